@@ -38,7 +38,7 @@ from femubench.core.challenge.calibration import (
 from femubench.core.challenge.sweep import (
     GROUPS,
     Record,
-    Task,
+    SweepCase,
     bars_table,
     run_task,
     stated,
@@ -52,7 +52,7 @@ DOCS = ROOT / "docs"
 NO_NAME = ("none", "unknown", "not-confirmed", "error")
 
 
-def diagnosed(task: Task) -> Record:
+def diagnosed(task: SweepCase) -> Record:
     """Return the record of one case, on one thread."""
     from femubench.core.diagnosis.diagnose import diagnose
 
@@ -74,7 +74,7 @@ def read_records(path: Path) -> list[Record]:
     return list(records.values())
 
 
-def run(path: Path, wanted: Sequence[Task], jobs: int) -> None:
+def run(path: Path, wanted: Sequence[SweepCase], jobs: int) -> None:
     """Diagnose what is not in the results file yet; append a line a case."""
     known = {(record["group"], record["number"]) for record in read_records(path)}
     rest = [task for task in wanted if task.key not in known]

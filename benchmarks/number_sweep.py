@@ -21,7 +21,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from femubench.core.challenge.sweep import GROUPS, Record, Task, run_task, tasks
+from femubench.core.challenge.sweep import GROUPS, Record, SweepCase, run_task, tasks
 from femubench.core.inference.settings import Setting, Value, overridden, settings_table, shown
 
 ROOT = Path(__file__).parents[1]
@@ -53,7 +53,7 @@ def moved(setting: Setting, up: bool) -> Value:
     return value * factor
 
 
-def answer(task: Task, values: Mapping[str, Value]) -> Record:
+def answer(task: SweepCase, values: Mapping[str, Value]) -> Record:
     """Return what is said of a case while some numbers have other values."""
     from femubench.core.diagnosis.diagnose import diagnose
 
@@ -76,7 +76,7 @@ def read(path: Path) -> list[dict[str, Any]]:
     return found
 
 
-def chosen(count: int) -> list[Task]:
+def chosen(count: int) -> list[SweepCase]:
     """Return so many cases, spread over the groups that do not take long."""
     groups = [group for group in GROUPS if group.name not in SLOW]
     each = -(-count // len(groups))

@@ -57,8 +57,8 @@ from femubench.core.challenge.outcome import (
 )
 from femubench.core.challenge.posing import HEALTHY
 from femubench.core.challenge.sweep import Record
-from femubench.core.challenge.true_fit import Finding, fits_of, fits_worse, is_search_fault
-from femubench.core.challenge.truth_file import TRUTH_FILE, Truth, read_truth
+from femubench.core.challenge.true_fit import CataloguedCause, fits_of, fits_worse, is_search_fault
+from femubench.core.challenge.truth_file import TRUTH_FILE, KnownCase, read_truth
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.plugin.loader import load_plugins
 from truths.posing import DEFECTS, FAULTS, OPENSEES, STRUCTURES, SUITE, pose
@@ -158,14 +158,14 @@ def diagnosed(task: Task, key: tuple[str, str]) -> Record:
     return record
 
 
-def _fits(diagnosis: Diagnosis, truth: Truth) -> Record:
+def _fits(diagnosis: Diagnosis, truth: KnownCase) -> Record:
     """Return how the true causes fit beside what was found; nothing where there are none."""
     if diagnosis.examination is None or truth.kind not in ("defect", "pair"):
         return {}
     # A true size is one parameter's; where an effect has more, the others are not known.
     causes = [
         [
-            Finding(effect, place, () if cause.size is None or i else (cause.size,))
+            CataloguedCause(effect, place, () if cause.size is None or i else (cause.size,))
             for i, (effect, place) in enumerate(cause.findings)
         ]
         for cause in truth.causes
@@ -218,7 +218,7 @@ def is_of(record: Record | None, key: tuple[str, str]) -> bool:
     return record is not None and (record["name"], record["digest"]) == key
 
 
-def reach(truth: Truth) -> str:
+def reach(truth: KnownCase) -> str:
     """Return the range of the visibility of a truth; a dash where it has none.
 
     A mode that appears among the used ones cannot be overlooked, whatever the others do.
@@ -230,7 +230,7 @@ def reach(truth: Truth) -> str:
     return next(word for word, edge in zip(RANGES, EDGES, strict=True) if truth.chi2 < edge)
 
 
-def kind_of(truth: Truth) -> str:
+def kind_of(truth: KnownCase) -> str:
     """Return the row of a truth: faults of the data by what they are, all others by kind."""
     return truth.causes[0].effect if truth.kind.endswith("-fault") else truth.kind
 
@@ -251,7 +251,7 @@ class Scored:
         seconds: of one core.
     """
 
-    truth: Truth
+    truth: KnownCase
     said: str
     sure: bool
     beside: str = ""
@@ -261,7 +261,7 @@ class Scored:
     seconds: float = 0.0
 
 
-def scored(records: Mapping[str, Record], truths: Iterable[Truth], suite: Path) -> list[Scored]:
+def scored(records: Mapping[str, Record], truths: Iterable[KnownCase], suite: Path) -> list[Scored]:
     """Return what was said of every truth that has a record."""
 
     @cache
@@ -293,7 +293,7 @@ def scored(records: Mapping[str, Record], truths: Iterable[Truth], suite: Path) 
     return found
 
 
-def stated(truth: Truth, record: Record, same: Same) -> list[Statement]:
+def stated(truth: KnownCase, record: Record, same: Same) -> list[Statement]:
     """Return the probabilities of names and places in a record, and whether they are right.
 
     What is taken at the textbook value counts neither way; where the data or what was typed in
@@ -329,7 +329,7 @@ def outcome_row(first: Mapping[str, str], cases: Sequence[Scored]) -> dict[str, 
 
 
 def outcome_table(
-    head: str, group: Callable[[Truth], str], cases: Iterable[Scored], order: Sequence[str] = ()
+    head: str, group: Callable[[KnownCase], str], cases: Iterable[Scored], order: Sequence[str] = ()
 ) -> str:
     """Return a table with one row a group of cases, in a given order or by name."""
     groups: dict[str, list[Scored]] = {}
@@ -345,7 +345,7 @@ def ranked(names: Iterable[str], order: Sequence[str]) -> list[str]:
     return [*first, *sorted(known - set(first))]
 
 
-def visibility_table(truths: Iterable[Truth]) -> str:
+def visibility_table(truths: Iterable[KnownCase]) -> str:
     """Return how many cases of each kind change the data by how much."""
     kinds: dict[str, list[str]] = {}
     for truth in truths:
@@ -449,7 +449,7 @@ def _beside(cases: Sequence[Scored]) -> str:
 
 def tables(
     cases: Sequence[Scored],
-    truths: Sequence[Truth],
+    truths: Sequence[KnownCase],
     *,
     reference: bool = False,
     generator: str = "",

@@ -89,7 +89,7 @@ class Items:
 
 
 @dataclass(frozen=True)
-class Card:
+class FindingCard:
     """Something that was found, with everything that is known of it.
 
     Arguments:
@@ -118,7 +118,7 @@ class Card:
 class Cards:
     """What was found, one by one."""
 
-    cards: Sequence[Card]
+    cards: Sequence[FindingCard]
 
     @property
     def entries(self) -> Sequence[tuple[str, ...]]:
@@ -154,7 +154,7 @@ Block = str | Table | Items | Cards | Drawing | Row
 
 
 @dataclass(frozen=True)
-class Section:
+class Passage:
     """Blocks under a title; without a title they stand by themselves.
 
     Arguments:

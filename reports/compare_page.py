@@ -13,7 +13,7 @@ from femubench.reports.blocks import (
     Column,
     Drawing,
     Items,
-    Section,
+    Passage,
     Table,
 )
 from femubench.reports.cells import NOTHING, fixed, plain, shortened
@@ -56,7 +56,7 @@ def comparison_text(data: Mapping[str, Any]) -> str:
         data: what `bench compare --format json` writes.
     """
     before, after = _sides(data)
-    top = Section("", [f"A {before}, B {after}: {headline(data)}"])
+    top = Passage("", [f"A {before}, B {after}: {headline(data)}"])
     return to_terminal([top, *_sections(data, screen=True)]).replace(_BLANK, " ")
 
 
@@ -92,11 +92,11 @@ def _sides(data: Mapping[str, Any]) -> tuple[str, str]:
     return before, after
 
 
-def _top(data: Mapping[str, Any]) -> Section:
-    return Section("", [Items(tuple(zip("AB", _sides(data), strict=True)))])
+def _top(data: Mapping[str, Any]) -> Passage:
+    return Passage("", [Items(tuple(zip("AB", _sides(data), strict=True)))])
 
 
-def _sections(data: Mapping[str, Any], *, screen: bool = False) -> Iterator[Section]:
+def _sections(data: Mapping[str, Any], *, screen: bool = False) -> Iterator[Passage]:
     """Yield the parts; lists are cut on the screen, and tables show what differs."""
     differing = [shortened(plain(line), _LONGEST) for line in data["environment"]]
     notes = [shortened(plain(note), _LONGEST) for note in data["notes"]]
@@ -105,7 +105,7 @@ def _sections(data: Mapping[str, Any], *, screen: bool = False) -> Iterator[Sect
     evidence = data["evidence"]
     told = [] if screen else _drawn(evidence)
     proof = Table(_PROOF, [*map(_proof, evidence)])
-    yield Section("Is it more than chance?", [*told, proof, _EVIDENCE])
+    yield Passage("Is it more than chance?", [*told, proof, _EVIDENCE])
     legend = f"{_LEGEND} {_TELLING}" if screen else _LEGEND
     cells = []
     for row in data["rows"]:
@@ -122,7 +122,7 @@ def _sections(data: Mapping[str, Any], *, screen: bool = False) -> Iterator[Sect
         for key, say in zip(_RATIOS, says, strict=True)
     ]
     columns = [Column("strategy", 22, left=True), Column("jobs", 4), *figures, Column("lost", 4)]
-    yield Section("Ratios", [Table(columns, cells), legend])
+    yield Passage("Ratios", [Table(columns, cells), legend])
     yield from _listed("Only in A", _jobs(data["only_before"]), screen)
     yield from _listed("Only in B", _jobs(data["only_after"]), screen)
     yield from _listed("Not compared: other case files", _jobs(data["other_cases"]), screen)
@@ -131,12 +131,12 @@ def _sections(data: Mapping[str, Any], *, screen: bool = False) -> Iterator[Sect
     yield from _listed("Thresholds that nothing was held against", data["untested"], screen)
 
 
-def _listed(title: str, lines: Iterable[str], screen: bool) -> Iterator[Section]:
+def _listed(title: str, lines: Iterable[str], screen: bool) -> Iterator[Passage]:
     found = list(lines)
     shown = found[:_MOST_LINES] if screen else found
     more = [f"... and {len(found) - len(shown)} more"] if len(shown) < len(found) else []
     if found:
-        yield Section(title, [Items([("", line) for line in [*shown, *more]])])
+        yield Passage(title, [Items([("", line) for line in [*shown, *more]])])
 
 
 def _drawn(evidence: Sequence[Mapping[str, Any]]) -> list[Block]:

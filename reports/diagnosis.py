@@ -15,14 +15,14 @@ from femubench.plot import MOST_ROWS, evidence, residual_dots, residuals, strong
 from femubench.reports import diagnosis_words as words
 from femubench.reports.blocks import (
     Block,
-    Card,
     Cards,
     Cell,
     Column,
     Drawing,
+    FindingCard,
     Items,
+    Passage,
     Row,
-    Section,
     Table,
 )
 from femubench.reports.cells import chance, figure, plain, sentence, signed
@@ -40,12 +40,12 @@ _EVIDENCE = "Thick lines and large dots: strong evidence. Numbers: the causes. "
 
 def diagnosis_text(data: Data) -> str:
     """Return a diagnosis as plain text of 80 columns at most."""
-    return to_terminal([Section("", [_heading(data)]), *_sections(data)])
+    return to_terminal([Passage("", [_heading(data)]), *_sections(data)])
 
 
 def diagnosis_markdown(data: Data) -> str:
     """Return a diagnosis in GitHub's Markdown."""
-    sections = [Section("", [_heading(data)]), *_sections(data)]
+    sections = [Passage("", [_heading(data)]), *_sections(data)]
     return to_markdown(sections, f"Diagnosis of {data['case']}")
 
 
@@ -76,7 +76,7 @@ def _heading(data: Data) -> str:
     return data["sentence"] or f"The verdict on {data['case']} is {data['verdict']}."
 
 
-def _sections(data: Data, *, page: bool = False) -> list[Section]:
+def _sections(data: Data, *, page: bool = False) -> list[Passage]:
     """Return what a diagnosis says; of a page the verdict, causes and faults stand at the top."""
     verdict, base, reason = data["verdict"], data["base"], sentence(data["reason"])
     name = verdict if page else f"{data['case']}: {verdict}"
@@ -92,21 +92,21 @@ def _sections(data: Data, *, page: bool = False) -> list[Section]:
     gain_title = "How far off the model is" if verdict == "none" else "What it gains"
     textbook = [f"Taken at the textbook value: {', '.join(base)}."] if base else []
     found = (
-        Section("", [said, Items(_tiles(data), look="tiles")], area="first"),
-        Section(words.CAUSES.get(verdict, ""), [*_cards(data), *textbook], area="first"),
-        Section("", [_map(data)] if page else [], area="beside"),
-        Section(words.FAULTS, _cards(data, faults=True), area="beside"),
-        Section("The stated scatter does not fit what is left", [Items(warned)] * bool(warned),
+        Passage("", [said, Items(_tiles(data), look="tiles")], area="first"),
+        Passage(words.CAUSES.get(verdict, ""), [*_cards(data), *textbook], area="first"),
+        Passage("", [_map(data)] if page else [], area="beside"),
+        Passage(words.FAULTS, _cards(data, faults=True), area="beside"),
+        Passage("The stated scatter does not fit what is left", [Items(warned)] * bool(warned),
                 area="beside", look="notes"),
-        Section(next_title, [*([reason] if reason else []), *_advice(data)]),
-        Section(gain_title, _gain(data)),
-        Section("How well it fits", list(_fit(data, page=page))),
-        Section("Where it is", list(_where(data))),
-        Section("Rivals", [*_rivals(data), *map(words.weight, data["evidence"])]),
-        Section("The smallest that these data would have shown", _visible(data)),
-        Section("Classical indicators of where the error sits", _indicators(data, page=page)),
-        Section("Plausibility checks of the model, before any fit", [Items(looks)] * bool(looks)),
-        Section("Notes", [Items(notes)] * bool(notes)),
+        Passage(next_title, [*([reason] if reason else []), *_advice(data)]),
+        Passage(gain_title, _gain(data)),
+        Passage("How well it fits", list(_fit(data, page=page))),
+        Passage("Where it is", list(_where(data))),
+        Passage("Rivals", [*_rivals(data), *map(words.weight, data["evidence"])]),
+        Passage("The smallest that these data would have shown", _visible(data)),
+        Passage("Classical indicators of where the error sits", _indicators(data, page=page)),
+        Passage("Plausibility checks of the model, before any fit", [Items(looks)] * bool(looks)),
+        Passage("Notes", [Items(notes)] * bool(notes)),
     )  # fmt: skip
     return [section for section in found if section.blocks]
 
@@ -138,12 +138,12 @@ def _cards(data: Data, *, faults: bool = False) -> list[Block]:
     return [Cards(cards)] if cards else []
 
 
-def _card(number: int, cause: Data) -> Card:
+def _card(number: int, cause: Data) -> FindingCard:
     sure = [("probability", cause["probability"])]
     if cause["place"] != "all" and cause["place_probability"] is not None:
         sure.append(("at this place", cause["place_probability"]))
     said = "textbook value, not fitted"
-    return Card(
+    return FindingCard(
         cause["effect"],
         words.at(cause["place"]),
         number,

@@ -6,14 +6,14 @@ from collections.abc import Iterable
 
 from markupsafe import Markup
 
-from femubench.reports.blocks import Section
+from femubench.reports.blocks import Passage
 from femubench.reports.cells import plain
 from femubench.reports.svg import embedded
 from femubench.reports.templating import asset, templates
 
 
 def to_html(
-    sections: Iterable[Section],
+    sections: Iterable[Passage],
     *,
     title: str,
     heading: str,

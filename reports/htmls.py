@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from femubench.reports.page.data import Exhibits, page_data
+from femubench.reports.page.data import ExhibitSource, page_data
 from femubench.reports.page.document import document
 from femubench.results import Run, StudyAxes
 
@@ -24,7 +24,7 @@ class HtmlReporter:
         """Return the page, without what only a store can add."""
         return self.render_with(run, None)
 
-    def render_with(self, run: Run, exhibits: Exhibits | None) -> str:
+    def render_with(self, run: Run, exhibits: ExhibitSource | None) -> str:
         """Return the page with the drawings that the store has."""
         if StudyAxes.asked(run) is not None:
             from femubench.reports.study import study_html

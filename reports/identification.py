@@ -10,7 +10,7 @@ import numpy as np
 
 from femubench import Identification, __version__
 from femubench.plot import stabilisation, svg, synthesis
-from femubench.reports.blocks import Cell, Column, Drawing, Items, Row, Section, Table
+from femubench.reports.blocks import Cell, Column, Drawing, Items, Passage, Row, Table
 from femubench.reports.cells import estimate, figure
 from femubench.reports.terminal import to_terminal
 
@@ -24,7 +24,7 @@ _OVERVIEW, _SMALL = (8.6, 4.2), (4.0, 2.8)  # inch
 
 def identification_text(found: Identification) -> str:
     """Return the modes as plain text of 80 columns at most."""
-    return to_terminal([Section("", [_heading(found), _modes(found)])])
+    return to_terminal([Passage("", [_heading(found), _modes(found)])])
 
 
 def identification_html(found: Identification, source: str = "") -> str:
@@ -68,29 +68,29 @@ def _pair(value: float, std: float) -> tuple[str, str]:
     return text, spread or figure(float(std), 2)
 
 
-def _sections(found: Identification) -> Iterator[Section]:
+def _sections(found: Identification) -> Iterator[Passage]:
     said = (
         "Standard deviations are those of the fit to these data. MPC is 1 and MPD 0 for a real "
         "shape."
     )
-    yield Section("Modes", [said, _modes(found)])
+    yield Passage("Modes", [said, _modes(found)])
     said = (
         "Every dot is a pole of a model of that size; filled dots lie at a mode, open ones at "
         "none. Vertical lines are the modes, the grey curve is what was measured."
     )
     title = "Poles over model orders"
     drawn = _drawing(found, "stabilisation", title, stabilisation, _OVERVIEW)
-    yield Section(title, [said, Row([drawn])])
+    yield Passage(title, [said, Row([drawn])])
     if found.measured is not None:
         channels, title = int(_seen(found).sum()), "Synthesised over measured, all channels"
         said = f"Root mean square over {channels} channels, each at a level of one."
         drawn = _drawing(found, "synthesis", title, synthesis, _OVERVIEW)
-        yield Section(title, [said, Row([drawn])])
+        yield Passage(title, [said, Row([drawn])])
         worst = list(_worst(found))
         said = f"Of {channels} channels, by the share of the response that the modes leave."
         if worst:
-            yield Section("Channels that fit worst", [said, Row(worst)])
-    yield Section("How it was done", [Items(list(_facts(found)), look="parameters")])
+            yield Passage("Channels that fit worst", [said, Row(worst)])
+    yield Passage("How it was done", [Items(list(_facts(found)), look="parameters")])
 
 
 def _facts(found: Identification) -> Iterator[tuple[str, str]]:

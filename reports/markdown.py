@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from urllib.parse import quote
 
-from femubench.reports.blocks import Block, Cards, Items, Row, Section, Table
+from femubench.reports.blocks import Block, Cards, Items, Passage, Row, Table
 from femubench.reports.cells import plain
 
 _SPECIAL = re.compile(r"([\\`*_\[\]|~])")
@@ -15,7 +15,7 @@ _ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
 _STARTERS = re.compile(r"^(\d*)([#+\-=.)])")
 
 
-def to_markdown(sections: Iterable[Section], title: str = "") -> str:
+def to_markdown(sections: Iterable[Passage], title: str = "") -> str:
     """Return a document; whatever Markdown or HTML would obey is escaped."""
     heading = [f"# {escape(title)}"] if title else []
     return "\n\n".join([*heading, *(part for section in sections for part in _parts(section))])
@@ -34,7 +34,7 @@ def table(headers: Sequence[str], rows: Iterable[Iterable[str]], align: str) -> 
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def _parts(section: Section) -> Iterator[str]:
+def _parts(section: Passage) -> Iterator[str]:
     if section.title:
         yield f"{'#' * section.level} {escape(section.title)}"
     for block in section.blocks:

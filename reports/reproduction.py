@@ -11,7 +11,7 @@ from femubench.reports.blocks import (
     Column,
     Drawing,
     Items,
-    Section,
+    Passage,
     Table,
 )
 from femubench.reports.cells import plain
@@ -111,25 +111,25 @@ def _noun(cells: Sequence[Cell]) -> str:
     return "cell" if len(cells) == 1 else "cells"
 
 
-def _legend(words: Words) -> Iterator[Section]:
+def _legend(words: Words) -> Iterator[Passage]:
     entries = [(words[verdict], meaning) for verdict, meaning in MEANING.items()]
-    yield Section("How to read it", [AGREE, Items(entries), DEVIATION])
+    yield Passage("How to read it", [AGREE, Items(entries), DEVIATION])
 
 
-def _chapters(studies: Iterable[Study], words: Words, folder: str) -> Iterator[Section]:
+def _chapters(studies: Iterable[Study], words: Words, folder: str) -> Iterator[Passage]:
     for study in studies:
-        yield Section(study.title, [study.citation, f"{sentence_of_counts(study.cells)}."])
+        yield Passage(study.title, [study.citation, f"{sentence_of_counts(study.cells)}."])
         yield from _remarks("What was taken from where", study.premises)
         tables: dict[str, list[Cell]] = {}
         for cell in study.cells:
             tables.setdefault(cell.table, []).append(cell)
         for table, cells in tables.items():
             title = heading(table)
-            yield Section(title, list(cells_in_words(cells, words)), level=3)
+            yield Passage(title, list(cells_in_words(cells, words)), level=3)
         yield from parts_of(study, partial(_drawing, folder=folder))
 
 
-def parts_of(study: Study, drawn: Callable[[Figure], Drawing]) -> Iterator[Section]:
+def parts_of(study: Study, drawn: Callable[[Figure], Drawing]) -> Iterator[Passage]:
     """Yield what follows the tables of a paper.
 
     Arguments:
@@ -137,14 +137,14 @@ def parts_of(study: Study, drawn: Callable[[Figure], Drawing]) -> Iterator[Secti
     """
     yield from _remarks("What the re-run shows", study.findings)
     for extra in study.extras:
-        yield Section(extra.title, list(_extra_blocks(extra)), level=3)
+        yield Passage(extra.title, list(_extra_blocks(extra)), level=3)
     if study.figures:
-        yield Section("Figures", [drawn(figure) for figure in study.figures], level=3)
+        yield Passage("Figures", [drawn(figure) for figure in study.figures], level=3)
 
 
-def _remarks(title: str, sentences: Sequence[str]) -> Iterator[Section]:
+def _remarks(title: str, sentences: Sequence[str]) -> Iterator[Passage]:
     if sentences:
-        yield Section(title, [Items([("", sentence) for sentence in sentences])], level=3)
+        yield Passage(title, [Items([("", sentence) for sentence in sentences])], level=3)
 
 
 def cells_in_words(cells: Sequence[Cell], words: Words) -> Iterator[Block]:

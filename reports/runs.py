@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from femubench.reports import study
-from femubench.reports.blocks import Block, Cell, Column, Items, Section, Table
+from femubench.reports.blocks import Block, Cell, Column, Items, Passage, Table
 from femubench.reports.cells import NOTHING, hertz, interval, plain, whole
 from femubench.reports.markdown import escape, to_markdown
 from femubench.reports.page.papers import papers_of, started_as_drawn
@@ -100,7 +100,7 @@ class TerminalReporter:
             return study.study_text(run)
         failed = failures(troubles(run.results))
         told = [*failed, *_notes(run)]
-        return to_terminal([*_board(run), *(Section("", [block]) for block in told)])
+        return to_terminal([*_board(run), *(Passage("", [block]) for block in told)])
 
     def notes(self, run: Run) -> list[str]:
         """Return what a reader has to know of a run, where a format has no room for it."""
@@ -193,7 +193,7 @@ def _marks(row: _Row) -> str:
     return ("!" if row["unphysical"] else "") + ("*" if incomplete else "")
 
 
-def _board(run: Run, title: str = "") -> Iterator[Section]:
+def _board(run: Run, title: str = "") -> Iterator[Passage]:
     """Yield the leaderboard, what its columns mean, and what the run shows."""
     rows = leaderboard(run).to_dict("records")
     tested = tell_apart(run, [row["strategy"] for row in rows])
@@ -225,16 +225,16 @@ def _board(run: Run, title: str = "") -> Iterator[Section]:
     if not title and not {heads[k].title for k in known[_ALWAYS:]} - _BESIDE:
         known = known[:_ALWAYS]
     table = Table([heads[k] for k in known], [[line[k] for k in known] for line in cells], names=1)
-    yield Section(title, [table])
+    yield Passage(title, [table])
     titles = " ".join([*(c.title.replace("\n", " ") for c in table.columns), *map(_marks, rows)])
     legend = [entry for entry in _LEGEND.items() if entry[0].partition(",")[0] in titles]
     if title or not tested.tiers:
         legend.append(("tier, group" if tested.tiers else "#", tested.note))
-    yield Section("", [lead(run), Items(legend)])
+    yield Passage("", [lead(run), Items(legend)])
     if said := finding(run, rows, tested.tiers):
-        yield Section("", [" ".join(said)])
+        yield Passage("", [" ".join(said)])
     if twins := list(_twins(run)):
-        yield Section("Twins" if title else "", twins)
+        yield Passage("Twins" if title else "", twins)
 
 
 def _twins(run: Run) -> Iterator[Block]:
@@ -271,12 +271,12 @@ def _moving(run: Run) -> Iterator[str]:
         yield f"Still moving at their last iteration (jobs): {named}."
 
 
-def _document(run: Run) -> Iterator[Section]:
+def _document(run: Run) -> Iterator[Passage]:
     notes = [("Note", note) for note in notes_of(run)]
     about = Table([Column("", 9, left=True)] * 2, list(header(run)))
-    yield Section("", [about, *([Items(notes)] if notes else [])])
+    yield Passage("", [about, *([Items(notes)] if notes else [])])
     yield from _board(run, "Leaderboard")
-    yield Section("", [Items([("skill", _SKILL), floors_said(run)])])
+    yield Passage("", [Items([("skill", _SKILL), floors_said(run)])])
     rows: list[list[Cell]] = []
     for name in strategies_of(run):
         found = [result.status for result in run.results if result.strategy == name]
@@ -285,18 +285,18 @@ def _document(run: Run) -> Iterator[Section]:
     heads = [Column(name, 14) for name in ("ok", "not applicable", "failed", "jobs")]
     both = ["Jobs from both nominal models."] if len(run.nominals) > 1 else []
     counted = Table([Column("strategy", 16, left=True), *heads], rows)
-    yield Section("Coverage", [*both, counted, *_moving(run)])
+    yield Passage("Coverage", [*both, counted, *_moving(run)])
     for title, fine in (("Failures", False), ("Not applicable", True)):
         ended = failures(troubles(run.results, fine=fine))
-        yield Section(title, ended or ["None."], level=3)
+        yield Passage(title, ended or ["None."], level=3)
     drawn, papers, ranked = started_as_drawn(run), papers_of(run), Run(run.meta, run.ranked)
     for case in cases_of(run):
         start, printed = drawn.get(case, {}), papers.get(case, {})
         others = (("from the model as drawn", start), ("as the paper prints it", printed))
-        yield Section(f"Case {case}", list(_case(ranked, case, others)))
+        yield Passage(f"Case {case}", list(_case(ranked, case, others)))
     yield from _changes(ranked)
     if cited := run.meta.get("citations"):
-        yield Section("Strategies", [Items(list(cited.items()))])
+        yield Passage("Strategies", [Items(list(cited.items()))])
 
 
 def _case(run: Run, case: str, others: Iterable[tuple[str, _Printed]]) -> Iterator[Block]:
@@ -358,7 +358,7 @@ def _mac(modes: Iterable[PairedMode]) -> float | None:
     return sum(values) / len(values) if values else None
 
 
-def _changes(run: Run) -> Iterator[Section]:
+def _changes(run: Run) -> Iterator[Passage]:
     """Yield the errors after every design change, a table a scenario, a strategy a row."""
     modes, seed = modes_frame(run), first_seed(run)
     modes = modes[(modes["block"] == "modified") & (modes["seed"] == seed)]
@@ -378,4 +378,4 @@ def _changes(run: Run) -> Iterator[Section]:
         ]
         told = [(str(number), ": ".join(change)) for number, change in enumerate(changes, 1)]
         heads = [Column("strategy", 16, left=True), *(Column(n, 7, digits=2) for n, _ in told)]
-        yield Section(f"Design changes of {scenario}", [said, Items(told), Table(heads, rows)])
+        yield Passage(f"Design changes of {scenario}", [said, Items(told), Table(heads, rows)])

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from femubench import InputError
-from femubench.reports.blocks import Block, Column, Drawing, Items, Section, Table
+from femubench.reports.blocks import Block, Column, Drawing, Items, Passage, Table
 from femubench.reports.cells import NOTHING, fixed, interval, plain
 from femubench.reports.markdown import to_markdown
 from femubench.reports.summary import failures, header, lead, notes_of, troubles
@@ -50,23 +50,23 @@ def _title(run: Run) -> str:
     return plain(StudyAxes.of(run).title) or f"Study {plain(run.meta.get('run', ''))}"
 
 
-def _sections(run: Run, *drawing: Block) -> Iterator[Section]:
+def _sections(run: Run, *drawing: Block) -> Iterator[Passage]:
     known = StudyAxes.of(run)
     x, y = known.pictured
-    yield Section("", [lead(run)], area="first")
-    yield Section(f"Skill by {x} and {y}", [*drawing, _grid(run, known, x, y)])
+    yield Passage("", [lead(run)], area="first")
+    yield Passage(f"Skill by {x} and {y}", [*drawing, _grid(run, known, x, y)])
     cells = skill_by(run).to_dict("records")
-    yield Section(f"Cells ({len(cells)})", [*_cells(cells), _COUNTED])
+    yield Passage(f"Cells ({len(cells)})", [*_cells(cells), _COUNTED])
     if failed := failures(troubles(run.results)):
-        yield Section("Failures", failed)
+        yield Passage("Failures", failed)
     if notes := [("Note", note) for note in notes_of(run)]:
-        yield Section("Notes", [Items(notes)])
+        yield Passage("Notes", [Items(notes)])
 
 
-def _about(run: Run) -> Section:
+def _about(run: Run) -> Passage:
     known = StudyAxes.of(run)
     axes = [(name, ", ".join(map(StudyAxes.text_of, known.values(name)))) for name in known.names]
-    return Section("Study", [Items([*axes, *header(run)])])
+    return Passage("Study", [Items([*axes, *header(run)])])
 
 
 def _drawing(run: Run) -> Block:

@@ -6,13 +6,13 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import zip_longest
 
-from femubench.reports.blocks import Block, Cards, Column, Items, Row, Section, Table
+from femubench.reports.blocks import Block, Cards, Column, Items, Passage, Row, Table
 from femubench.reports.cells import plain, shortened
 
 WIDTH = 80
 
 
-def to_terminal(sections: Iterable[Section]) -> str:
+def to_terminal(sections: Iterable[Passage]) -> str:
     """Return plain text of 80 columns at most; whatever a terminal would obey is taken out."""
     return "\n\n".join("\n".join(_screen(section)) for section in sections)
 
@@ -30,7 +30,7 @@ def aligned_table(rows: list[list[str]], headers: tuple[str, ...], align: tuple[
     return "\n".join(line.rstrip() for line in text.splitlines())
 
 
-def _screen(section: Section) -> Iterator[str]:
+def _screen(section: Passage) -> Iterator[str]:
     if section.title:
         yield shortened(plain(section.title), WIDTH)
     for block in section.blocks:

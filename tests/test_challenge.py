@@ -27,17 +27,13 @@ from femubench.core.challenge.sweep import bars_table, run_task, tasks
 from femubench.core.challenge.truth import (
     KINDS,
     DataKind,
-    TrueCause,
+    HiddenCause,
     Truth,
     fine_places,
     finer,
     scattered,
 )
-from femubench.core.challenge.truth_file import (
-    TrueCause as GivenCause,
-    Truth as GivenTruth,
-    truth_text,
-)
+from femubench.core.challenge.truth_file import KnownCase, TrueCause, truth_text
 from femubench.core.challenge.visibility import delta_chi2
 from femubench.core.cli.main import bench
 from femubench.core.errors import FemubenchError, ModelError
@@ -100,11 +96,11 @@ class Absurd(ToyModulus):
 TOYS = {toy.name: toy for toy in (ToyMass(), ToyModulus())}
 
 
-def cause(effect: str = "added-mass", place: str = "J1", value: float = 0.1) -> TrueCause:
-    return TrueCause(effect, place, ("mass",), (value,), ("kg",))
+def cause(effect: str = "added-mass", place: str = "J1", value: float = 0.1) -> HiddenCause:
+    return HiddenCause(effect, place, ("mass",), (value,), ("kg",))
 
 
-def truth(*causes: TrueCause, outside: str = "") -> Truth:
+def truth(*causes: HiddenCause, outside: str = "") -> Truth:
     hidden = "outside" if outside else {0: "none", 1: "one"}.get(len(causes), "pair")
     return Truth(7, "A", "ladder", hidden, causes, outside)  # type: ignore[arg-type]
 
@@ -570,16 +566,14 @@ def outside(tmp_path: Path) -> Path:
     """Write a folder of one truth, on a built-in structure, and one on a structure beside it."""
     room = tmp_path / "truths"
     frame = read_cases("frame-solid", load_plugins())[0].folder
-    loose = GivenCause(
-        "a loose joint", "joint-rotation", "J1", ("joint-offset@J1",), 4e3, "N m/rad"
-    )
+    loose = TrueCause("a loose joint", "joint-rotation", "J1", ("joint-offset@J1",), 4e3, "N m/rad")
     for name, structure, causes in (
         ("a", frame.name, (loose,)),
         ("b", "ours", ()),
     ):
         (room / name).mkdir(parents=True)
         kind = "defect" if causes else "clean"
-        told = GivenTruth(name, structure, kind, 1, causes, 50.0, 40.0)
+        told = KnownCase(name, structure, kind, 1, causes, 50.0, 40.0)
         (room / name / "truth.toml").write_text(truth_text(told), encoding="utf-8")
         shutil.copyfile(frame / "modes.csv", room / name / "modes.csv")
     shutil.copytree(frame, room / "structures" / "ours")

@@ -9,7 +9,7 @@ import pytest
 import femubench
 from femubench.core.challenge.draw import BlindCase
 from femubench.core.challenge.sweep import Record, run_task, stated, tasks
-from femubench.core.challenge.true_fit import Finding, fits_worse, true_fit
+from femubench.core.challenge.true_fit import CataloguedCause, fits_worse, true_fit
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import InputError
@@ -85,11 +85,11 @@ def test_the_truth_is_found_from_the_grid_too() -> None:
     seen, truth = diagnosed(None).examination, pair().truth
     assert seen is not None
     effects = load_plugins().effects
-    causes = [[Finding(cause.effect, cause.place)] for cause in truth.causes]
+    causes = [[CataloguedCause(cause.effect, cause.place)] for cause in truth.causes]
     without = true_fit(seen, causes, effects, str.__eq__)
     assert without is not None
     assert without.chi2 == pytest.approx(recorded(None)["true_fit"]["chi2"], abs=0.1)
-    nowhere = [[Finding(cause.effect, "nowhere")] for cause in truth.causes]
+    nowhere = [[CataloguedCause(cause.effect, "nowhere")] for cause in truth.causes]
     assert true_fit(seen, nowhere, effects, str.__eq__) is None
 
 

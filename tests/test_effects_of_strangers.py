@@ -19,7 +19,7 @@ from femubench import Diagnosis, InputError, Model, diagnose
 from femubench.core.case.case import Case
 from femubench.core.challenge import draw
 from femubench.core.challenge.draw import BlindCase, draw_case
-from femubench.core.challenge.sweep import Task, run_task
+from femubench.core.challenge.sweep import SweepCase, run_task
 from femubench.core.conformance.checking import findings, subjects
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
 from femubench.core.look.look import look
@@ -177,7 +177,7 @@ def softer(case: Case) -> Diagnosis:
     return diagnose(replace(case, model=model), known(Skin.name, Plain.name))
 
 
-class TaskOfSkin(Task):
+class TaskOfSkin(SweepCase):
     def draw(self) -> BlindCase:
         return draw_case(self.seed, self.kind, effect=Skin.name)
 

@@ -166,7 +166,7 @@ def test_a_mode_that_no_sensor_sees_has_no_shape(crossing: Measurement) -> None:
     data = Data(crossing, np.zeros(0))
     assert len(data) == 2 + 4
     assert list((data.weight > 0.0).any(axis=0)) == [True, False]
-    assert not residuals.Data(crossing, statistical=True).shape_weight[:, 1].any()
+    assert not residuals.Targets(crossing, statistical=True).shape_weight[:, 1].any()
     noise = 1e-15 * np.random.default_rng(0).standard_normal((4, 4))
     predicted = np.column_stack([noise[:, 0], crossing.shapes[:, 0], noise[:, 1:]])
     hertz = np.array([9.0, 10.5, 19.0, 30.0, 31.0])

@@ -15,7 +15,7 @@ from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.sensors import Sensors
 from femubench.core.look.localisation import locate
-from femubench.core.look.shape_expansion import Comparison, expand
+from femubench.core.look.shape_expansion import ModalCorrelation, expand
 from femubench.core.modal.eigen import dense_matrices, solve_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.schema.diagnosis import LocationRow
@@ -138,12 +138,12 @@ def test_an_added_mass_shows_at_its_joint(ladder: FrameBuilder, joint: int) -> N
 
 
 @pytest.fixture
-def noisy(ladder: FrameBuilder) -> Comparison:
+def noisy(ladder: FrameBuilder) -> ModalCorrelation:
     truth, _ = damaged(ladder(elements=2 * ELEMENTS), np.random.default_rng(1))
-    return Comparison.of(Model.of(ladder()), measured(truth, 3, f_std=1e-3, std=0.01))
+    return ModalCorrelation.of(Model.of(ladder()), measured(truth, 3, f_std=1e-3, std=0.01))
 
 
-def test_the_gap_obeys_its_equations(noisy: Comparison) -> None:
+def test_the_gap_obeys_its_equations(noisy: ModalCorrelation) -> None:
     expansion, shapes = expand(noisy), noisy.measurement.shapes
     mass, stiffness = dense_matrices(noisy.model)
     rows = noisy.model.observe(noisy.measurement.sensors)
@@ -157,7 +157,7 @@ def test_the_gap_obeys_its_equations(noisy: Comparison) -> None:
         assert 8.0 < np.square((shapes[:, j] - factor * seen) / 0.01).sum() < 12.1
 
 
-def test_no_other_shape_with_these_readings_has_a_smaller_error(noisy: Comparison) -> None:
+def test_no_other_shape_with_these_readings_has_a_smaller_error(noisy: ModalCorrelation) -> None:
     expansion = expand(noisy)
     mass, stiffness = dense_matrices(noisy.model)
     modes = solve_modes(noisy.model)

@@ -18,7 +18,7 @@ from femubench.core.fit.modal_fit import Problem, State, fit, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.static_response import Basis
 from femubench.core.inference.model_error import (
-    ModelError,
+    Inadequacy,
     class_widths,
     conditioned,
     error_slopes,
@@ -155,7 +155,7 @@ def drawn(
 def test_scales_follow_the_size_of_the_error(
     problem: Problem, slopes: dict[str, FloatArray]
 ) -> None:
-    model = ModelError.of(slopes, None, NOTHING, WIDTHS, 0.0, 0.0)
+    model = Inadequacy.of(slopes, None, NOTHING, WIDTHS, 0.0, 0.0)
     chosen = model.names.index("element stiffness"), model.names.index("mass of joints")
     seen = []
     for size in (0.0, 1.0, 3.0):
@@ -180,7 +180,7 @@ def test_scales_that_are_fitted_make_less_sure_than_a_noise_that_is_known(
     _, error = drawn(problem, slopes, rng, 0.5)
     offset = error + rng.standard_normal(len(error))
     offset -= state_at(problem, (part,), np.array([1.5])).raw
-    model = ModelError.of(slopes, slopes, error, WIDTHS, 0.02, 0.0)
+    model = Inadequacy.of(slopes, slopes, error, WIDTHS, 0.02, 0.0)
     present = replace(problem, offset=offset)
     guess = model.noise(model.fitted(state_at(present, (), NOTHING)))
     known = conditioned(model.covariance(guess.scales), model.residual, 0.0, beam=True)
@@ -203,7 +203,7 @@ def test_unseen_data_lie_within_what_is_foreseen(
     mode, _ = problem.data.shape_rows
     shapes = count + np.flatnonzero(mode >= count - 2)
     used = np.setdiff1d(np.arange(len(problem.data)), [*unseen, *shapes])
-    model = ModelError.of({k: s[used] for k, s in slopes.items()}, None, NOTHING, WIDTHS, 0.0, 0.0)
+    model = Inadequacy.of({k: s[used] for k, s in slopes.items()}, None, NOTHING, WIDTHS, 0.0, 0.0)
     rows = np.concatenate([used, unseen])
     scores, blind = [], []
     for seed in range(40):
@@ -237,7 +237,7 @@ def test_a_cause_beside_a_model_error_keeps_its_size(
     before = error + rng.standard_normal(len(error))
     # Data of the damaged structure, as if measured: the residual of the right cause is the error.
     offset = error + rng.standard_normal(len(error)) - state_at(problem, (part,), x).raw
-    model = ModelError.of(slopes, slopes, before, WIDTHS, 0.02, 0.0)
+    model = Inadequacy.of(slopes, slopes, before, WIDTHS, 0.02, 0.0)
     present = replace(problem, offset=offset)
     nothing = state_at(present, (), NOTHING)
     noise = model.noise(model.fitted(nothing))
@@ -246,7 +246,7 @@ def test_a_cause_beside_a_model_error_keeps_its_size(
     assert np.linalg.norm(shift) > 8.0
     assert abs(found.state.x[0] - 1.0) < 3.0 * np.sqrt(found.covariance[0, 0])
     assert np.sqrt(found.covariance[0, 0]) < 0.3
-    alone = ModelError.of(slopes, None, NOTHING, WIDTHS, 0.0, 0.0)
+    alone = Inadequacy.of(slopes, None, NOTHING, WIDTHS, 0.0, 0.0)
     blurred = fit(
         replace(present, noise=alone.noise(alone.fitted(nothing))), (part,), np.array([0.3])
     )
@@ -269,7 +269,7 @@ def test_what_a_cause_changes_may_be_off_by_a_share_of_it(
     rng = np.random.default_rng(9)
     reference, noise = rng.standard_normal((2, len(moved)))
     error = 0.3 * np.abs(moved) * rng.standard_normal(len(moved))
-    model = ModelError.of(slopes, slopes, reference, WIDTHS, 0.02, 0.0)
+    model = Inadequacy.of(slopes, slopes, reference, WIDTHS, 0.02, 0.0)
     near = model.fitted(replace(nothing, raw=noise + moved))
     shares = []
     for off in (0.0, 1.0):

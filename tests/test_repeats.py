@@ -17,7 +17,7 @@ from femubench.core.case.case import Case
 from femubench.core.case.writing import write_case
 from femubench.core.fit.residuals import Data as DiagnosisData
 from femubench.core.update.posterior_sampling import Target
-from femubench.core.update.residuals import Data as UpdateData
+from femubench.core.update.residuals import Targets as UpdateData
 from femubench.modal import shrunk_correlation
 
 CASES = Path(__file__).parent / "cases"

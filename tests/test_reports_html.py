@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from femubench.reports.blocks import Drawing, Items, Section
+from femubench.reports.blocks import Drawing, Items, Passage
 from femubench.reports.digits import Digits, off
 from femubench.reports.html import to_html
 from femubench.reports.markdown import to_markdown
@@ -189,15 +189,15 @@ class TestMarkdown:
         assert {len(re.findall(r"(?<!\\)\|", row)) for row in rows} == {3, 7, 8}
 
     def test_levels(self) -> None:
-        text = to_markdown([Section("a", [], 2), Section("b", [], 3)])
+        text = to_markdown([Passage("a", [], 2), Passage("b", [], 3)])
         assert text == "## a\n\n### b"
 
     def test_drawing(self) -> None:
         block = Drawing("A [b]", "c", file="figures/a b.svg")
-        assert to_markdown([Section("", [block])]) == (
+        assert to_markdown([Passage("", [block])]) == (
             "![A \\[b\\]](figures/a%20b.svg)\n\n**A \\[b\\]**: c"
         )
-        assert to_terminal([Section("", [block])]) == "  A [b]: c"
+        assert to_terminal([Passage("", [block])]) == "  A [b]: c"
 
 
 class TestHtml:
@@ -291,7 +291,7 @@ class TestHtml:
         assert names == ["Receptance <6Z/6Z>", "Bars"] * 2
 
     def test_label_and_empty_parts(self) -> None:
-        text = to_html([Section("", [Items([("a<", "b"), ("", "c")])])], title="t & u", heading="h")
+        text = to_html([Passage("", [Items([("a<", "b"), ("", "c")])])], title="t & u", heading="h")
         assert "<li><b>a&lt;</b>: b</li>\n<li>c</li>" in text
         assert "<title>t &amp; u</title>" in text
         assert "<li class" not in text

@@ -27,7 +27,7 @@ from femubench.core.fem.model_parameters import matrix_slopes
 from femubench.core.fem.sections import constant_kappa
 from femubench.core.modal.eigen import counted_evaluations
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
-from femubench.core.update.residuals import Data, predict
+from femubench.core.update.residuals import Targets, predict
 from femubench.effect import Change
 from femubench.fem import (
     Frame,
@@ -364,9 +364,9 @@ def test_a_partner_that_is_lost_for_an_iteration_is_followed(hframe_case: Any) -
     model, data = hframe_case
     shapes = data.shapes.copy()
     shapes[:, 2] = np.random.default_rng(3).normal(size=len(shapes))
-    before = predict(Data(data), model)
-    alone = predict(Data(replace(data, shapes=shapes)), model)
-    followed = predict(Data(replace(data, shapes=shapes)), model, before)
+    before = predict(Targets(data), model)
+    alone = predict(Targets(replace(data, shapes=shapes)), model)
+    followed = predict(Targets(replace(data, shapes=shapes)), model, before)
     assert alone.partner[2] == -1
     assert np.isnan(alone.residual[2])
     np.testing.assert_array_equal(followed.partner, before.partner)
@@ -649,7 +649,7 @@ def test_shapes_as_data_sharpen_the_parameters(ladder: Any) -> None:
 def test_the_jacobian_of_scaled_shapes(ladder: Any) -> None:
     model = Model.of(ladder(elements=2))
     structure = model.frame_structure
-    data = Data(measured(model, 3).with_noise(np.random.default_rng(2)), "frequency", True, True)
+    data = Targets(measured(model, 3).with_noise(np.random.default_rng(2)), "frequency", True, True)
     labels = tuple(label for label in structure.labels if label)
     parameters = [Property("GJ", "GJ", labels), Property("EI", "EI", labels[:3])]
     slopes = matrix_slopes(model, parameters)

@@ -17,7 +17,7 @@ from femubench.core.errors import InputError
 from femubench.core.run.runner import run_jobs
 from femubench.core.schema.results import Block, JobResult, Run
 from femubench.core.score.comparison import Against, compare_runs
-from femubench.core.score.statistics import Evidence, ScoreTable, evidence_of, structures_of
+from femubench.core.score.statistics import ScoreTable, Significance, evidence_of, structures_of
 from femubench.core.typing import FloatArray
 from femubench.reports.runs import TerminalReporter
 from femubench.results import (
@@ -57,7 +57,7 @@ def drawn(
     return np.asarray(logs)
 
 
-def judged(logs: FloatArray, structures: Sequence[int]) -> Evidence:
+def judged(logs: FloatArray, structures: Sequence[int]) -> Significance:
     """Return what the comparison of the two says."""
     member = np.equal.outer(range(max(structures) + 1), np.repeat(structures, len(BLOCKS)))
     flat = logs.reshape(2, -1, logs.shape[-1])

@@ -22,7 +22,7 @@ from femubench.core.fem.model import LowRank
 from femubench.core.run import schedule, standing_judge
 from femubench.core.run.answers import packed
 from femubench.core.run.jobs import JobOutcome
-from femubench.core.run.judging import Verdict
+from femubench.core.run.judging import Dossier
 from femubench.core.run.limits import MIB, Limits
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.standing_judge import Judges
@@ -54,8 +54,8 @@ def ended(judges: Judges[int]) -> Ending:
     raise AssertionError("nobody is at work")
 
 
-def verdict(answer: bytes, case: bytes = PICKLED) -> Verdict:
-    return Verdict(case, answer, "s", 0)
+def verdict(answer: bytes, case: bytes = PICKLED) -> Dossier:
+    return Dossier(case, answer, "s", 0)
 
 
 def result(
@@ -192,7 +192,7 @@ def test_a_run_in_which_somebody_kills_judges_has_the_results_of_one_without(
     calm = run_jobs([CASE], strategies, **options)  # type: ignore[arg-type]
     start, asked = Judges.start, list[int]()
 
-    def killed(self: Judges[Any], key: Any, case: bytes, what: Verdict, limits: Limits) -> Any:
+    def killed(self: Judges[Any], key: Any, case: bytes, what: Dossier, limits: Limits) -> Any:
         found = start(self, key, case, what, limits)
         asked.append(self._at_work[-1][1].process.pid)
         if len(asked) in (2, 5):

@@ -12,12 +12,12 @@ from concurrent.futures import ProcessPoolExecutor
 import pytest
 from threadpoolctl import threadpool_limits
 
-from femubench.core.challenge.sweep import BARS, Bar, Record, Task, run_task, tasks
+from femubench.core.challenge.sweep import BARS, Goal, Record, SweepCase, run_task, tasks
 
 pytestmark = pytest.mark.sweep
 
 
-def diagnosed(task: Task) -> Record:
+def diagnosed(task: SweepCase) -> Record:
     from femubench.core.diagnosis.diagnose import diagnose
 
     with threadpool_limits(1):
@@ -37,7 +37,7 @@ def test_no_case_ends_in_an_error(records: list[Record]) -> None:
 
 
 @pytest.mark.parametrize("bar", BARS, ids=lambda bar: bar.what)
-def test_bars(records: list[Record], bar: Bar) -> None:
+def test_bars(records: list[Record], bar: Goal) -> None:
     hits, count = bar.counts(records)
     assert count > 0
     assert bar.reached(hits, count), f"{hits} of {count}"

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from femubench import read_case
-from femubench.core.challenge.truth_file import TrueCause, Truth, held, truth_text
+from femubench.core.challenge.truth_file import KnownCase, TrueCause, held, truth_text
 from femubench.core.diagnosis import diagnose as diagnosing
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
@@ -25,8 +25,8 @@ SWAP = TrueCause("swapped cables", "sensors-swapped", "sensor:5Z+7Z")
 TAPER = TrueCause("a tapered member", "", "front-left")
 
 
-def truth(kind: str, *causes: TrueCause, chi2: float | None = 50.0, name: str = "x") -> Truth:
-    return Truth(name, "frame-solid", kind, 1, causes, chi2, chi2)
+def truth(kind: str, *causes: TrueCause, chi2: float | None = 50.0, name: str = "x") -> KnownCase:
+    return KnownCase(name, "frame-solid", kind, 1, causes, chi2, chi2)
 
 
 def said(verdict: str, *causes: str, p: float = 0.9) -> dict[str, Any]:

@@ -16,7 +16,7 @@ import pytest
 
 from femubench import Case, InputError, read_case, solve_modes
 from femubench.core.challenge.posing import overlay
-from femubench.core.challenge.truth_file import TRUTH_FILE, Truth, held, read_truth
+from femubench.core.challenge.truth_file import TRUTH_FILE, KnownCase, held, read_truth
 from femubench.fem import FloatArray
 from truths import faults
 from truths.faults import FAULT_KINDS, Draft, Structure, drafts, files_of, visibility, write_faults
@@ -25,7 +25,7 @@ from truths.posing import FAULTS, SUITE
 sys.path.insert(0, str(Path(__file__).parent))
 from small_suite import SUPPORTED, write_suite
 
-Drawn = tuple[Structure, Truth, Draft]
+Drawn = tuple[Structure, KnownCase, Draft]
 
 
 def structures_of(suite: Path) -> list[Structure]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from femubench import InputError, read_case
-from femubench.core.challenge.truth_file import TrueCause, Truth, held, read_truth, truth_text
+from femubench.core.challenge.truth_file import KnownCase, TrueCause, held, read_truth, truth_text
 from truths.posing import DEFECTS, SUITE, pose
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -19,7 +19,7 @@ CAUSES = (
     TrueCause("a loose joint", "joint-rotation", "J5", ("joint-rotation@T",), 1.25e5, "N m/rad"),
     TrueCause("a tapered member", "", "front-left"),
 )
-TRUTH = Truth("two", "frame-solid", "pair", 7, CAUSES, 83.2, 61.0)
+TRUTH = KnownCase("two", "frame-solid", "pair", 7, CAUSES, 83.2, 61.0)
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def suite(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_suite(tmp_path_factory.mktemp("suite"))
 
 
-def written(folder: Path, truth: Truth = TRUTH, **files: str) -> Path:
+def written(folder: Path, truth: KnownCase = TRUTH, **files: str) -> Path:
     """Write a truth with files of the structure's names, a dot for every underline."""
     room = folder / truth.name
     room.mkdir(parents=True)
@@ -39,7 +39,7 @@ def written(folder: Path, truth: Truth = TRUTH, **files: str) -> Path:
 
 def test_a_truth_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert read_truth(written(tmp_path)) == TRUTH
-    clean = Truth("sound", "frame-solid", "clean", 8)
+    clean = KnownCase("sound", "frame-solid", "clean", 8)
     assert read_truth(written(tmp_path, clean)) == clean
     assert CAUSES[0].findings == (("joint-rotation", "J5"), ("joint-rotation", "T"))
     assert CAUSES[1].findings == ()

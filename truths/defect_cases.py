@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from femubench.core.challenge.truth_file import TrueCause, Truth, rounded, truth_text
+from femubench.core.challenge.truth_file import KnownCase, TrueCause, rounded, truth_text
 from truths.defects import ATTACHED, KINDS, OUTSIDE, Defect, local
 from truths.eigenmodes import attach, statics
 from truths.elasticity import Matrices, basis_of
@@ -247,7 +247,7 @@ def files_of(draw: Draw) -> dict[str, str]:
     if min(len(state.frequencies), len(base.modes.frequencies)) < count:
         raise ValueError(f"fewer than {count} modes were found")
     chi2, chi2_frequencies, appears = visible(base, state) if draw.defects else (0.0, 0.0, 0)
-    truth = Truth(
+    truth = KnownCase(
         draw.name,
         draw.structure,
         draw.kind,

@@ -29,8 +29,8 @@ from femubench.core.case.tables import RESERVED
 from femubench.core.challenge.posing import CASE_FILE, overlay
 from femubench.core.challenge.truth_file import (
     TRUTH_FILE,
+    KnownCase,
     TrueCause,
-    Truth,
     read_truth,
     rounded,
     truth_text,
@@ -397,7 +397,7 @@ FAULT_KINDS = (
 )
 
 
-def drafts(structures: Sequence[Structure]) -> Iterator[tuple[Structure, Truth, Draft]]:
+def drafts(structures: Sequence[Structure]) -> Iterator[tuple[Structure, KnownCase, Draft]]:
     """Yield every fault with its structure and its truth, not yet with its visibility.
 
     A fault goes to the structure that has fewest of its kind, then fewest of all.
@@ -433,7 +433,7 @@ def drafts(structures: Sequence[Structure]) -> Iterator[tuple[Structure, Truth, 
         total[structure.name] += 1
         again = len(taken[kind.effect, structure.name])
         name = f"{structure.name}-{kind.effect}" + (f"-{again}" if again > 1 else "")
-        yield structure, Truth(name, structure.name, kind.kind, seed, (draft.cause,)), draft
+        yield structure, KnownCase(name, structure.name, kind.kind, seed, (draft.cause,)), draft
 
 
 def change_of_data(sound: Case, faulty: Case) -> tuple[float, float]:
@@ -467,7 +467,7 @@ def change_of_model(sound: Case, faulty: Case) -> tuple[float, float]:
     return chi2, chi2
 
 
-def visibility(structure: Structure, truth: Truth, draft: Draft) -> tuple[float | None, ...]:
+def visibility(structure: Structure, truth: KnownCase, draft: Draft) -> tuple[float | None, ...]:
     """Return chi-square of what a fault changes, and the part of the frequencies.
 
     A misstated deviation changes nothing that was measured: there is none.

@@ -15,7 +15,7 @@ import numpy.typing as npt
 import pandas as pd
 import tomlkit
 
-from femubench.core.challenge.truth_file import TrueCause, Truth, rounded, truth_text
+from femubench.core.challenge.truth_file import KnownCase, TrueCause, rounded, truth_text
 from truths.measurement import mac, paired, scaled
 from truths.opensees_faults import OUTSIDE, SINGLES, Fault
 from truths.opensees_frames import AXES, FREE, NU, RHO, Beams, E, Plan, cut, plans
@@ -155,7 +155,7 @@ def files_of(draw: Draw) -> dict[str, str]:
         )
         for f in draw.faults
     )
-    truth = Truth(
+    truth = KnownCase(
         *(draw.name, plan.name, draw.kind, draw.seed, causes, chi2, part, appears),
         mass=weighed(mass_of(beams), draw.seed, 3),
     )

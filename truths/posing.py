@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from femubench.core.challenge import posing
-from femubench.core.challenge.truth_file import Truth, read_truth
+from femubench.core.challenge.truth_file import KnownCase, read_truth
 
 ROOT = Path(__file__).parents[1]
 SUITE = ROOT / "scenarios" / "suite"
@@ -18,7 +18,7 @@ STRUCTURES = OPENSEES / "structures"
 
 def pose(
     truth_folder: Path, target: Path, reference: bool = False, *, suite: Path = SUITE
-) -> Truth:
+) -> KnownCase:
     """Write the case of a truth on a structure of the suite; see `femubench.core.challenge.posing`.
 
     Arguments:

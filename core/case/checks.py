@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
-from femubench.core.case.faults import Fault, KeyPath
+from femubench.core.case.faults import BadKey, KeyPath
 from femubench.core.case.schema import MOST_ELEMENTS, FrameSpec, JointSpringSpec, RigidEndSpec
 from femubench.core.fem.frame import ACTIVE, Plane
 from femubench.core.fem.mesh import ON_MEMBER
@@ -23,12 +23,12 @@ def _check_element(place: str, members: dict[str, int], i: int) -> None:
     path, expected = ("factors", i, "at"), '"all", the name of a member or "member/k"'
     member, found, number = place.rpartition("/")
     if not found or member not in members:
-        raise Fault(path, f"there is no member {member if found else place!r}", expected)
+        raise BadKey(path, f"there is no member {member if found else place!r}", expected)
     count = members[member]
     # Only the plain way to write a number: "m/02" would be no label of an element.
     if number not in map(str, range(1, count + 1)):
         what = f"member {member!r} has no element {number[:20]!r}"
-        raise Fault(path, what, f"a number from 1 to {count}")
+        raise BadKey(path, what, f"a number from 1 to {count}")
 
 
 def _check_braces(model: FrameSpec) -> None:
@@ -36,23 +36,23 @@ def _check_braces(model: FrameSpec) -> None:
     for i, item in enumerate(model.braces):
         if model.plane == "out-of-plane" and not item.direction:
             what = "a brace does nothing in plane 'out-of-plane'"
-            raise Fault(("braces", i), what, "plane 'in-plane' or '3d', or a direction")
+            raise BadKey(("braces", i), what, "plane 'in-plane' or '3d', or a direction")
         moving = [name for name in ACTIVE[model.plane] if len(name) == 1]
         if item.direction and item.direction not in moving:
             what = f"nothing moves along {item.direction} in plane {model.plane!r}"
-            raise Fault(("braces", i, "direction"), what, ", ".join(moving))
+            raise BadKey(("braces", i, "direction"), what, ", ".join(moving))
         for j, end in enumerate(item.ends):
             _check_known("joint", end, joints, ("braces", i, "ends", j))
         if item.ends[0] == item.ends[1]:
-            raise Fault(("braces", i, "ends"), "the brace has length zero", "two different joints")
+            raise BadKey(("braces", i, "ends"), "the brace has length zero", "two different joints")
 
 
 def check_frame(model: FrameSpec) -> None:
-    """Check names, geometry and connections; raises Fault with a path below `model`."""
+    """Check names, geometry and connections; raises BadKey with a path below `model`."""
     check_unique((("joints", i, "name"), joint.name) for i, joint in enumerate(model.joints))
     check_unique((("members", i, "name"), member.name) for i, member in enumerate(model.members))
     if model.free and model.supports:
-        raise Fault(("free",), FREE_YET_HELD, NOT_HELD)
+        raise BadKey(("free",), FREE_YET_HELD, NOT_HELD)
     _check_links(model)
     _check_joints(model)
     _check_members(model)
@@ -61,14 +61,14 @@ def check_frame(model: FrameSpec) -> None:
     for i, joint in enumerate(model.joints):
         if joint.name not in whole:
             what = f"joint {joint.name!r} is not connected to {model.joints[0].name!r}"
-            raise Fault(("joints", i), what, "members or links that connect all joints")
+            raise BadKey(("joints", i), what, "members or links that connect all joints")
     for key, items in (("joint_springs", model.joint_springs), ("rigid_ends", model.rigid_ends)):
         _check_ends(model, key, items)
     for i, spring in enumerate(model.joint_springs):
         path: KeyPath = ("joint_springs", i)
         _check_directions(tuple(spring.stiffness), model.plane, (*path, "stiffness"))
         if spring.arm_factor is not None and spring.arm == 0.0:
-            raise Fault((*path, "arm_factor"), "there is no arm", "arm > 0 beside arm_factor")
+            raise BadKey((*path, "arm_factor"), "there is no arm", "arm > 0 beside arm_factor")
     for i, support in enumerate(model.supports):
         _check_directions(support.fixed, model.plane, ("supports", i, "fixed"))
     members = {member.name: member.elements for member in model.members}
@@ -84,7 +84,7 @@ def check_frame(model: FrameSpec) -> None:
     for i, factor in enumerate(model.factors):
         if factor.factor == 0.0 and factor.quantity not in MAY_VANISH:
             what = f"a factor 0 leaves no {factor.quantity}"
-            raise Fault(("factors", i, "factor"), what, "a number > 0")
+            raise BadKey(("factors", i, "factor"), what, "a number > 0")
         for place in factor.at:
             if place != "all" and place not in members:
                 _check_element(place, members, i)
@@ -92,17 +92,17 @@ def check_frame(model: FrameSpec) -> None:
     for i, offset in enumerate(model.eccentricities):
         if idle is not None and getattr(offset, idle) != 0.0:
             what = f"an offset along {idle} does nothing in plane {model.plane!r}"
-            raise Fault(("eccentricities", i, idle), what, "0, or no key")
+            raise BadKey(("eccentricities", i, idle), what, "0, or no key")
     total: dict[str, float] = {}
     for i, coupling in enumerate(model.couplings):
         if model.plane == "in-plane":
             what = "there is no torsion in plane 'in-plane'"
-            raise Fault(("couplings", i), what, "plane 'out-of-plane' or '3d'")
+            raise BadKey(("couplings", i), what, "plane 'out-of-plane' or '3d'")
         member = coupling.member
         total[member] = total.get(member, 0.0) + coupling.coefficient
         if abs(total[member]) >= 1.0:
             what = f"the coefficients of member {member!r} add up to {total[member]:g}"
-            raise Fault(("couplings", i, "coefficient"), what, "a sum > -1 and < 1")
+            raise BadKey(("couplings", i, "coefficient"), what, "a sum > -1 and < 1")
     _check_braces(model)
 
 
@@ -115,7 +115,7 @@ def _check_links(model: FrameSpec) -> None:
         for j, name in enumerate(link.follows):
             _check_known("joint", name, joints, (*path, j))
             if name == link.leads:
-                raise Fault((*path, j), f"joint {name!r} follows itself", "another joint")
+                raise BadKey((*path, j), f"joint {name!r} follows itself", "another joint")
         _check_directions(link.motions, model.plane, ("links", i, "motions"))
 
 
@@ -137,7 +137,7 @@ def _check_known(
     kind: str, name: str, known: Collection[str], path: KeyPath, expected: str | None = None
 ) -> None:
     if name not in known:
-        raise Fault(path, f"there is no {kind} {name!r}", expected or f"the name of a {kind}")
+        raise BadKey(path, f"there is no {kind} {name!r}", expected or f"the name of a {kind}")
 
 
 def check_unique(names: Iterable[tuple[KeyPath, str]]) -> None:
@@ -145,7 +145,7 @@ def check_unique(names: Iterable[tuple[KeyPath, str]]) -> None:
     seen = set()
     for path, name in names:
         if name in seen:
-            raise Fault(path, f"{name!r} is listed twice", "a name of its own")
+            raise BadKey(path, f"{name!r} is listed twice", "a name of its own")
         seen.add(name)
 
 
@@ -154,9 +154,9 @@ def _check_directions(directions: Sequence[str], plane: Plane, path: KeyPath) ->
     for direction in directions:
         if direction not in allowed:
             expected = f"{', '.join(allowed)}, the directions of plane {plane!r}"
-            raise Fault(path, f"direction {direction!r} is not there", expected)
+            raise BadKey(path, f"direction {direction!r} is not there", expected)
     if len(set(directions)) < len(directions):
-        raise Fault(path, "a direction is listed twice", "each direction once")
+        raise BadKey(path, "a direction is listed twice", "each direction once")
 
 
 def _check_joints(model: FrameSpec) -> None:
@@ -168,14 +168,14 @@ def _check_joints(model: FrameSpec) -> None:
         if len(off):
             i = int(off[0])
             what = f"joint {model.joints[i].name!r} lies off the plane, {normal} = {column[i]:g}"
-            raise Fault(("joints", i, "xyz"), what, f"{normal} = {column[0]:g} as at the first")
+            raise BadKey(("joints", i, "xyz"), what, f"{normal} = {column[0]:g} as at the first")
     cells: dict[tuple[int, ...], str] = {}
     linked = _bodies(model, members=False)
     for i, joint in enumerate(model.joints):
         cell = tuple(int(v) for v in np.round(xyz[i] / ON_MEMBER))
         if cell in cells and joint.name not in linked[cells[cell]]:
             what = f"joint {joint.name!r} lies at the same point as {cells[cell]!r}"
-            raise Fault(("joints", i, "xyz"), what, "a point of its own, or a link")
+            raise BadKey(("joints", i, "xyz"), what, "a point of its own, or a link")
         cells[cell] = joint.name
 
 
@@ -186,10 +186,10 @@ def _check_members(model: FrameSpec) -> None:
         for j, end in enumerate(member.ends):
             if end not in places:
                 what = f"member {member.name!r} ends at a joint {end!r} that is not there"
-                raise Fault(("members", i, "ends", j), what, "the name of a joint")
+                raise BadKey(("members", i, "ends", j), what, "the name of a joint")
         if member.ends[0] == member.ends[1]:
             what = f"member {member.name!r} has length zero"
-            raise Fault(("members", i, "ends"), what, "two different joints")
+            raise BadKey(("members", i, "ends"), what, "two different joints")
         for key, table in (("section", model.sections), ("material", model.materials)):
             expected = ", ".join(table) or f"a table [model.{key}s.NAME]"
             _check_known(key, getattr(member, key), table, ("members", i, key), expected)
@@ -198,17 +198,17 @@ def _check_members(model: FrameSpec) -> None:
         elements += member.elements
         if elements > MOST_ELEMENTS:
             what, path = f"more than {MOST_ELEMENTS} elements", ("members", i, "elements")
-            raise Fault(path, what, f"fewer elements, {MOST_ELEMENTS} in all at most")
+            raise BadKey(path, what, f"fewer elements, {MOST_ELEMENTS} in all at most")
 
 
 def _check_up(model: FrameSpec, i: int, along: FloatArray) -> None:
     path = ("members", i, "up")
     if model.plane != "3d":
-        raise Fault(path, f"not a key of plane {model.plane!r}", "no `up`, it belongs to 3d")
+        raise BadKey(path, f"not a key of plane {model.plane!r}", "no `up`, it belongs to 3d")
     up = np.array(model.members[i].up)
     across = np.linalg.norm(np.cross(up, along / np.linalg.norm(along)))
     if across < 1e-9 or across < 1e-6 * np.linalg.norm(up):
-        raise Fault(path, "lies along the member", "a vector in the local x-z plane")
+        raise BadKey(path, "lies along the member", "a vector in the local x-z plane")
 
 
 def _check_ends(
@@ -220,8 +220,8 @@ def _check_ends(
         _check_known("member", item.member, ends, (key, i, "member"), "a member")
         if item.joint not in ends[item.member]:
             what = f"member {item.member!r} does not end at {item.joint!r}"
-            raise Fault((key, i, "joint"), what, f"one of {', '.join(ends[item.member])}")
+            raise BadKey((key, i, "joint"), what, f"one of {', '.join(ends[item.member])}")
         if (item.joint, item.member) in seen:
             what = f"the end of {item.member!r} at {item.joint!r} is listed twice"
-            raise Fault((key, i), what, "every member end once")
+            raise BadKey((key, i), what, "every member end once")
         seen.add((item.joint, item.member))

@@ -16,7 +16,7 @@ KeyPath = tuple[str | int, ...]
 _LONGEST_VALUE = 60
 
 
-class Fault(Exception):  # noqa: N818 - becomes an InputError before anybody sees it
+class BadKey(Exception):  # noqa: N818 - becomes an InputError before anybody sees it
     """A fault at a key; the reader adds file and line and makes an `InputError` of it.
 
     Arguments:
@@ -47,10 +47,10 @@ def at_key(*path: str | int) -> Iterator[None]:
     """Put a key path before the faults raised inside, and give a `Misfit` that path."""
     try:
         yield
-    except Fault as fault:
-        raise Fault((*path, *fault.path), fault.what, fault.expected) from None
+    except BadKey as fault:
+        raise BadKey((*path, *fault.path), fault.what, fault.expected) from None
     except Misfit as misfit:
-        raise Fault(path, misfit.what, misfit.expected) from None
+        raise BadKey(path, misfit.what, misfit.expected) from None
 
 
 def dotted(path: KeyPath) -> str:
@@ -76,7 +76,7 @@ def shown(value: object) -> str:
     return _clipped(text)
 
 
-def first_fault(error: ValidationError, schema: type[BaseModel]) -> Fault:
+def first_fault(error: ValidationError, schema: type[BaseModel]) -> BadKey:
     """Return the most telling of pydantic's findings in the words of the case format.
 
     A misspelt key is also a missing one; the spelling is named.
@@ -89,27 +89,27 @@ def first_fault(error: ValidationError, schema: type[BaseModel]) -> Fault:
         path, tag = ("model", *path[2:]), str(path[1])
     owner, expected = _described(schema, path, tag)
     if path[-1] == "[key]":
-        return Fault(path[:-1], f"{shown(found['input'])} is not allowed as a name", expected)
+        return BadKey(path[:-1], f"{shown(found['input'])} is not allowed as a name", expected)
     kind, value = found["type"], found["input"]
     context: Mapping[str, Any] = found.get("ctx", {})
     if kind == "too_long":
         most = f"{context.get('max_length')} at most"
-        return Fault(path, f"{context.get('actual_length') or 'too many'} entries", most)
+        return BadKey(path, f"{context.get('actual_length') or 'too many'} entries", most)
     if kind == "too_short" or (kind == "missing" and isinstance(path[-1], int)):
         whole = path[:-1] if kind == "missing" else path
-        return Fault(whole, "wrong number of entries", expected)
+        return BadKey(whole, "wrong number of entries", expected)
     if kind == "missing":
-        return Fault(path, "missing key", expected)
+        return BadKey(path, "missing key", expected)
     if kind == "extra_forbidden":
         near = get_close_matches(_clipped(str(path[-1])), owner.model_fields, n=1)
         hint = f"; is {near[0]!r} meant?" if near else ""
-        return Fault(path, f"unknown key{hint}", f"one of {', '.join(owner.model_fields)}")
+        return BadKey(path, f"unknown key{hint}", f"one of {', '.join(owner.model_fields)}")
     if kind.startswith("union_tag"):
         what = "missing key" if kind == "union_tag_not_found" else f"unknown kind {_tag(value)}"
-        return Fault(("model", "kind"), what, "'frame', 'matrices' or 'file'")
+        return BadKey(("model", "kind"), what, "'frame', 'matrices' or 'file'")
     if kind == "misfit":
-        return Fault(path, context["what"], context["expected"])
-    return Fault(path, f"{shown(value)} is not allowed", expected)
+        return BadKey(path, context["what"], context["expected"])
+    return BadKey(path, f"{shown(value)} is not allowed", expected)
 
 
 def _tag(value: object) -> str:

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from femubench.core.case.faults import Fault
+from femubench.core.case.faults import BadKey
 from femubench.core.case.files import LARGEST_TEXT, CaseFiles
 from femubench.core.case.frame_tables import FrameTables
 from femubench.core.case.frames import CONSTANTS, section_of
@@ -54,7 +54,7 @@ def known_from(file: Path) -> Known:
     try:
         data = tomllib.loads(read_text(file, LARGEST_TEXT))
         spec = FrameTables(CaseFiles(file.parent)).spec(data)
-    except (InputError, Fault, ValueError, RecursionError):  # not TOML, or not the keys of a case
+    except (InputError, BadKey, ValueError, RecursionError):  # not TOML, or not the keys of a case
         return Known()
     share = spec.measurement.shape_std
     if not isinstance(spec.model, FrameSpec):
@@ -115,7 +115,7 @@ def described_frame(structure: Structure) -> Frame:
     """Return the frame with all parameter changes turned into factors, joint springs, rigid ends.
 
     Raises:
-        Fault: for a value that no key of a frame can have.
+        BadKey: for a value that no key of a frame can have.
     """
     frame = structure.frame
     factors: _Factors = {}
@@ -136,10 +136,10 @@ def described_frame(structure: Structure) -> Frame:
     return replace(frame, factors=(*frame.factors, *_written(structure, factors)))
 
 
-def _refused(parameter: Property, value: float) -> Fault:
+def _refused(parameter: Property, value: float) -> BadKey:
     what = f"{parameter.name} = {value:g} cannot be written as a key of a frame"
     expected = "values > 0 of factors, >= 0 of springs, on members of the frame"
-    return Fault(("model",), what, expected)
+    return BadKey(("model",), what, expected)
 
 
 def _with_springs(frame: Frame, parameter: Property, value: float) -> Frame:
@@ -199,7 +199,7 @@ def frame_keys(frame: Frame, known: Known) -> Keys:
         known: names and sizes from the file of the case that it comes from.
 
     Raises:
-        Fault: when a section cannot be said in keys, with a path from the top of the file.
+        BadKey: when a section cannot be said in keys, with a path from the top of the file.
     """
     # A beam without length is no arm, and the reader takes none.
     springs = (replace(s, arm_factor=s.arm_factor if s.arm else None) for s in frame.joint_springs)
@@ -216,7 +216,7 @@ def frame_keys(frame: Frame, known: Known) -> Keys:
     for name, spec in known.sections.items():
         try:
             section = section_of(spec, frame.plane, "euler-bernoulli")
-        except Fault:
+        except BadKey:
             continue
         tables[name] = section_keys(section, _ANY_NU, frame.plane, spec)
     sections, section_tables = named_tables(contents, own, tables, "section")
@@ -274,9 +274,9 @@ def _plain(value: object) -> Any:  # noqa: ANN401 - what TOML can hold
 def _section_keys(member: Member, plane: Plane, hint: SectionSpec | None) -> Keys:
     try:
         return section_keys(member.section, member.material.nu, plane, hint)
-    except Fault as fault:
+    except BadKey as fault:
         what = f"member {member.name!r}: {fault.what}"
-        raise Fault(("model", "sections"), what, fault.expected) from None
+        raise BadKey(("model", "sections"), what, fault.expected) from None
 
 
 def section_keys(section: Section, nu: float, plane: Plane, hint: SectionSpec | None) -> Keys:
@@ -289,7 +289,7 @@ def section_keys(section: Section, nu: float, plane: Plane, hint: SectionSpec | 
         hint: a table with the shape and the sizes that the section may have had.
 
     Raises:
-        Fault: when the shear coefficients of a frame in 3d differ in a way that no shape has.
+        BadKey: when the shear coefficients of a frame in 3d differ in a way that no shape has.
     """
     best, least = None, np.inf
     for shape, sizes in (*_hinted(hint), *_recovered(section)):
@@ -397,5 +397,5 @@ def _kappa(kappa: ShearCoefficients, nu: float, plane: Plane) -> float:
     along_y, along_z = kappa(nu)
     if plane == "3d" and along_y != along_z:
         what = f"shear coefficients {along_y:g} along y and {along_z:g} along z cannot be written"
-        raise Fault((), what, "those of a shape, or one number")
+        raise BadKey((), what, "those of a shape, or one number")
     return float(along_z)

@@ -9,8 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from femubench.core.case.checks import check_frame
-from femubench.core.case.faults import Fault, Misfit, WrongDirection, at_key
-from femubench.core.case.schema import FrameSpec, SectionSpec, Table
+from femubench.core.case.faults import BadKey, Misfit, WrongDirection, at_key
+from femubench.core.case.schema import FrameSpec, SectionSpec, TomlTable
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import (
     ACTIVE,
@@ -54,34 +54,34 @@ def section_of(spec: SectionSpec, plane: Plane, beam: BeamTheory) -> Section:
     """Return the section of a table, numbers beside a shape taking the place of the shape's.
 
     Raises:
-        Fault: where a size or a constant is missing or does not belong there.
+        BadKey: where a size or a constant is missing or does not belong there.
     """
     shape = spec.shape
     section = _from_numbers(spec, plane) if shape is None else _from_shape(spec, shape)
     if spec.kappa is not None:
         section = replace(section, kappa=constant_kappa(spec.kappa))
     if beam == "timoshenko" and section.kappa is None:
-        raise Fault(("kappa",), "missing key", "the shear coefficient of a timoshenko beam, > 0")
+        raise BadKey(("kappa",), "missing key", "the shear coefficient of a timoshenko beam, > 0")
     return section
 
 
 def _from_shape(spec: SectionSpec, shape: str) -> Section:
     if shape not in SHAPES:
-        raise Fault(("shape",), f"unknown shape {shape[:40]!r}", f"one of {', '.join(SHAPES)}")
+        raise BadKey(("shape",), f"unknown shape {shape[:40]!r}", f"one of {', '.join(SHAPES)}")
     make, keys = SHAPES[shape]
     sizes: dict[str, float] = {}
     for key in _SIZES:
         value = getattr(spec, key)
         if key in keys and value is None:
-            raise Fault((key,), "missing key", f"{', '.join(keys)}, each > 0 in m")
+            raise BadKey((key,), "missing key", f"{', '.join(keys)}, each > 0 in m")
         if key not in keys and value is not None:
-            raise Fault((key,), f"not a size of a {shape}", f"{', '.join(keys)}")
+            raise BadKey((key,), f"not a size of a {shape}", f"{', '.join(keys)}")
         if value is not None:
             sizes[key] = value
     wall = sizes.get("wall", 0.0)
     smallest = min(value for key, value in sizes.items() if key != "wall")
     if wall >= smallest / 2:
-        raise Fault(("wall",), f"wall {wall:g}", f"a number < {smallest / 2:g}, half of the size")
+        raise BadKey(("wall",), f"wall {wall:g}", f"a number < {smallest / 2:g}, half of the size")
     return replace(make(**sizes), **_constants(spec))
 
 
@@ -92,14 +92,14 @@ def _constants(spec: SectionSpec) -> dict[str, Any]:
 def _from_numbers(spec: SectionSpec, plane: Plane) -> Section:
     for key in _SIZES:
         if getattr(spec, key) is not None:
-            raise Fault((key,), "a size without a shape", f"shape = one of {', '.join(SHAPES)}")
+            raise BadKey((key,), "a size without a shape", f"shape = one of {', '.join(SHAPES)}")
     given = _constants(spec)
     if "Iy" in given and "Iz" in given:
         given.setdefault("Jp", given["Iy"] + given["Iz"])
     for key in _NEEDED[plane]:
         if key not in given:
             expected = f"{', '.join(_NEEDED[plane])}, which plane {plane!r} needs"
-            raise Fault((key,), "missing key", expected)
+            raise BadKey((key,), "missing key", expected)
     return Section(**dict.fromkeys(CONSTANTS, 0.0) | given)
 
 
@@ -199,7 +199,7 @@ _ATTACHED: dict[str, type] = {
 
 
 def frame_of(model: FrameSpec) -> Frame:
-    """Return the frame that `[model]` describes; raises Fault with a path below `model`."""
+    """Return the frame that `[model]` describes; raises BadKey with a path below `model`."""
     check_frame(model)
     sections = {}
     for name, spec in model.sections.items():
@@ -227,11 +227,11 @@ def frame_of(model: FrameSpec) -> Frame:
     return replace(site.frame, **attached)
 
 
-def _made(kind: Any, spec: Table) -> Any:  # noqa: ANN401 - a part of a frame
+def _made(kind: Any, spec: TomlTable) -> Any:  # noqa: ANN401 - a part of a frame
     return kind(**{f.name: getattr(spec, f.name) for f in fields(kind)})
 
 
-def attachments(key: str, specs: Sequence[Table], site: Site) -> tuple[Any, ...]:
+def attachments(key: str, specs: Sequence[TomlTable], site: Site) -> tuple[Any, ...]:
     """Return what is attached at places of a structure.
 
     Arguments:
@@ -240,7 +240,7 @@ def attachments(key: str, specs: Sequence[Table], site: Site) -> tuple[Any, ...]
         site: the structure.
 
     Raises:
-        Fault: with a path from the key on.
+        BadKey: with a path from the key on.
     """
     parts = [_made(_ATTACHED[key], spec) for spec in specs]
     for i, part in enumerate(parts):

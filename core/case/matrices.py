@@ -17,7 +17,7 @@ import scipy.io
 import scipy.sparse as sp
 
 from femubench.core.case.checks import check_unique
-from femubench.core.case.faults import Fault, Misfit, at_key
+from femubench.core.case.faults import BadKey, Misfit, at_key
 from femubench.core.case.files import LARGEST_FILE, CaseFiles
 from femubench.core.case.nodes import MatrixGeometry, read_dofs
 from femubench.core.case.schema import LARGEST, GroupSpec, MatricesSpec
@@ -209,7 +209,7 @@ def model_of_matrices(spec: MatricesSpec, files: CaseFiles, readers: Sequence[Re
     """Return the model of a case of kind ``matrices``.
 
     Raises:
-        Fault: with a path below `model`.
+        BadKey: with a path below `model`.
         InputError: for what is wrong in one of the files.
     """
     paths = {}
@@ -228,7 +228,7 @@ def with_groups(
     """Return a model from files with the groups of `[[model.groups]]` beside its own.
 
     Raises:
-        Fault: with a path below `model`.
+        BadKey: with a path below `model`.
         InputError: for what is wrong in one of the files.
     """
     geometry = model.geometry
@@ -238,9 +238,9 @@ def with_groups(
     for i, spec in enumerate(specs):
         with at_key("groups", i):
             if spec.dofs is not None and (spec.stiffness is not None or spec.mass is not None):
-                raise Fault(("dofs",), "a group of dofs with files", "either files or dofs")
+                raise BadKey(("dofs",), "a group of dofs with files", "either files or dofs")
             if spec.stiffness is None and spec.mass is None and spec.dofs is None:
-                raise Fault((), "a group without a part", "stiffness, mass or dofs")
+                raise BadKey((), "a group without a part", "stiffness, mass or dofs")
             if spec.dofs is not None:
                 inside = np.zeros(len(geometry.dofs))
                 for i, entry in enumerate(spec.dofs):

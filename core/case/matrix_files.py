@@ -12,7 +12,7 @@ import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
-from femubench.core.case.faults import Fault
+from femubench.core.case.faults import BadKey
 from femubench.core.case.frame_keys import Keys
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.table_text import csv_bytes, number
@@ -46,7 +46,7 @@ def matrices_of(model: Model) -> tuple[SparseArray, SparseArray]:
     """Return mass and stiffness with low-rank changes multiplied out, sparse (n, n) each.
 
     Raises:
-        Fault: when that would fill a large matrix.
+        BadKey: when that would fill a large matrix.
     """
     pairs = ((model.mass, model.mass_change), (model.stiffness, model.stiffness_change))
     mass, stiffness = (_whole(matrix, change) for matrix, change in pairs)
@@ -57,7 +57,7 @@ def _whole(matrix: SparseArray, change: LowRank | None) -> SparseArray:
     if change is not None:
         if matrix.shape[0] > _MOST_DENSE:
             what = f"a low-rank change of {matrix.shape[0]} degrees of freedom has no sparse matrix"
-            raise Fault(("model",), what, f"at most {_MOST_DENSE}")
+            raise BadKey(("model",), what, f"at most {_MOST_DENSE}")
         matrix = sp.csc_array(matrix).toarray() + change.toarray()
     matrix = sp.csc_array(matrix)
     return sp.csc_array(0.5 * (matrix + matrix.T))
@@ -128,7 +128,7 @@ def frame_places(model: Model, places: Sequence[Place]) -> dict[Place, Place]:
     """Return the nodes, by name, at places of a frame.
 
     Raises:
-        Fault: for a place between nodes.
+        BadKey: for a place between nodes.
     """
     structure = model.frame_structure
     names, found = node_names(structure), {}
@@ -136,7 +136,7 @@ def frame_places(model: Model, places: Sequence[Place]) -> dict[Place, Place]:
         node = node_at(structure.frame, structure.mesh, place)
         if node is None:
             what = f"the model has changed matrices and no node at {place}"
-            raise Fault(("modification",), what, "attachments at nodes")
+            raise BadKey(("modification",), what, "attachments at nodes")
         found[place] = Place(joint=names[node])
     return found
 
@@ -216,7 +216,7 @@ def write_matrices(model: Model, folder: str | PathLike[str]) -> tuple[Path, ...
         geometry = frame_geometry(model)
     try:
         files = matrix_keys(*matrices_of(model), geometry, model)[1]
-    except Fault as fault:
+    except BadKey as fault:
         raise InputError(fault.what, file=place, expected=fault.expected) from None
     make_folder(place)
     for name, content in files.items():

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.core.case.faults import Fault, at_key
+from femubench.core.case.faults import BadKey, at_key
 from femubench.core.case.files import CASE_FILE, LARGEST_CASE, CaseFiles
 from femubench.core.case.frame_tables import FrameTables
 from femubench.core.case.matrices import (
@@ -132,7 +132,7 @@ def model_of_file(spec: FileSpec, files: CaseFiles, readers: Sequence[Reader]) -
     """Return the model of a case of kind ``file``.
 
     Raises:
-        Fault: with a path below `model`.
+        BadKey: with a path below `model`.
         InputError: for what is wrong in one of the files.
     """
     found: dict[str, Path] = {}
@@ -264,7 +264,7 @@ def write_model(
                 model, mass=mass, stiffness=whole, mass_change=None, stiffness_change=None
             )
         model = from_si(model, unit)
-    except Fault as fault:
+    except BadKey as fault:
         what = f"cannot be written: {fault.what}"
         raise InputError(what, file=made, expected=fault.expected) from None
     reader = _reader(like.model, readers)

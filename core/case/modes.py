@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from femubench.core.case.schema import SMALLEST
-from femubench.core.case.tables import PLACES, RESERVED, Complex, Table, read_table
+from femubench.core.case.tables import PLACES, RESERVED, Complex, CsvTable, read_table
 from femubench.core.errors import InputError
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.sensors import Sensors
@@ -79,7 +79,7 @@ def _not_negative(value: float) -> bool:
     return value >= 0.0
 
 
-def _shapes(table: Table, labels: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
+def _shapes(table: CsvTable, labels: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
     """Return real shapes and the deviations that are given, nan elsewhere, (n_sensors, m)."""
     size = (len(labels), len(table.rows))
     shapes, std = np.full(size, np.nan, dtype=complex), np.full(size, np.nan)

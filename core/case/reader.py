@@ -13,7 +13,7 @@ import numpy as np
 from femubench.core.case.case import Case, Match, Modification
 from femubench.core.case.checks import FREE_YET_HELD, NOT_HELD, check_unique
 from femubench.core.case.deviations import with_floor
-from femubench.core.case.faults import Fault, KeyPath, at_key
+from femubench.core.case.faults import BadKey, KeyPath, at_key
 from femubench.core.case.files import LARGEST_CASE, CaseFiles
 from femubench.core.case.frame_tables import FrameTables
 from femubench.core.case.frames import FrameSite, Site, attachments, frame_of
@@ -86,7 +86,7 @@ def read_case(
     try:
         spec = spec_of(text, files.case_file, CaseSpec, tables.spec)
         return _Building(files, spec, readers).case(name)
-    except Fault as fault:
+    except BadKey as fault:
         place = tables.place(fault.path)
         if place is None:
             raise located(fault, text, files.case_file) from None
@@ -109,7 +109,7 @@ class _Building:
     lines: FloatArray | None = None
 
     def case(self, name: str | None) -> Case:
-        """Return the case; raises Fault or InputError."""
+        """Return the case; raises BadKey or InputError."""
         model = self.model()
         site: Site = (
             model.geometry
@@ -160,14 +160,14 @@ class _Building:
                 finite = all(np.isfinite(m.data).all() for m in (model.mass, model.stiffness))
             except ModelError as error:
                 key, expected = _key_of(error.item, frame)
-                raise Fault(key, str(error), expected) from None
+                raise BadKey(key, str(error), expected) from None
             except ArithmeticError:
                 finite = False
             if not finite:
                 expected = "sizes and constants of a real structure"
-                raise Fault((), "the matrices are not finite", expected)
+                raise BadKey((), "the matrices are not finite", expected)
             if model.size == 0:
-                raise Fault(("supports",), "nothing can move", "a direction that is free")
+                raise BadKey(("supports",), "nothing can move", "a direction that is free")
             return model
 
     def reading(self, key: KeyPath, name: str) -> tuple[Path, Measurement | None]:
@@ -179,7 +179,7 @@ class _Building:
         reader = reader_of(path, self.readers)
         if reader is None:
             known = [".csv", *(suffix for r in self.readers for suffix in r.suffixes)]
-            raise Fault(key, f"unknown kind of file {name!r}", ", ".join(known))
+            raise BadKey(key, f"unknown kind of file {name!r}", ", ".join(known))
         if path not in self.readings:
             names, named = (
                 self.spec.measurement.variables,
@@ -187,19 +187,19 @@ class _Building:
             )
             if names and named is None:
                 path_of = ("measurement", "variables")
-                raise Fault(path_of, f"{reader.name} has no variables", "no such key")
+                raise BadKey(path_of, f"{reader.name} has no variables", "no such key")
             with reading_with(reader, path):
                 found = reader.read_modes(path) if named is None else named(path, names)
             if not isinstance(found, Measurement):
                 what = f"{reader.name} gave {type(found).__name__}"
-                raise Fault(key, what, "femubench.Measurement")
+                raise BadKey(key, what, "femubench.Measurement")
             self.readings[path] = found
         return path, self.readings[path]
 
     def measurement(self, site: Site) -> Measurement:
         spec = self.spec.measurement
         if spec.band is not None and spec.band[0] >= spec.band[1]:
-            raise Fault(("measurement", "band"), "the band is empty", "[low, high], low < high")
+            raise BadKey(("measurement", "band"), "the band is empty", "[low, high], low < high")
         sensors, from_plugin = self.sensors(site)
         measurement = self.modes(("measurement", "modes"), spec.modes, sensors)
         if from_plugin:
@@ -221,7 +221,7 @@ class _Building:
         spec = self.spec.measurement
         if spec.repeats is not None and spec.covariance is not None:
             what = "both repeats and covariance"
-            raise Fault(("measurement", "covariance"), what, "one of the two")
+            raise BadKey(("measurement", "covariance"), what, "one of the two")
         if spec.covariance is not None:
             with at_key("measurement", "covariance"):
                 path = self.files.path(spec.covariance)
@@ -245,10 +245,10 @@ class _Building:
             path = self.files.path(name)
         found = read_responses(path, self.readers, sensors)
         if not isinstance(found, FrequencyResponses):
-            raise Fault(key, f"{name!r} holds motions over time", "frequency responses")
+            raise BadKey(key, f"{name!r} holds motions over time", "frequency responses")
         if not set(found.responses.labels) & set(sensors.labels):
             expected = f"labels as in the file, e.g. {found.responses.labels[0]!r}"
-            raise Fault(key, "no response belongs to a sensor of the case", expected)
+            raise BadKey(key, "no response belongs to a sensor of the case", expected)
         return found
 
     @property
@@ -324,7 +324,7 @@ class _Building:
         check_unique((("modification", i, "name"), spec.name) for i, spec in enumerate(specs))
         if len(specs) * model.size > _MOST_CHANGED:
             what = f"{len(specs)} changes of {model.size} degrees of freedom"
-            raise Fault(("modification",), what, f"a product of at most {_MOST_CHANGED}")
+            raise BadKey(("modification",), what, f"a product of at most {_MOST_CHANGED}")
         return tuple(
             self.modification(i, spec, model, site, sensors) for i, spec in enumerate(specs)
         )
@@ -336,11 +336,11 @@ class _Building:
             masses = attachments("masses", spec.masses, site)
             springs = attachments("springs", spec.springs, site)
             if not masses and not springs:
-                raise Fault((), "nothing is changed", "masses or springs")
+                raise BadKey((), "nothing is changed", "masses or springs")
             try:
                 model.attach(masses, springs)
             except ModelError as error:
-                raise Fault((), str(error), "a change that the model can take") from None
+                raise BadKey((), str(error), "a change that the model can take") from None
         measurement = self.modes(("modification", i, "modes"), spec.modes, sensors)
         return Modification(spec.name, masses, springs, measurement)
 
@@ -349,13 +349,13 @@ def known_free(model: Model, free: bool) -> Model:
     """Return a model of which it is known whether it hangs free.
 
     Raises:
-        Fault: when its supports say otherwise.
+        BadKey: when its supports say otherwise.
     """
     if not free or model.structure is None:
         return replace(model, free=free)
     frame = replace(model.structure.frame, free=True)
     if frame.supports:
-        raise Fault(("free",), FREE_YET_HELD, NOT_HELD)
+        raise BadKey(("free",), FREE_YET_HELD, NOT_HELD)
     structure = model.structure.rebuilt(frame)
     return replace(model, free=True, structure=structure, geometry=structure)
 
@@ -371,15 +371,15 @@ def check_labels(
         file: where, as `case.toml` names it.
 
     Raises:
-        Fault: at the key of the first label that is wrong.
+        BadKey: at the key of the first label that is wrong.
     """
     seen: set[int] = set()
     for path, number in listed:
         if number in seen:
-            raise Fault(path, f"mode {number} is listed twice", "every mode once")
+            raise BadKey(path, f"mode {number} is listed twice", "every mode once")
         if number not in measurement.numbers:
             there = ", ".join(map(str, measurement.numbers[:20]))
-            raise Fault(path, f"mode {number} has no data in {file}", f"one of {there}")
+            raise BadKey(path, f"mode {number} has no data in {file}", f"one of {there}")
         seen.add(number)
 
 

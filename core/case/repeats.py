@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from femubench.core.case.schema import LARGEST, SMALLEST
-from femubench.core.case.tables import Table, read_table
+from femubench.core.case.tables import CsvTable, read_table
 from femubench.core.errors import InputError
 from femubench.core.modal.correlated_errors import shrunk_correlation
 from femubench.core.modal.measurement import Measurement
@@ -96,7 +96,7 @@ def _positive(value: float) -> bool:
     return SMALLEST <= value <= LARGEST
 
 
-def _columns(table: Table, measurement: Measurement, other: tuple[str, ...]) -> dict[str, int]:
+def _columns(table: CsvTable, measurement: Measurement, other: tuple[str, ...]) -> dict[str, int]:
     """Return from the columns that are modes to their places in the measurement."""
     known = {str(number): i for i, number in enumerate(measurement.numbers)}
     table.check_columns((), (*known, *other))

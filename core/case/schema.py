@@ -79,7 +79,7 @@ BAND = "[low, high] in Hz with low < high"
 XYZ = "[x, y, z] in m, finite numbers"
 
 
-class Table(BaseModel):
+class TomlTable(BaseModel):
     """A table of `case.toml`; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -109,7 +109,7 @@ Share = Annotated[bool | float, PlainValidator(_share)]
 Quantity = Literal["EA", "EI", "GJ", "E", "rhoA", "rhoJp", "density", "shear", "rotary"]
 
 
-class FactorSpec(Table):
+class FactorSpec(TomlTable):
     """`[[model.factors]]`."""
 
     quantity: Quantity = Field(description=f"one of {', '.join(get_args(Quantity))}")
@@ -117,14 +117,14 @@ class FactorSpec(Table):
     factor: NotNegative = Field(description="a number > 0")
 
 
-class PreloadSpec(Table):
+class PreloadSpec(TomlTable):
     """`[[model.preloads]]`."""
 
     member: Name = Field(description=_MEMBER)
     force: Number = Field(description="a number in N, tension positive")
 
 
-class EccentricitySpec(Table):
+class EccentricitySpec(TomlTable):
     """`[[model.eccentricities]]`."""
 
     member: Name = Field(description=_MEMBER)
@@ -132,7 +132,7 @@ class EccentricitySpec(Table):
     z: Number = Field(0.0, description="a number in m, along local z")
 
 
-class CouplingSpec(Table):
+class CouplingSpec(TomlTable):
     """`[[model.couplings]]`."""
 
     member: Name = Field(description=_MEMBER)
@@ -141,7 +141,7 @@ class CouplingSpec(Table):
     )
 
 
-class BraceSpec(Table):
+class BraceSpec(TomlTable):
     """`[[model.braces]]`."""
 
     ends: tuple[Name, Name] = Field(description="the names of two joints")
@@ -149,7 +149,7 @@ class BraceSpec(Table):
     direction: Literal["", "x", "y", "z"] = Field("", description="x, y or z")
 
 
-class OscillatorSpec(Table):
+class OscillatorSpec(TomlTable):
     """`[[model.oscillators]]`."""
 
     at: At = Field(description=AT)
@@ -167,7 +167,7 @@ def _tables(key: str, max_length: int | None = None) -> Any:  # noqa: ANN401 - a
     return Field((), max_length=max_length, description=f"tables [[{key}]]")
 
 
-class CaseInfo(Table):
+class CaseInfo(TomlTable):
     """`[case]`."""
 
     name: CaseName = Field(description="a name without blanks at its ends, in quotes")
@@ -176,7 +176,7 @@ class CaseInfo(Table):
     structure: CaseName = Field("", description="a name without blanks at its ends, in quotes")
 
 
-class MaterialSpec(Table):
+class MaterialSpec(TomlTable):
     """`[model.materials.NAME]`."""
 
     E: Positive = Field(description="Young's modulus, a number > 0 in Pa")
@@ -186,7 +186,7 @@ class MaterialSpec(Table):
     rho: Positive = Field(description="density, a number > 0 in kg/m3")
 
 
-class SectionSpec(Table):
+class SectionSpec(TomlTable):
     """`[model.sections.NAME]`: a shape with its sizes, or numbers."""
 
     shape: Annotated[str, Field(strict=True)] | None = Field(None, description="name of a shape")
@@ -202,7 +202,7 @@ class SectionSpec(Table):
     kappa: Positive | None = Field(None, description="shear coefficient, a number > 0")
 
 
-class JointSpec(Table):
+class JointSpec(TomlTable):
     """`[[model.joints]]`."""
 
     name: Name = Field(description=NAME)
@@ -210,7 +210,7 @@ class JointSpec(Table):
     type: str = Field("", strict=True, pattern=rf"^$|{ID}", max_length=80, description=NAME)
 
 
-class MemberSpec(Table):
+class MemberSpec(TomlTable):
     """`[[model.members]]`."""
 
     name: Name = Field(description=NAME)
@@ -221,7 +221,7 @@ class MemberSpec(Table):
     up: Vector | None = Field(None, description="a vector in the local x-z plane, 3d only")
 
 
-class MassSpec(Table):
+class MassSpec(TomlTable):
     """`[[model.masses]]`."""
 
     at: At = Field(description=AT)
@@ -229,7 +229,7 @@ class MassSpec(Table):
     offset: Vector = Field((0.0, 0.0, 0.0), description=XYZ)
 
 
-class SpringSpec(Table):
+class SpringSpec(TomlTable):
     """`[[model.springs]]`."""
 
     at: At = Field(description=AT)
@@ -237,14 +237,14 @@ class SpringSpec(Table):
     stiffness: NotNegative = Field(description="a number >= 0 in N/m or N m/rad")
 
 
-class SupportSpec(Table):
+class SupportSpec(TomlTable):
     """`[[model.supports]]`."""
 
     at: At = Field(description=AT)
     fixed: Many[Direction] = Field(min_length=1, max_length=6, description="a list of directions")
 
 
-class JointSpringSpec(Table):
+class JointSpringSpec(TomlTable):
     """`[[model.joint_springs]]`."""
 
     joint: Name = Field(description="the name of a joint")
@@ -256,7 +256,7 @@ class JointSpringSpec(Table):
     arm_factor: Positive | None = Field(None, description="a number > 0")
 
 
-class RigidEndSpec(Table):
+class RigidEndSpec(TomlTable):
     """`[[model.rigid_ends]]`."""
 
     joint: Name = Field(description="the name of a joint")
@@ -265,7 +265,7 @@ class RigidEndSpec(Table):
     mass_length: Number = Field(0.0, description="a length in m")
 
 
-class LinkSpec(Table):
+class LinkSpec(TomlTable):
     """`[[model.links]]`."""
 
     leads: Name = Field(description="the name of a joint")
@@ -275,14 +275,14 @@ class LinkSpec(Table):
     motions: Many[Direction] = Field((), max_length=6, description="a list of directions")
 
 
-class SetSpec(Table):
+class SetSpec(TomlTable):
     """`[[model.sets]]`: members that belong together."""
 
     name: Name = Field(description=NAME)
     members: Many[Name] = Field(min_length=1, description="a list of names of members")
 
 
-class FrameSpec(Table):
+class FrameSpec(TomlTable):
     """`[model]` with ``kind = "frame"``."""
 
     kind: Literal["frame"] = Field(description="'frame', 'matrices' or 'file'")
@@ -317,7 +317,7 @@ class FrameSpec(Table):
     sets: Many[SetSpec] = _tables("model.sets")
 
 
-class GroupSpec(Table):
+class GroupSpec(TomlTable):
     """`[[model.groups]]`: a named part of the stiffness, of the mass, or of both."""
 
     name: Name = Field(description=NAME)
@@ -331,7 +331,7 @@ class GroupSpec(Table):
     )
 
 
-class MatricesSpec(Table):
+class MatricesSpec(TomlTable):
     """`[model]` with ``kind = "matrices"``."""
 
     kind: Literal["matrices"] = Field(description="'frame', 'matrices' or 'file'")
@@ -344,7 +344,7 @@ class MatricesSpec(Table):
     )
 
 
-class FileSpec(Table):
+class FileSpec(TomlTable):
     """`[model]` with ``kind = "file"``."""
 
     kind: Literal["file"] = Field(description="'frame', 'matrices' or 'file'")
@@ -360,14 +360,14 @@ class FileSpec(Table):
     )
 
 
-class WeightSpec(Table):
+class WeightSpec(TomlTable):
     """`mass` in `[measurement]`."""
 
     value: Positive = Field(description="a number > 0 in kg")
     std: Positive = Field(description="a number > 0 in kg")
 
 
-class MeasurementSpec(Table):
+class MeasurementSpec(TomlTable):
     """`[measurement]`."""
 
     sensors: FileName | None = Field(None, description="a file in the case folder")
@@ -394,7 +394,7 @@ class MeasurementSpec(Table):
     frfs: FileName | None = Field(None, description="a file in the case folder")
 
 
-class ReferenceSpec(Table):
+class ReferenceSpec(TomlTable):
     """`[reference]`."""
 
     modes: FileName = Field(description="a file in the case folder")
@@ -405,7 +405,7 @@ class ReferenceSpec(Table):
     mass: WeightSpec | None = Field(None, description="{value, std} in kg")
 
 
-class ModificationSpec(Table):
+class ModificationSpec(TomlTable):
     """`[[modification]]`."""
 
     name: Text = Field(description="one line of text")
@@ -416,7 +416,7 @@ class ModificationSpec(Table):
     modes: FileName = Field(description="a file in the case folder")
 
 
-class DiagnosisSpec(Table):
+class DiagnosisSpec(TomlTable):
     """`[diagnosis]`."""
 
     tolerance: Annotated[float, Field(strict=True, ge=0, le=0.2, allow_inf_nan=False)] = Field(
@@ -435,7 +435,7 @@ class DiagnosisSpec(Table):
     )
 
 
-class CaseSpec(Table):
+class CaseSpec(TomlTable):
     """The whole of `case.toml`."""
 
     case: CaseInfo = Field(description="the table [case]")

@@ -17,7 +17,7 @@ from femubench.core.case.matching import (
     span_told,
     told_of,
 )
-from femubench.core.case.tables import RESERVED, Row, parse_place, read_table
+from femubench.core.case.tables import RESERVED, CsvRow, parse_place, read_table
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Vector
 from femubench.core.fem.sensors import Sensors
@@ -83,7 +83,7 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
     return Placed(sensors, matches, (*close, *told_of(matches, file.name)), turn)
 
 
-def _point_at(row: Row, direction: str, site: Site) -> Vector:
+def _point_at(row: CsvRow, direction: str, site: Site) -> Vector:
     try:
         xyz = site.point(parse_place(row.text("at")))
     except Misfit as misfit:
@@ -93,7 +93,7 @@ def _point_at(row: Row, direction: str, site: Site) -> Vector:
     return xyz
 
 
-def _check_sensor(row: Row, xyz: FloatArray, direction: str, site: Site, column: str) -> None:
+def _check_sensor(row: CsvRow, xyz: FloatArray, direction: str, site: Site, column: str) -> None:
     x, y, z = (float(v) for v in xyz)
     try:
         site.check_sensor((x, y, z), direction)

@@ -37,7 +37,7 @@ class Complex(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Row:
+class CsvRow:
     """One row of a table; cells are found by column and told with file and line when wrong."""
 
     file: Path
@@ -156,10 +156,10 @@ class _Headed:
 
 
 @dataclass(frozen=True)
-class Table(_Headed):
+class CsvTable(_Headed):
     """A CSV file: its column names and its rows."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[CsvRow, ...]
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ class Cells(_Headed):
     cells: tuple[list[str], ...]
 
 
-def read_table(file: Path) -> Table:
+def read_table(file: Path) -> CsvTable:
     """Return the content of a CSV file whose first row names the columns.
 
     Raises:
@@ -178,10 +178,10 @@ def read_table(file: Path) -> Table:
     """
     plain = read_cells(file)
     rows = (
-        Row(file, line, dict(zip(plain.columns, cells, strict=True)))
+        CsvRow(file, line, dict(zip(plain.columns, cells, strict=True)))
         for line, cells in zip(plain.lines, plain.cells, strict=True)
     )
-    return Table(file, plain.columns, tuple(rows))
+    return CsvTable(file, plain.columns, tuple(rows))
 
 
 def read_cells(file: Path) -> Cells:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from femubench.core.case.faults import Fault, KeyPath, dotted, first_fault, key_lines, line_of
+from femubench.core.case.faults import BadKey, KeyPath, dotted, first_fault, key_lines, line_of
 from femubench.core.errors import InputError
 
 _Spec = TypeVar("_Spec", bound=BaseModel)
@@ -33,7 +33,7 @@ def spec_of(
         parse: turns plain tables into these; the schema's own way where left out.
 
     Raises:
-        Fault: at the first key that is wrong.
+        BadKey: at the first key that is wrong.
         InputError: when it is no TOML.
     """
     deep = InputError("nested too deeply", file=file, expected="a flat table")
@@ -55,7 +55,7 @@ def spec_of(
         raise InputError("a number is too long", file=file, expected="valid TOML") from None
 
 
-def located(fault: Fault, text: str, file: Path) -> InputError:
+def located(fault: BadKey, text: str, file: Path) -> InputError:
     """Return a fault with its file, line and key."""
     key = dotted(fault.path) or None
     line = key_line(text, fault.path)

@@ -15,7 +15,7 @@ import numpy as np
 
 from femubench.core.case.case import BEAM_SHARE, TOLERANCE, Case, Modification
 from femubench.core.case.deviations import with_floor
-from femubench.core.case.faults import Fault, dotted
+from femubench.core.case.faults import BadKey, dotted
 from femubench.core.case.files import CASE_FILE
 from femubench.core.case.frame_keys import (
     Keys,
@@ -215,7 +215,7 @@ def write_case(
     flat = [line for entry in lines for line in entry.splitlines() or [""]]
     try:
         files = case_files(wanted, known_from(case.folder / CASE_FILE), flat)
-    except Fault as fault:
+    except BadKey as fault:
         raise refused(folder, fault.what, dotted(fault.path), fault.expected) from None
     except UnicodeEncodeError as error:
         what = f"{error.object[:40]!r} is not a text"
@@ -236,7 +236,7 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
         comment: lines for the top of `case.toml`.
 
     Raises:
-        Fault: for what no case folder can say.
+        BadKey: for what no case folder can say.
     """
     keys, files, modifications = _model_part(case, known)
     # Long lists of joints and members go to files of their own.
@@ -319,10 +319,10 @@ def _model_part(case: Case, known: Known) -> tuple[Keys, Files, tuple[Modificati
         return *matrix_keys(*matrices, model.geometry, model), case.modifications
     if model.structure is None:
         what = "a model without elements and without nodes by name cannot be written"
-        raise Fault(("model",), what, "a frame, or matrices from files")
+        raise BadKey(("model",), what, "a frame, or matrices from files")
     if has_skew_dofs(model):
         what = "the model has changed matrices and flexible connections of skew members"
-        raise Fault(("model",), what, "degrees of freedom along x, y or z")
+        raise BadKey(("model",), what, "degrees of freedom along x, y or z")
     moved = tuple(_at_nodes(item, model) for item in case.modifications)
     return *matrix_keys(*matrices, frame_geometry(model), model), moved
 
@@ -332,7 +332,7 @@ def _model_of(frame: Frame) -> Model:
     try:
         return Model.of(frame)
     except ModelError as error:
-        raise Fault(("model",), str(error), "parameters that keys can say") from None
+        raise BadKey(("model",), str(error), "parameters that keys can say") from None
 
 
 def _at_nodes(item: Modification, model: Model) -> Modification:

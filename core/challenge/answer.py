@@ -28,12 +28,12 @@ Probability = Annotated[
 Word = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
 
 
-class _Part(BaseModel):
+class _AnswerPart(BaseModel):
     # An answer may say more than is judged: rivals, residuals, advice.
     model_config = ConfigDict(extra="ignore", frozen=True, from_attributes=True)
 
 
-class AnswerParameter(_Part):
+class AnswerParameter(_AnswerPart):
     """A size: `std` is None where it was not fitted; `textbook` where a handbook gives it."""
 
     name: Word
@@ -43,7 +43,7 @@ class AnswerParameter(_Part):
     textbook: bool = False
 
 
-class AnswerCause(_Part):
+class AnswerCause(_AnswerPart):
     """An effect at a place; ``a + b`` at ``p + q`` for a pair within a group.
 
     A fault of data or input, by its `side`, belongs to every member of a group.
@@ -80,7 +80,7 @@ class AnswerCause(_Part):
         return tuple(zip(effects, places, strict=True))
 
 
-class Answer(_Part):
+class Answer(_AnswerPart):
     """What somebody says of a blind case.
 
     Arguments:

@@ -20,7 +20,7 @@ from femubench.core.challenge.truth import (
     KINDS,
     DataKind,
     Hidden,
-    TrueCause,
+    HiddenCause,
     Truth,
     element_of,
     finer,
@@ -56,7 +56,7 @@ class Candidate:
     """
 
     frame: Frame
-    causes: tuple[TrueCause, ...] = ()
+    causes: tuple[HiddenCause, ...] = ()
     outside: str = ""
     excess: float = 0.0
     sensors: FloatArray | None = None
@@ -129,7 +129,7 @@ class Candidates:
         """Return the causes outside the catalogue that the kind of data can show."""
         return tuple(key for key in OUTSIDE if self.kind != "C" or key not in SENSOR_FAULTS)
 
-    def cause(self, name: str) -> TrueCause:
+    def cause(self, name: str) -> HiddenCause:
         """Return an effect at a random place, of random size."""
         place = str(self.rng.choice(self.places[name]))
         effect = self.effects[name]
@@ -138,7 +138,7 @@ class Candidates:
         values = draw_values(effect.sizes, parameters, site, self.rng)
         narrow = element_of(place) is not None and effect.in_half(values) is not None
         half = narrow and self.rng.random() < _HALF
-        return TrueCause(
+        return HiddenCause(
             effect=name,
             place=place,
             names=tuple(parameter.name for parameter in parameters),
@@ -147,7 +147,7 @@ class Candidates:
             half=(1 if self.rng.random() < 0.5 else 2) if half else 0,
         )
 
-    def causes(self, *causes: TrueCause) -> Candidate:
+    def causes(self, *causes: HiddenCause) -> Candidate:
         """Return the truth that has these causes and the scatter of the draw."""
         frame = finer(self.specimen.frame)
         if self.scatter > 0.0:

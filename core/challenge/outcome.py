@@ -16,7 +16,7 @@ from femubench.core.challenge.score import (
     faults_in,
     group_size,
 )
-from femubench.core.challenge.truth_file import TrueCause, Truth
+from femubench.core.challenge.truth_file import KnownCase, TrueCause
 from femubench.core.effect.places import match
 from femubench.core.fem.frame import Frame
 
@@ -69,7 +69,7 @@ def is_finding(part: tuple[str, str], cause: TrueCause, same: Same) -> bool:
     return any(effect == known and same(place, where) for known, where in cause.findings)
 
 
-def _holds(truth: Truth, parts: Parts, same: Same) -> bool:
+def _holds(truth: KnownCase, parts: Parts, same: Same) -> bool:
     """Tell whether every cause is among the parts, each by a part of its own."""
     return any(
         all(is_finding(part, cause, same) for part, cause in zip(chosen, truth.causes, strict=True))
@@ -77,13 +77,13 @@ def _holds(truth: Truth, parts: Parts, same: Same) -> bool:
     )
 
 
-def _only(truth: Truth, parts: Parts, same: Same) -> bool:
+def _only(truth: KnownCase, parts: Parts, same: Same) -> bool:
     """Tell whether every part is a finding of some cause: one cause may show as two, a thinner
     wall as less stiffness and less mass."""
     return all(any(is_finding(part, cause, same) for cause in truth.causes) for part in parts)
 
 
-def outcome(truth: Truth, record: Record, same: Same) -> str:
+def outcome(truth: KnownCase, record: Record, same: Same) -> str:
     """Return which of `OUTCOMES` a record is.
 
     A name is right with effect and place, or as an entry of `also`. A group holds the truth when
@@ -131,7 +131,7 @@ def beside(record: Record) -> str:
     return "a cause" if any(cause.side == "model" for cause in causes) else "none"
 
 
-def counts_as_right(truth: Truth, said: str) -> bool:
+def counts_as_right(truth: KnownCase, said: str) -> bool:
     """Tell whether an outcome is the best that can be said of a truth."""
     if truth.kind == "clean":
         return said == "none"
@@ -153,7 +153,7 @@ def record_of(answer: Answer) -> dict[str, Any]:
     }
 
 
-def size_errors(truth: Truth, record: Record, same: Same) -> tuple[SizeError, ...]:
+def size_errors(truth: KnownCase, record: Record, same: Same) -> tuple[SizeError, ...]:
     """Return true and stated sizes of causes that are named where they sit, by their own name."""
     if record["verdict"] not in ("named", "ambiguous"):
         return ()
@@ -170,7 +170,7 @@ def size_errors(truth: Truth, record: Record, same: Same) -> tuple[SizeError, ..
     return tuple(found)
 
 
-def judge_by_truth(truth: Truth, answer: Answer, same: Same) -> Judgement:
+def judge_by_truth(truth: KnownCase, answer: Answer, same: Same) -> Judgement:
     """Judge an answer to a truth from outside.
 
     Arguments:

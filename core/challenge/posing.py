@@ -8,7 +8,7 @@ from pathlib import Path
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
-from femubench.core.challenge.truth_file import TRUTH_FILE, Truth, read_truth
+from femubench.core.challenge.truth_file import TRUTH_FILE, KnownCase, read_truth
 from femubench.core.errors import InputError
 from femubench.core.files import MIB, check_new, read_text
 
@@ -16,7 +16,7 @@ CASE_FILE, HEALTHY = "case.toml", "healthy.csv"
 _ABOUT = (".md", ".svg")  # what tells of a structure and is no data
 
 
-def pose(truth_folder: Path, structure: Path, target: Path, reference: bool = False) -> Truth:
+def pose(truth_folder: Path, structure: Path, target: Path, reference: bool = False) -> KnownCase:
     """Write the case of a truth into a new folder, and return the truth, which stays outside.
 
     Arguments:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from femubench.core.challenge.answer import Answer, AnswerCause
 from femubench.core.challenge.structures import structure_named
-from femubench.core.challenge.truth import TrueCause, Truth
+from femubench.core.challenge.truth import HiddenCause, Truth
 from femubench.core.effect.places import match
 from femubench.core.fem.frame import Frame
 
@@ -149,7 +149,7 @@ def group_size(answer: Answer) -> int:
     return len({_effects(cause.parts) for cause in answer.causes if cause.side == "model"})
 
 
-def _places_fit(frame: Frame, parts: Parts, causes: Sequence[TrueCause]) -> bool:
+def _places_fit(frame: Frame, parts: Parts, causes: Sequence[HiddenCause]) -> bool:
     """Tell whether every effect named sits where it truly sits."""
     return all(
         any(effect == cause.effect and match(frame, place, cause.place) for cause in causes)
@@ -157,7 +157,7 @@ def _places_fit(frame: Frame, parts: Parts, causes: Sequence[TrueCause]) -> bool
     )
 
 
-def _sizes(frame: Frame, answer: Answer, causes: Sequence[TrueCause]) -> tuple[SizeError, ...]:
+def _sizes(frame: Frame, answer: Answer, causes: Sequence[HiddenCause]) -> tuple[SizeError, ...]:
     """Return true and stated sizes wherever effect and place are right."""
     return tuple(
         error
@@ -168,7 +168,7 @@ def _sizes(frame: Frame, answer: Answer, causes: Sequence[TrueCause]) -> tuple[S
     )
 
 
-def _size_errors(cause: TrueCause, said: AnswerCause) -> list[SizeError]:
+def _size_errors(cause: HiddenCause, said: AnswerCause) -> list[SizeError]:
     stated = {parameter.name: parameter for parameter in said.parameters}
     errors = []
     for name, value, unit in zip(cause.names, cause.values, cause.units, strict=True):

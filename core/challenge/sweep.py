@@ -14,7 +14,7 @@ from femubench.core.challenge.calibration import Statement, percent, statements
 from femubench.core.challenge.draw import BlindCase, draw_case, registered_effects
 from femubench.core.challenge.score import Judgement, judge_answer
 from femubench.core.challenge.structures import STRUCTURES, structure_named
-from femubench.core.challenge.true_fit import Finding, fits_of, fits_worse, is_search_fault
+from femubench.core.challenge.true_fit import CataloguedCause, fits_of, fits_worse, is_search_fault
 from femubench.core.challenge.truth import DataKind, Hidden, Truth
 from femubench.core.challenge.visibility import delta_chi2
 from femubench.core.diagnosis.result import Diagnosis
@@ -29,7 +29,7 @@ OTHERS = tuple(name for name in STRUCTURES if name not in LADDERS)
 
 
 @dataclass(frozen=True)
-class Group:
+class CaseGroup:
     """Cases that are counted together.
 
     Arguments:
@@ -50,22 +50,22 @@ class Group:
 
 
 GROUPS = (
-    Group("A, ladders", 160, "one", "A", LADDERS),
-    Group("A, other structures", 60, "one", "A", OTHERS),
-    Group("B", 50, "one", "B"),
-    Group("C", 60, "one", "C"),
-    Group("A with scatter", 60, "one", "A", scatter=0.005),
-    Group("clean A", 50, "none", "A"),
-    Group("clean B", 50, "none", "B"),
-    Group("clean C", 50, "none", "C"),
-    Group("clean A with scatter", 50, "none", "A", scatter=0.005),
-    Group("pairs", 50, "pair", "A"),
-    Group("outside", 40, "outside", "A"),
+    CaseGroup("A, ladders", 160, "one", "A", LADDERS),
+    CaseGroup("A, other structures", 60, "one", "A", OTHERS),
+    CaseGroup("B", 50, "one", "B"),
+    CaseGroup("C", 60, "one", "C"),
+    CaseGroup("A with scatter", 60, "one", "A", scatter=0.005),
+    CaseGroup("clean A", 50, "none", "A"),
+    CaseGroup("clean B", 50, "none", "B"),
+    CaseGroup("clean C", 50, "none", "C"),
+    CaseGroup("clean A with scatter", 50, "none", "A", scatter=0.005),
+    CaseGroup("pairs", 50, "pair", "A"),
+    CaseGroup("outside", 40, "outside", "A"),
 )
 
 
 @dataclass(frozen=True)
-class Task:
+class SweepCase:
     """One case of a sweep; group and number give it again."""
 
     group: str
@@ -92,11 +92,11 @@ class Task:
         )
 
 
-def tasks(groups: Iterable[Group] = GROUPS, limit: int | None = None) -> list[Task]:
+def tasks(groups: Iterable[CaseGroup] = GROUPS, limit: int | None = None) -> list[SweepCase]:
     """Return the cases of groups, at most `limit` a group; every case has a seed of its own."""
     order = {group.name: 1000 * i for i, group in enumerate(GROUPS, 1)}
     return [
-        Task(
+        SweepCase(
             group.name,
             i,
             order[group.name] + i,
@@ -110,7 +110,7 @@ def tasks(groups: Iterable[Group] = GROUPS, limit: int | None = None) -> list[Ta
     ]
 
 
-def run_task(task: Task, diagnose: Diagnose) -> Record:
+def run_task(task: SweepCase, diagnose: Diagnose) -> Record:
     """Return the record of one case; an error of the diagnosis is a wrong answer.
 
     Arguments:
@@ -149,7 +149,7 @@ def _fits(diagnosis: Diagnosis, truth: Truth) -> Record:
     if diagnosis.examination is None or not truth.causes:
         return {}
     frame = structure_named(truth.structure).frame
-    causes = [[Finding(cause.effect, cause.place, cause.values)] for cause in truth.causes]
+    causes = [[CataloguedCause(cause.effect, cause.place, cause.values)] for cause in truth.causes]
     return fits_of(diagnosis.examination, causes, registered_effects(), partial(match, frame))
 
 
@@ -188,7 +188,7 @@ def _said(answer: Answer, judged: Judgement) -> Record:
 
 
 @dataclass(frozen=True)
-class Bar:
+class Goal:
     """A figure and what it must reach.
 
     Arguments:
@@ -246,41 +246,41 @@ def _stated(low: float, high: float) -> Callable[[Record], bool]:
 
 _DATA_A = ("A, ladders", "A, other")
 BARS = (
-    Bar("A: name right", _in(*_DATA_A), _right, 0.98, prototype="94.4 %"),
-    Bar(
+    Goal("A: name right", _in(*_DATA_A), _right, 0.98, prototype="94.4 %"),
+    Goal(
         "A: name right where chi-square falls by 30 or more",
         lambda r: _in(*_DATA_A)(r) and min(r["delta_chi2"]) >= 30.0,
         _right,
         0.995,
         prototype="198 of 198",
     ),
-    Bar(
+    Goal(
         "A: place right",
         lambda r: _in(*_DATA_A)(r) and r.get("place_right") is not None,
         lambda r: bool(r["place_right"]),
         0.96,
         prototype="91.7 %",
     ),
-    Bar("B: name right", _in("B"), _right, 0.90, prototype="80.6 %"),
-    Bar("C: name right", _in("C"), _right, 0.90, prototype="85.9 %"),
-    Bar("A with scatter: name right", _in("A with"), _right, 0.92, prototype="83 %"),
-    Bar("Clean with scatter: false alarms", _in("clean A with"), _alarm, 0.02, False, "0 of 12"),
-    Bar("Clean: false alarms", _in("clean"), _alarm, 0.02, False, "0 of 85"),
-    Bar("Outside the catalogue: flagged", _in("outside"), _right, 0.90, prototype="80 %"),
-    Bar("Pairs: both named", _in("pairs"), _right, 0.90, prototype="82.5 %"),
-    Bar("Stated P >= 0.99: wrong", _stated(0.99, 2.0), _wrong, 0.01, False, "1 of 185"),
-    Bar(
+    Goal("B: name right", _in("B"), _right, 0.90, prototype="80.6 %"),
+    Goal("C: name right", _in("C"), _right, 0.90, prototype="85.9 %"),
+    Goal("A with scatter: name right", _in("A with"), _right, 0.92, prototype="83 %"),
+    Goal("Clean with scatter: false alarms", _in("clean A with"), _alarm, 0.02, False, "0 of 12"),
+    Goal("Clean: false alarms", _in("clean"), _alarm, 0.02, False, "0 of 85"),
+    Goal("Outside the catalogue: flagged", _in("outside"), _right, 0.90, prototype="80 %"),
+    Goal("Pairs: both named", _in("pairs"), _right, 0.90, prototype="82.5 %"),
+    Goal("Stated P >= 0.99: wrong", _stated(0.99, 2.0), _wrong, 0.01, False, "1 of 185"),
+    Goal(
         "Faults of search",
         lambda r: fits_worse(r) is not None,
         lambda r: bool(is_search_fault(r)),
         0.01,
         at_least=False,
     ),
-    Bar("Stated 0.9 <= P < 0.99: wrong", _stated(0.9, 0.99), _wrong, 0.10, False, "25 %"),
+    Goal("Stated 0.9 <= P < 0.99: wrong", _stated(0.9, 0.99), _wrong, 0.10, False, "25 %"),
 )
 
 
-def bars_table(records: Sequence[Record], bars: Sequence[Bar] = BARS) -> list[dict[str, str]]:
+def bars_table(records: Sequence[Record], bars: Sequence[Goal] = BARS) -> list[dict[str, str]]:
     """Return one row a bar: cases, figure, 95 % interval, what it must be, whether it is."""
     rows = []
     for bar in bars:

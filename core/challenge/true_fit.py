@@ -29,7 +29,7 @@ _WAYS = 8  # of saying the same truth
 
 
 @dataclass(frozen=True)
-class Finding:
+class CataloguedCause:
     """A cause in the words of the catalogue.
 
     Arguments:
@@ -45,7 +45,7 @@ class Finding:
 
 def fits_of(
     examination: Examination,
-    causes: Iterable[Iterable[Finding]],
+    causes: Iterable[Iterable[CataloguedCause]],
     effects: Mapping[str, Effect],
     same: Callable[[str, str], bool],
 ) -> dict[str, Any]:
@@ -100,7 +100,7 @@ def is_search_fault(record: Mapping[str, Any]) -> bool | None:
 
 def true_fit(
     examination: Examination,
-    causes: Iterable[Iterable[Finding]],
+    causes: Iterable[Iterable[CataloguedCause]],
     effects: Mapping[str, Effect],
     same: Callable[[str, str], bool],
 ) -> Explanation | None:
@@ -125,7 +125,7 @@ def true_fit(
 def _fits_on(
     examination: Examination,
     base: Base,
-    causes: Sequence[Sequence[Finding]],
+    causes: Sequence[Sequence[CataloguedCause]],
     effects: Mapping[str, Effect],
     same: Callable[[str, str], bool],
 ) -> Iterator[Fit]:
@@ -136,7 +136,7 @@ def _fits_on(
     problem = placed(basis, best.data, best.noise, ())
     project = Projector(model, basis.modes.shapes)
 
-    def offered(finding: Finding) -> Hypothesis | None:
+    def offered(finding: CataloguedCause) -> Hypothesis | None:
         effect = effects.get(finding.effect)
         places = [] if effect is None else list(dict.fromkeys(effect.places(model)))
         place = next((place for place in places if same(place, finding.place)), None)
@@ -151,7 +151,7 @@ def _fits_on(
         yield from _fits(problem, parts, [_starts(*pair) for pair in chosen])
 
 
-def _starts(hypothesis: Hypothesis, finding: Finding) -> FloatArray:
+def _starts(hypothesis: Hypothesis, finding: CataloguedCause) -> FloatArray:
     """Return coordinates to start from, (s, k): the true ones if they are known, and the grid."""
     grid = hypothesis.grid
     if len(finding.values) != len(hypothesis.parameters):

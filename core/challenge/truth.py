@@ -19,7 +19,7 @@ _REFINEMENT = 2
 
 
 @dataclass(frozen=True)
-class TrueCause:
+class HiddenCause:
     """One thing that the nominal model lacks.
 
     Arguments:
@@ -64,7 +64,7 @@ class Truth:
     kind: DataKind
     structure: str
     hidden: Hidden
-    causes: tuple[TrueCause, ...] = ()
+    causes: tuple[HiddenCause, ...] = ()
     outside: str = ""
     excess: float = 0.0
     scatter: float = 0.0
@@ -96,7 +96,7 @@ def fine_places(place: str) -> tuple[str, ...]:
 
 
 def with_causes(
-    frame: Frame, causes: Sequence[TrueCause], effects: Mapping[str, FrameEffect]
+    frame: Frame, causes: Sequence[HiddenCause], effects: Mapping[str, FrameEffect]
 ) -> Frame:
     """Return the finer frame with the causes in it, by the effects' own words.
 

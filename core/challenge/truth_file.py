@@ -60,7 +60,7 @@ class TrueCause:
 
 
 @dataclass(frozen=True)
-class Truth:
+class KnownCase:
     """A case whose truth is known.
 
     Arguments:
@@ -107,7 +107,7 @@ class GivenTruth:
         digest: of the case.
     """
 
-    truth: Truth
+    truth: KnownCase
     seed: int
     reference: bool
     digest: str
@@ -151,7 +151,7 @@ class _Table:
         return _Table(self.file, f"{key}.", part)
 
 
-def read_truth(folder: Path) -> Truth:
+def read_truth(folder: Path) -> KnownCase:
     """Return what the truth file in a folder says.
 
     Raises:
@@ -178,7 +178,7 @@ def read_truth(folder: Path) -> Truth:
     if seed < 0:
         raise table.error("seed", f"{seed}", "a whole number >= 0")
     structure = table.take("structure", str, "a folder of the suite")
-    return Truth(folder.name, structure, kind, seed, causes, *_visible(table), _mass(table))
+    return KnownCase(folder.name, structure, kind, seed, causes, *_visible(table), _mass(table))
 
 
 def _mass(table: _Table) -> tuple[float, float] | None:
@@ -225,7 +225,7 @@ def rounded(value: float) -> float:
     return float(f"{value:.{DIGITS}g}")
 
 
-def truth_text(truth: Truth) -> str:
+def truth_text(truth: KnownCase) -> str:
     """Return the content of the truth file."""
     document = tomlkit.document()
     document.update(

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from femubench.core.case.case import Case
-from femubench.core.challenge.truth import TrueCause, Truth
+from femubench.core.challenge.truth import HiddenCause, Truth
 from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.effect.frame_effect import FrameEffect
 from femubench.core.errors import ModelError
@@ -61,7 +61,7 @@ def unexplained(
     return min(explanation.chi2 for explanation in explanations)
 
 
-def _chi2(problem: Problem, causes: Sequence[TrueCause]) -> float:
+def _chi2(problem: Problem, causes: Sequence[HiddenCause]) -> float:
     """Return chi-square with some causes fitted, from their true sizes on."""
     parts: list[Projection] = []
     start: list[float] = []

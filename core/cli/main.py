@@ -44,7 +44,7 @@ VERBS = {
 }
 
 
-class Bench(click.Group):
+class VerbGroup(click.Group):
     """A group of lazily imported verbs with the exit codes of `bench`."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -103,7 +103,7 @@ class Bench(click.Group):
 
     def main(self, *args: Any, **kwargs: Any) -> NoReturn:  # noqa: ANN401 - as click has it
         """Run `bench` and leave with its exit code."""
-        sys.exit(_exit_code(lambda: super(Bench, self).main(*args, **kwargs), kwargs))
+        sys.exit(_exit_code(lambda: super(VerbGroup, self).main(*args, **kwargs), kwargs))
 
 
 def _exit_code(call: Callable[[], Any], kwargs: dict[str, Any]) -> int:
@@ -129,7 +129,7 @@ def _exit_code(call: Callable[[], Any], kwargs: dict[str, Any]) -> int:
     return code if isinstance(code, int) else DONE
 
 
-@click.group(cls=Bench, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=VerbGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="femubench")
 @click.option(
     "--traceback", is_flag=True, help="Show where an error or a broken plugin comes from."

@@ -19,7 +19,7 @@ from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import CHECKS, chosen, did_you_mean
 
 if TYPE_CHECKING:
-    from femubench.core.conformance.checking import Finding
+    from femubench.core.conformance.checking import CheckResult
 
 # What `new` writes, as in `KINDS` of the module that does it.
 _KINDS = ("strategy", "effect", "scenario", "reader")
@@ -154,7 +154,7 @@ def check(
     return 1 if bad else 0
 
 
-def _line(finding: Finding) -> str:
+def _line(finding: CheckResult) -> str:
     """Return one line: what a finding says, or what was checked."""
     word = _WORDS[finding.verdict.status]
     plain = finding.verdict.status == "pass" and not finding.verdict.message

@@ -22,7 +22,7 @@ from femubench.core.conformance.kit import (
     judged,
     prepare,
 )
-from femubench.core.conformance.problems import Problem
+from femubench.core.conformance.problems import UpdatingProblem
 from femubench.core.errors import InputError
 from femubench.core.plugin.loader import Plugins, shown
 from femubench.core.plugin.validation import KINDS, did_you_mean
@@ -52,7 +52,7 @@ class Subject:
 
 
 @dataclass(frozen=True)
-class Finding:
+class CheckResult:
     """A check and its verdict."""
 
     check: Check
@@ -65,7 +65,7 @@ def checks_of(role: Role) -> tuple[Check, ...]:
 
 
 def subjects(
-    name: str, plugins: Plugins, *, cases: Sequence[Problem] = (), seconds: float = SECONDS
+    name: str, plugins: Plugins, *, cases: Sequence[UpdatingProblem] = (), seconds: float = SECONDS
 ) -> list[Subject]:
     """Return every strategy, effect, reader and scenario of a name.
 
@@ -89,21 +89,21 @@ def subjects(
     return found
 
 
-def findings(subject: Subject) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[CheckResult]:
     """Run all checks of a subject, side by side where they can."""
     if subject.role == "strategy":
         prepare(subject.checks, subject.bench)
     for check in subject.checks:
-        yield Finding(check, judged(check, subject.bench))
+        yield CheckResult(check, judged(check, subject.bench))
 
 
-def counts(found: Iterable[Finding]) -> dict[str, int]:
+def counts(found: Iterable[CheckResult]) -> dict[str, int]:
     """Return how many checks have each status."""
     statuses = [finding.verdict.status for finding in found]
     return {status: statuses.count(status) for status in get_args(Status)}
 
 
-def to_json(subject: Subject, found: Sequence[Finding]) -> dict[str, Any]:
+def to_json(subject: Subject, found: Sequence[CheckResult]) -> dict[str, Any]:
     """Return the findings as plain data."""
     return {
         "role": subject.role,
@@ -134,7 +134,7 @@ def _bench(
     role: Role,
     item: Any,  # noqa: ANN401 - any role
     plugins: Plugins,
-    cases: Sequence[Problem],
+    cases: Sequence[UpdatingProblem],
     seconds: float,
 ) -> Bench:
     if role == "strategy":

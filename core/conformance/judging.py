@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femubench.core.conformance.fingerprints import fingerprint
-from femubench.core.conformance.problems import Problem
+from femubench.core.conformance.problems import UpdatingProblem
 from femubench.core.conformance.results import Given, faults_of
 from femubench.core.conformance.trial import Observation
 from femubench.core.run.answers import AnswerError, unpacked
@@ -34,7 +34,7 @@ class Handed:
         promises: what the strategy says that it keeps.
     """
 
-    problem: Problem
+    problem: UpdatingProblem
     answer: bytes
     promises: frozenset[str]
 

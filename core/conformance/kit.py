@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeAlias, get_args
 
 from femubench.core.conformance import SECONDS
 from femubench.core.conformance.judging import Handed, confirmed, judge_handed
-from femubench.core.conformance.problems import PLAIN, Problem, problem
+from femubench.core.conformance.problems import PLAIN, UpdatingProblem, problem
 from femubench.core.conformance.trial import (
     Observation,
     Trial,
@@ -138,7 +138,7 @@ class Bench:
         subject: Any,  # noqa: ANN401 - any role
         *,
         reference: Strategy | None = None,
-        cases: Sequence[Problem] = (),
+        cases: Sequence[UpdatingProblem] = (),
         helpers: Sequence[object] = (),
         seconds: float = SECONDS,
         memory: int = MEMORY,
@@ -204,7 +204,7 @@ class Bench:
     def _strategy(self, want: Want) -> Any:  # noqa: ANN401 - a strategy of anybody's
         return self.reference if want.reference else self.subject
 
-    def _problem(self, want: Want) -> Problem:
+    def _problem(self, want: Want) -> UpdatingProblem:
         return self.cases.get(want.problem) or problem(want.problem)
 
     def apart(self, function: Callable[..., Verdict], *further: object) -> Verdict:

@@ -44,7 +44,7 @@ _SPRINGS: Mapping[Plane, Mapping[str, float]] = {
 
 
 @dataclass(frozen=True)
-class Problem:
+class UpdatingProblem:
     """What a strategy is given in a check.
 
     Arguments:
@@ -145,7 +145,7 @@ def frame_problem(
     elements: int = ELEMENTS,
     torsion: tuple[float, float] = (1.0, 1.0),
     **kind: Any,  # noqa: ANN401 - as `small_frame` has it
-) -> Problem:
+) -> UpdatingProblem:
     """Return a coarse model that is too stiff, and a test of a finer one.
 
     Arguments:
@@ -156,10 +156,10 @@ def frame_problem(
     model = frame(elements=elements, torsion=torsion[0])
     mass = PointMass(Place(joint=members[0][1]), 0.02)
     truth = frame(elements=3 * elements, modulus=TRUE_E, torsion=torsion[1], masses=(mass,))
-    return Problem(name, Model.of(model), measured(Model.of(truth), sensors_of(model)))
+    return UpdatingProblem(name, Model.of(model), measured(Model.of(truth), sensors_of(model)))
 
 
-def _as_matrices(problem: Problem) -> Problem:
+def _as_matrices(problem: UpdatingProblem) -> UpdatingProblem:
     """Return a problem with a model that came as matrices from files."""
     model = problem.model
     names = tuple(f"n{number + 1}" for number in range(int(model.dofs.node.max()) + 1))
@@ -169,7 +169,7 @@ def _as_matrices(problem: Problem) -> Problem:
     return replace(problem, model=Model(model.mass, model.stiffness, dofs, geometry))
 
 
-def _as_groups(problem: Problem) -> Problem:
+def _as_groups(problem: UpdatingProblem) -> UpdatingProblem:
     """Return a problem with matrices of which one member and the others are groups."""
     structure, nominal = problem.model.frame_structure, problem.model.stiffness
     own = Property("E", "E", tuple(m for m in structure.label_index if m.startswith("AB/")))
@@ -180,7 +180,7 @@ def _as_groups(problem: Problem) -> Problem:
     return replace(grouped, model=replace(grouped.model, groups=groups, mass_groups=mass))
 
 
-def _without(problem: Problem, *cells: tuple[int | slice, int | slice]) -> Problem:
+def _without(problem: UpdatingProblem, *cells: tuple[int | slice, int | slice]) -> UpdatingProblem:
     """Return a problem in which some cells of the shapes are missing, by sensors and modes."""
     shapes, std = problem.measurement.shapes.copy(), problem.measurement.shape_std.copy()
     for cell in cells:
@@ -189,19 +189,19 @@ def _without(problem: Problem, *cells: tuple[int | slice, int | slice]) -> Probl
     return replace(problem, measurement=measurement)
 
 
-def _noisy(problem: Problem, draw: int) -> Problem:
+def _noisy(problem: UpdatingProblem, draw: int) -> UpdatingProblem:
     """Return a problem with one draw of measurement noise."""
     measurement = problem.measurement.with_noise(np.random.default_rng(draw))
     return replace(problem, measurement=measurement)
 
 
-def of_case(case: Case) -> Problem:
+def of_case(case: Case) -> UpdatingProblem:
     """Return what a strategy is given of a case."""
-    return Problem(case.name, case.model, case.used_measurement())
+    return UpdatingProblem(case.name, case.model, case.used_measurement())
 
 
 @cache
-def problem(name: str) -> Problem:
+def problem(name: str) -> UpdatingProblem:
     """Return one of the built problems by name; raises KeyError."""
     if name in _FRAMES:
         return frame_problem(name, **_FRAMES[name])
@@ -227,7 +227,7 @@ _FRAMES: Mapping[str, Mapping[str, Any]] = {
     "joints without mass, free": {"plane": "out-of-plane", "sprung": True, "grounded": False},
 }
 # The problem that is changed, and how.
-_CHANGED: Mapping[str, tuple[str, Callable[[Problem], Problem]]] = {
+_CHANGED: Mapping[str, tuple[str, Callable[[UpdatingProblem], UpdatingProblem]]] = {
     "matrices alone": (PLAIN, _as_matrices),
     GROUPED: (PLAIN, _as_groups),
     # One sensor never worked, and others missed a mode.

@@ -171,10 +171,10 @@ class _Kit(pytest.Collector):
 
     def collect(self) -> Iterator[pytest.Item]:
         for check in self.subject.checks:
-            yield _Item.from_parent(self, name=check.name, check=check)
+            yield _CheckItem.from_parent(self, name=check.name, check=check)
 
 
-class _Item(pytest.Item):
+class _CheckItem(pytest.Item):
     """One check."""
 
     parent: _Kit
@@ -188,7 +188,7 @@ class _Item(pytest.Item):
 
         bench = self.parent.subject.bench
         if self.check.role == "strategy":
-            same = (item for item in self.session.items if isinstance(item, _Item))
+            same = (item for item in self.session.items if isinstance(item, _CheckItem))
             prepare([item.check for item in same if item.parent is self.parent], bench)
         verdict = judged(self.check, bench)
         if verdict.status == "fail":

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.conformance.fingerprints import fingerprint, first_difference
-from femubench.core.conformance.problems import Problem
+from femubench.core.conformance.problems import UpdatingProblem
 from femubench.core.errors import FemubenchError
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.eigen import enough_modes, solve_modes, zero_tolerance
@@ -37,7 +37,7 @@ class Given:
         promises: what the strategy says that it keeps.
     """
 
-    problem: Problem
+    problem: UpdatingProblem
     result: UpdateResult
     promises: frozenset[str]
 

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from femubench.core.conformance.fingerprints import fingerprint, first_difference, global_state
-from femubench.core.conformance.problems import Problem
+from femubench.core.conformance.problems import UpdatingProblem
 from femubench.core.conformance.results import Given, faults_of
 from femubench.core.errors import NotApplicable, StrategyFailure, harmless
 from femubench.core.fem.model import Model
@@ -60,7 +60,7 @@ class Trial:
     """What a worker is to do: a pickled strategy and what it is given."""
 
     strategy: bytes
-    problem: Problem
+    problem: UpdatingProblem
     want: Want
 
 
@@ -141,7 +141,7 @@ def _observe(trial: Trial) -> tuple[Observation, bytes]:
     problem = trial.problem
     # What is handed over may be spoilt; the problem itself is needed to judge the result.
     model, measurement = pickle.loads(pickle.dumps((problem.model, problem.measurement)))
-    given = Problem(problem.name, model, measurement)
+    given = UpdatingProblem(problem.name, model, measurement)
     before = _inputs(given)
     random.seed(trial.want.scramble)
     np.random.seed(trial.want.scramble)  # noqa: NPY002 - so that two runs find another state
@@ -169,12 +169,12 @@ def brought(subject: Any) -> Any:  # noqa: ANN401 - any role
     return imported(subject)
 
 
-def _inputs(given: Problem) -> dict[str, str]:
+def _inputs(given: UpdatingProblem) -> dict[str, str]:
     return fingerprint(given.model, "model") | fingerprint(given.measurement, "measurement")
 
 
 def _called(
-    strategy: Strategy, given: Problem, trial: Trial
+    strategy: Strategy, given: UpdatingProblem, trial: Trial
 ) -> tuple[Observation, UpdateResult | None]:
     rng = np.random.default_rng(np.random.SeedSequence([0, *given.name.encode()]))
     name, start = given.name, time.perf_counter()

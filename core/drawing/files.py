@@ -54,7 +54,7 @@ class _Receptance(_Part):
     note: str = Field(default="", max_length=1000)
 
 
-class _Mode(_Part):
+class _DrawnMode(_Part):
     hz: float
     paired: int | None = None
     modification: str | None = Field(default=None, max_length=500)
@@ -91,7 +91,7 @@ class _Difference(_Part):
 
 
 class _Exhibit(_Part):
-    modes: list[_Mode] = Field(max_length=2000)
+    modes: list[_DrawnMode] = Field(max_length=2000)
     mac: _Mac
     receptance: dict[str, list[Number]] = {}
     findings: list[Finding] = Field(default=[], max_length=_MOST)

@@ -15,7 +15,7 @@ _ENOUGH = 0.01  # decrease of the misfit in units of the noise
 
 
 @dataclass(frozen=True)
-class ModalFit:
+class ModalModel:
     """A modal model with poles, shapes and participations, rank one a mode.
 
     Arguments:
@@ -66,7 +66,7 @@ class _Point:
 
 def fit_modes(
     lines: Lines, poles: AnyArray, participation: AnyArray, weights: FloatArray
-) -> ModalFit:
+) -> ModalModel:
     """Return the modal model that fits best.
 
     For given poles and participations the shapes are a linear problem, output by output; the
@@ -202,7 +202,7 @@ def _solved(normal: FloatArray, right: FloatArray, damping: float = 1e-13) -> Fl
     return np.asarray(found * (scale if right.ndim == 1 else scale[:, None]))
 
 
-def _result(point: _Point, weights: FloatArray) -> ModalFit:
+def _result(point: _Point, weights: FloatArray) -> ModalModel:
     n, references = len(point.poles), len(point.participation)
     free = _free(point.participation)
     shared = _solved(point.normal, np.eye(len(point.normal)))
@@ -224,7 +224,7 @@ def _result(point: _Point, weights: FloatArray) -> ModalFit:
     covariance += np.asarray(np.einsum("oraf,prbf->raobp", moved, follow, optimize=True))
     at = np.arange(n)
     own_poles = poles[: 2 * n, : 2 * n].reshape(n, 2, n, 2)[at, :, at, :]
-    return ModalFit(
+    return ModalModel(
         poles=point.poles,
         participation=point.participation,
         shapes=shapes @ np.array([1.0, 1j]),
@@ -236,7 +236,7 @@ def _result(point: _Point, weights: FloatArray) -> ModalFit:
     )
 
 
-def predicted(fit: ModalFit, lines: Lines) -> AnyArray:
+def predicted(fit: ModalModel, lines: Lines) -> AnyArray:
     """Return the responses of a fit at the lines, whitened, complex, (n_f, n_out, n_ref)."""
     base = lines.modes(fit.poles)[:, :, :2]
     residues = fit.shapes[:, None, :] * fit.participation[None]  # (out, ref, n)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from femubench.core.identify.basis import RESIDUALS, Lines
-from femubench.core.identify.modal_fit import ModalFit, predicted
+from femubench.core.identify.modal_fit import ModalModel, predicted
 from femubench.core.typing import AnyArray, BoolArray, FloatArray
 
 # Lines over which the level is averaged: these, and as many as give so many values of all channels.
@@ -39,7 +39,7 @@ def _inverse(variance: FloatArray, lines: Lines, seen: BoolArray) -> FloatArray:
 
 
 def noise_left(
-    fit: ModalFit, lines: Lines, seen: BoolArray, *, rough: bool = False
+    fit: ModalModel, lines: Lines, seen: BoolArray, *, rough: bool = False
 ) -> tuple[Lines, FloatArray]:
     """Return lines and weights with the noise that a fit leaves.
 
@@ -70,7 +70,7 @@ def noise_left(
     return rescaled, _inverse(np.square(np.abs(error)).sum(axis=0) / freedom, rescaled, seen)
 
 
-def unevenness(fit: ModalFit, lines: Lines) -> FloatArray:
+def unevenness(fit: ModalModel, lines: Lines) -> FloatArray:
     """Return the noise around each mode's resonance over what the weights say, (n, 2).
 
     The noise of a channel need not follow the course of all channels: where it follows the

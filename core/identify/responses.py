@@ -13,7 +13,7 @@ from femubench.core.identify.clusters import Cluster, clusters_of
 from femubench.core.identify.hidden import hidden_poles
 from femubench.core.identify.identification import Identification
 from femubench.core.identify.lscf import Poles, lscf_poles
-from femubench.core.identify.modal_fit import ModalFit, fit_modes, predicted
+from femubench.core.identify.modal_fit import ModalModel, fit_modes, predicted
 from femubench.core.identify.noise import first_weights, noise_left, unevenness
 from femubench.core.identify.selection import needed, select
 from femubench.core.modal.complex_modes import mean_phase
@@ -91,7 +91,7 @@ def _all_poles(
     return replace(found, participation=forces)
 
 
-def _fitted(lines: Lines, clusters: Sequence[Cluster], seen: BoolArray) -> tuple[ModalFit, Lines]:
+def _fitted(lines: Lines, clusters: Sequence[Cluster], seen: BoolArray) -> tuple[ModalModel, Lines]:
     """Return the fit of all modes that the data need, and the data with the noise they show."""
     poles: AnyArray = np.array([cluster.pole for cluster in clusters], dtype=complex)
     forces: AnyArray = np.array([cluster.participation for cluster in clusters], dtype=complex)
@@ -122,7 +122,7 @@ def _fitted(lines: Lines, clusters: Sequence[Cluster], seen: BoolArray) -> tuple
     ), lines
 
 
-def _twice(fit: ModalFit) -> BoolArray:
+def _twice(fit: ModalModel) -> BoolArray:
     """Tell which modes are a stronger neighbour once more: as good as its place, and its shape.
 
     What a linear model cannot follow, as the bent peak of a joint that slips, is fitted so.
@@ -137,7 +137,7 @@ def _twice(fit: ModalFit) -> BoolArray:
 
 def _identification(
     data: FrequencyResponses,
-    fit: ModalFit,
+    fit: ModalModel,
     lines: Lines,
     clusters: Sequence[Cluster],
     poles: Poles,

@@ -22,7 +22,7 @@ from femubench.core.fit.static_response import Basis, placed
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.model_error import (
     Fitted,
-    ModelError,
+    Inadequacy,
     class_widths,
     conditioned,
     error_slopes,
@@ -62,7 +62,7 @@ class Examination:
     posterior: Posterior
     found: tuple[Found, ...]
     modes: Modes
-    error: ModelError | None = None
+    error: Inadequacy | None = None
     reference: Measurement | None = None
 
     @cached_property
@@ -287,7 +287,7 @@ def before_of(problem: Problem, reference: Measurement) -> State:
 
 
 def searched(
-    problem: Problem, error: ModelError, effects: Sequence[Effect], pairs: bool, effort: Effort
+    problem: Problem, error: Inadequacy, effects: Sequence[Effect], pairs: bool, effort: Effort
 ) -> list[Explanation]:
     """Return explanations beside a model error, each with scales of its own where it matters.
 
@@ -336,7 +336,7 @@ def _causes(explanation: Explanation) -> tuple[object, ...]:
 
 
 def with_scales(
-    error: ModelError, explanation: Explanation, near: Fitted, nothing: State
+    error: Inadequacy, explanation: Explanation, near: Fitted, nothing: State
 ) -> Explanation:
     """Return an explanation with the scales of model error that suit it best."""
     state = explanation.fit.state
@@ -355,7 +355,7 @@ def with_scales(
 
 def model_error_of(
     problem: Problem, basis: Basis, before: State | None, width: float, log_prior: float
-) -> ModelError:
+) -> Inadequacy:
     """Return the model error of a problem, and of a reference where there is one."""
     structure = problem.model.structure
     present = error_slopes(problem, structure, basis.modes)
@@ -363,7 +363,7 @@ def model_error_of(
     residual = np.zeros(0) if before is None else before.raw
     widths = {name: width * value for name, value in class_widths().items()}
     unshared = settings.width_between_states
-    return ModelError.of(present, reference, residual, widths, unshared, log_prior)
+    return Inadequacy.of(present, reference, residual, widths, unshared, log_prior)
 
 
 def beam_noise(

@@ -5,7 +5,7 @@ standard normal times the scale tau of its class: C = I + sum_k tau_k^2 S_k S_k'
 unknown too, tau_k = w_k u_k with ln u_k normal; the data infer them for every explanation, so that
 each has the same freedom to be wrong. A half-normal prior of the scales lets them collapse to zero.
 
-Source: Kennedy & O'Hagan (2001) for the discrepancy of a model as a random function; MacKay (1992)
+Source: Kennedy & O'Hagan (2001) for the inadequacy of a model as a random function; MacKay (1992)
 for scales that the evidence sets.
 """
 
@@ -233,7 +233,7 @@ def _end_moments(
 
 
 @dataclass(frozen=True)
-class ModelError:
+class Inadequacy:
     """The classes of model error in the data, and in those of a reference where there is one.
 
     Both states share one model error; what they do not share is a small part of it, whose scale is
@@ -271,7 +271,7 @@ class ModelError:
         widths: Mapping[str, float],
         unshared: float,
         log_prior: float,
-    ) -> ModelError:
+    ) -> Inadequacy:
         """Return the model error of sensitivities, (n_data, p_k) by class."""
         before = {} if reference is None else reference
         names = tuple(dict.fromkeys((*present, *before)))
@@ -289,7 +289,7 @@ class ModelError:
             log_prior,
         )
 
-    def beside(self, nothing: State, state: State) -> ModelError:
+    def beside(self, nothing: State, state: State) -> Inadequacy:
         """Return the model error where part of what an explanation changes is its own error.
 
         An effect at a place is an idealisation, and the beams that carry it to the sensors are.

@@ -11,7 +11,7 @@ from typing import Any
 from femubench.core.case.example import write_example
 from femubench.core.case.starting import Beginning
 from femubench.core.conformance import SECONDS
-from femubench.core.conformance.checking import Finding, findings, subjects
+from femubench.core.conformance.checking import CheckResult, findings, subjects
 from femubench.core.conformance.problems import of_case
 from femubench.core.errors import InputError
 from femubench.core.library.cases import CaseLike, listed, read_cases, usable_plugins
@@ -80,7 +80,7 @@ def check(
     *,
     cases: CaseLike | Iterable[CaseLike] = (),
     timeout: float = SECONDS,
-) -> tuple[Finding, ...]:
+) -> tuple[CheckResult, ...]:
     """Check that a plugin keeps what a plugin must keep; return what was found.
 
     Arguments:

@@ -35,7 +35,7 @@ from femubench.core.run.store import Store
 from femubench.core.schema.records import MOST_RESULTS
 from femubench.core.schema.results import DONE, NOMINALS, Nominal
 from femubench.core.score.scoring import reference_of
-from femubench.core.study.axes import Choice, Setting, StudyAxes
+from femubench.core.study.axes import CaseConditions, OptionSet, StudyAxes
 from femubench.core.study.conditions import varied
 from femubench.core.study.estimate import Forecast, forecast
 from femubench.core.study.study_file import StudyFile, grid, read_study
@@ -209,11 +209,11 @@ def study_plan(read: StudyFile, plugins: Plugins) -> StudyPlan:
     originals = _cases(read, plugins)
     textbook = textbook_of(originals)
     cases: list[Case] = []
-    known, settings = dict[str, Case](), dict[str, Setting]()
+    known, settings = dict[str, Case](), dict[str, CaseConditions]()
     for original in originals:
         for noise, left_out in product(axes.noise, axes.sensors_left_out):
             case = varied(original, noise, left_out)
-            settings[case.name] = Setting(original.name, noise, left_out)
+            settings[case.name] = CaseConditions(original.name, noise, left_out)
             first = not cases or settings[cases[-1].name].case != original.name
             cases.append(case if first else replace(case, notes=()))
             if original.name in textbook:
@@ -238,10 +238,10 @@ def study_plan(read: StudyFile, plugins: Plugins) -> StudyPlan:
     return plan
 
 
-def _strategies(read: StudyFile, plugins: Plugins) -> tuple[list[Strategy], dict[str, Choice]]:
+def _strategies(read: StudyFile, plugins: Plugins) -> tuple[list[Strategy], dict[str, OptionSet]]:
     """Return every strategy with every combination of its options, and which one it is."""
     found: list[Strategy] = []
-    choices: dict[str, Choice] = {}
+    choices: dict[str, OptionSet] = {}
     for number, asked in enumerate(read.tables.strategies):
         with read.at("strategies", number, "name"):
             chosen("strategy", [asked.name], plugins.strategies)
@@ -253,7 +253,7 @@ def _strategies(read: StudyFile, plugins: Plugins) -> tuple[list[Strategy], dict
                     raise InputError(f"{variant.name} stands twice", expected="every one once")
             # With the options that it has anyway it is the strategy that `bench run` runs.
             found.append(base if variant.name == base.name else variant)
-            choices[variant.name] = Choice(asked.name, options)
+            choices[variant.name] = OptionSet(asked.name, options)
     return found, choices
 
 

@@ -29,7 +29,7 @@ _MOST_NAMED = 3
 
 
 @dataclass(frozen=True)
-class Submission:
+class SubmissionReview:
     """A run that may go to a leaderboard, and what stands against it.
 
     Arguments:
@@ -58,7 +58,7 @@ def submit(
     timeouts: Mapping[str, float] | None = None,
     tell: Callable[[str], None] = lambda line: None,
     told: Told | None = None,
-) -> Submission:
+) -> SubmissionReview:
     """Check strategies, run them, compare them with an earlier run, and write the result file.
 
     Arguments:
@@ -105,7 +105,7 @@ def submit(
         found = compare(before, run, strategies=names, fail=fail)
         faults += _losses(found)
     tell(f"check {file} as a leaderboard does")
-    return Submission(run, tuple(faults), refusal_of(file), found)
+    return SubmissionReview(run, tuple(faults), refusal_of(file), found)
 
 
 def _unanswered(run: Run, names: Iterable[str]) -> Iterator[str]:
@@ -131,7 +131,7 @@ def _losses(found: Comparison) -> Iterator[str]:
         yield f"{item.strategy} is worse than the baseline{where}: {told}"
 
 
-def summary_of(found: Submission) -> str:
+def summary_of(found: SubmissionReview) -> str:
     """Return what came out in Markdown: the verdict, the ranking, the comparison."""
     markdown = reporter(usable_plugins(), "markdown")
     verdict = "not accepted" if found.faults else "accepted"

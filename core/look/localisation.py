@@ -16,7 +16,7 @@ from femubench.core.fem.group_factors import group_places
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.inference.settings import settings
-from femubench.core.look.shape_expansion import Comparison, Expansion, expand
+from femubench.core.look.shape_expansion import Expansion, ModalCorrelation, expand
 from femubench.core.modal.correlation import modal_scale_factor
 from femubench.core.modal.measurement import Measurement
 from femubench.core.schema.diagnosis import LocationRow
@@ -104,7 +104,7 @@ def _springs(structure: Structure, shapes: FloatArray, gaps: FloatArray) -> Valu
 
 
 def force_residual(
-    elements: Elements, comparison: Comparison, expansion: Expansion
+    elements: Elements, comparison: ModalCorrelation, expansion: Expansion
 ) -> list[Values]:
     """Return how much of the force residual every place explains, by kind of place.
 
@@ -132,7 +132,7 @@ def force_residual(
     return [*found, joints]
 
 
-def node_residual(comparison: Comparison, expansion: Expansion) -> list[Values]:
+def node_residual(comparison: ModalCorrelation, expansion: Expansion) -> list[Values]:
     """Return the energy of the force residual at the nodes of a model from files."""
     geometry = comparison.model.geometry
     if not isinstance(geometry, MatrixGeometry):
@@ -141,7 +141,7 @@ def node_residual(comparison: Comparison, expansion: Expansion) -> list[Values]:
     return [_named(geometry.names, _at_nodes(comparison, gaps))]
 
 
-def group_energy(comparison: Comparison, expansion: Expansion) -> list[Values]:
+def group_energy(comparison: ModalCorrelation, expansion: Expansion) -> list[Values]:
     """Return the error in constitutive relation of the groups of a model from files."""
     shapes, gaps = _weighted(expansion)
     names = group_places(comparison.model, "stiffness")
@@ -153,7 +153,7 @@ def group_energy(comparison: Comparison, expansion: Expansion) -> list[Values]:
     return [_named(names, error / (energy + _mean(energy)))]
 
 
-def _at_nodes(comparison: Comparison, gaps: FloatArray) -> FloatArray:
+def _at_nodes(comparison: ModalCorrelation, gaps: FloatArray) -> FloatArray:
     """Return sqrt(sum of r^2 / K_dd) over modes and dofs of every node, (n_nodes,)."""
     model = comparison.model
     diagonal = np.abs(model.stiffness.diagonal())
@@ -162,7 +162,7 @@ def _at_nodes(comparison: Comparison, gaps: FloatArray) -> FloatArray:
     return np.sqrt(np.bincount(model.dofs.node, weights=energy))
 
 
-def ecomac(comparison: Comparison) -> Values:
+def ecomac(comparison: ModalCorrelation) -> Values:
     """Return the mean difference of paired unit shapes at every sensor (1 - MAC by coordinate).
 
     Source: Hunt (1992), Application of an enhanced coordinate modal assurance criterion.
@@ -184,7 +184,7 @@ def ecomac(comparison: Comparison) -> Values:
     return {label: float(v) for label, v, k in zip(m.sensors.labels, mean, count, strict=True) if k}
 
 
-def mdlac(elements: Elements, comparison: Comparison) -> list[Values]:
+def mdlac(elements: Elements, comparison: ModalCorrelation) -> list[Values]:
     """Return how well the frequency shifts look like those of a softer place, by kind of place.
 
     The squared cosine between the measured relative shifts and the sensitivities of the
@@ -239,7 +239,7 @@ def locate(model: Model, measurement: Measurement) -> tuple[LocationRow, ...]:
     Raises:
         ModelError: when the model has no modes.
     """
-    comparison = Comparison.of(model, measurement)
+    comparison = ModalCorrelation.of(model, measurement)
     found: dict[str, list[Values]] = {}
     try:
         expansion = expand(comparison)

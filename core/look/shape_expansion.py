@@ -20,7 +20,7 @@ from femubench.core.typing import FloatArray
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ModalCorrelation:
     """Measured modes beside the modes of a model.
 
     Arguments:
@@ -40,7 +40,7 @@ class Comparison:
     bias: FloatArray
 
     @classmethod
-    def of(cls, model: Model, measurement: Measurement) -> Comparison:
+    def of(cls, model: Model, measurement: Measurement) -> ModalCorrelation:
         """Solve a model and pair its modes with the measured ones.
 
         Raises:
@@ -86,7 +86,7 @@ class Expansion:
     eigenvalues: FloatArray
 
 
-def expand(comparison: Comparison) -> Expansion:
+def expand(comparison: ModalCorrelation) -> Expansion:
     """Return the measured modes that have a shape, expanded by the error in constitutive relation.
 
     Of all shapes u that meet the readings within their noise, the one whose error has the least
@@ -119,7 +119,7 @@ def expand(comparison: Comparison) -> Expansion:
 
 
 def _expanded(
-    comparison: Comparison, sensors: FloatArray, reading: FloatArray, eigenvalue: float
+    comparison: ModalCorrelation, sensors: FloatArray, reading: FloatArray, eigenvalue: float
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return shape and gap of one mode, and the eigenvalue.
 

@@ -46,7 +46,7 @@ def _threads_of_numpy() -> Iterator[None]:
         yield
 
 
-class Factor(Protocol):
+class Symmetric(Protocol):
     """A factorised symmetric matrix."""
 
     def solve(self, right: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from femubench.core.fem.model import Model
-from femubench.core.modal.factorisation import Definite, Factor
+from femubench.core.modal.factorisation import Definite, Symmetric
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 Change = tuple[FloatArray, FloatArray]  # (basis, eigenvalues): basis @ diag(eigenvalues) @ basis'
@@ -20,7 +20,7 @@ _TRUSTED = 0.1  # spectral radius of the error; 1 is where a sign can change
 _CHOICE = 8  # nodes to choose from for every one chosen
 
 
-def signs_hold(factor: Factor, matrix: SparseArray) -> bool:
+def signs_hold(factor: Symmetric, matrix: SparseArray) -> bool:
     """Tell whether the pivots have the signs of the matrix, in spite of growth and rounding.
 
     They are exactly those of A + E. Between this and A no eigenvalue passes zero where

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import LowRank, Model
-from femubench.core.modal.factorisation import LU, Cholesky, DefiniteLU, Factor, cholmod_obstacle
+from femubench.core.modal.factorisation import LU, Cholesky, DefiniteLU, Symmetric, cholmod_obstacle
 from femubench.core.modal.generalised_mass import generalised_masses
 from femubench.core.modal.inertia import Change, negative_after, negative_by_pins, signs_hold
 from femubench.core.modal.rigid import rigid_modes_of
@@ -70,7 +70,7 @@ class ShiftedModel:
         )
 
     @cached_property
-    def _factor(self) -> Factor:
+    def _factor(self) -> Symmetric:
         # Above the lowest eigenvalue there is no Cholesky factorisation.
         if self.shift <= 0.0 and (cholesky := self._cholesky) and cholesky.factorise(self._matrix):
             return cholesky
@@ -144,7 +144,7 @@ class ShiftedModel:
 
 
 @dataclass(frozen=True)
-class _Known:
+class _KnownModes:
     """Mass-orthonormal modes that are known, to be kept out of motions and forces.
 
     Arguments:
@@ -166,7 +166,7 @@ def _random(model: Model, seed: int) -> FloatArray:
     return np.random.default_rng(seed).standard_normal(model.size)
 
 
-def _below_elastic(model: Model, rigid: _Known) -> tuple[ShiftedModel, FloatArray]:
+def _below_elastic(model: Model, rigid: _KnownModes) -> tuple[ShiftedModel, FloatArray]:
     """Return a factorisation shifted below the first elastic eigenvalue, and a start for Lanczos.
 
     The softest smooth field is stiffer than the first mode, on frames up to a few hundred times:
@@ -217,7 +217,7 @@ def lowest_eigenpairs(model: Model, count: int) -> tuple[FloatArray, FloatArray]
             lower = la.cholesky(gram, lower=True)
             modes = np.asarray(la.solve_triangular(lower, modes.T, lower=True).T)
     free = modes.shape[1]
-    rigid = _Known(modes, model.mass_times(modes))
+    rigid = _KnownModes(modes, model.mass_times(modes))
     shifted, start = _below_elastic(model, rigid)
     ask = min(max(count - free, 1) + _SPARE, model.size - free - 1)
     eigenvalues, shapes = _shift_invert(shifted, rigid, ask, start)
@@ -228,7 +228,7 @@ def lowest_eigenpairs(model: Model, count: int) -> tuple[FloatArray, FloatArray]
         # One start leads to one direction of a repeated eigenvalue: another is needed for the next.
         start = _random(model, number)
         weighted = np.hstack([rigid.weighted, model.mass_times(shapes)])
-        known = _Known(np.hstack([rigid.modes, shapes]), weighted)
+        known = _KnownModes(np.hstack([rigid.modes, shapes]), weighted)
         more, others = _shift_invert(shifted, known, missed + _SPARE, start)
         order = np.argsort(np.concatenate([eigenvalues, more]), kind="stable")[: len(eigenvalues)]
         eigenvalues = np.concatenate([eigenvalues, more])[order]
@@ -245,7 +245,7 @@ def lowest_eigenpairs(model: Model, count: int) -> tuple[FloatArray, FloatArray]
 
 
 def _shift_invert(
-    shifted: ShiftedModel, known: _Known, count: int, start: FloatArray
+    shifted: ShiftedModel, known: _KnownModes, count: int, start: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return so many eigenpairs above the shift, the lowest, and all below it; known ones aside."""
     model, size = shifted.model, shifted.model.size

@@ -18,7 +18,7 @@ _NO_RESULT = frozenset({"timeout", "crashed"})
 
 
 @dataclass(frozen=True)
-class Finding:
+class Outcome:
     """What the runs say on one job.
 
     Arguments:
@@ -29,7 +29,7 @@ class Finding:
 
     result: JobResult
     runs: tuple[Submission, ...]
-    others: tuple[Finding, ...] = ()
+    others: tuple[Outcome, ...] = ()
 
     @property
     def conflict(self) -> bool:
@@ -42,7 +42,7 @@ class Finding:
         return len({machine_of(run) for run in self.runs})
 
 
-def findings_of(submissions: Iterable[Submission], references: References) -> list[Finding]:
+def findings_of(submissions: Iterable[Submission], references: References) -> list[Outcome]:
     """Return one finding for every job, in the order of case, strategy, seed and key.
 
     Of contradicting results that counts on which most machines agree, of equals the worst.
@@ -52,7 +52,7 @@ def findings_of(submissions: Iterable[Submission], references: References) -> li
         references: that the worst is found with. Those of a run could make its own result look
             worse than it is, and so let it count.
     """
-    groups: dict[tuple[str, str, int, str], list[Finding]] = {}
+    groups: dict[tuple[str, str, int, str], list[Outcome]] = {}
     for item in submissions:
         for result in item.run.ranked:
             # The names go with the key: a forged key must not put two jobs together.
@@ -65,7 +65,7 @@ def findings_of(submissions: Iterable[Submission], references: References) -> li
                     listed[number] = replace(known, runs=(*known.runs, item))
                     break
             else:
-                listed.append(Finding(result, (item,)))
+                listed.append(Outcome(result, (item,)))
     return [_settled(groups[job], references) for job in sorted(groups)]
 
 
@@ -86,12 +86,12 @@ def machine_of(item: Submission) -> tuple[str, str, str]:
     return str(machine["cpu"]), str(machine["blas"]), str(machine["platform"])
 
 
-def _settled(found: Sequence[Finding], references: References) -> Finding:
+def _settled(found: Sequence[Outcome], references: References) -> Outcome:
     sound = [item for item in found if item.result.status not in _NO_RESULT] or list(found)
     if all(item.result.status in _NO_RESULT for item in found):
         sound = [replace(found[0], runs=tuple(run for item in found for run in item.runs))]
 
-    def order(item: Finding) -> tuple[int, float, str]:
+    def order(item: Outcome) -> tuple[int, float, str]:
         result = item.result
         case = result.case, str(result.provenance["case"])
         return -item.machines, -score_of(result, references[case]), item.runs[0].name

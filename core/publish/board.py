@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from femubench.core.errors import InputError
-from femubench.core.publish.agreement import Finding, findings_of, machine_of
+from femubench.core.publish.agreement import Outcome, findings_of, machine_of
 from femubench.core.publish.news import news_of
-from femubench.core.publish.places import Ground, board_on, errors_of, on_case, skill_on
+from femubench.core.publish.places import Scope, board_on, errors_of, on_case, skill_on
 from femubench.core.publish.submissions import Submission, slug
 from femubench.core.schema.results import BLOCKS
 from femubench.core.score.repeatability import unsteady
@@ -52,7 +52,7 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
     }
     findings = findings_of(submissions, references)
     current = {name: case["digest"] for item in submissions for name, case in _cases(item).items()}
-    groups: dict[_Version, list[Finding]] = {}
+    groups: dict[_Version, list[Outcome]] = {}
     for one in findings:
         provenance = one.result.provenance
         number, own = str(provenance["strategy"]), str(provenance["femubench"])
@@ -66,7 +66,7 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
     latest = {version.strategy: version for version in versions}  # the last one stays
     ranked = _ranked(latest.values(), versions, current)
     told = _told(submissions, "structures"), _told(submissions, "classes")
-    ground = Ground(ranked, current, references, *told)
+    ground = Scope(ranked, current, references, *told)
     runs = [
         {
             "file": f"data/{item.name}",
@@ -107,7 +107,7 @@ def _cases(item: Submission) -> dict[str, dict[str, Any]]:
 
 def _ranked(
     latest: Iterable[_Version],
-    versions: Mapping[_Version, Sequence[Finding]],
+    versions: Mapping[_Version, Sequence[Outcome]],
     current: Mapping[str, str],
 ) -> tuple[str, ...]:
     """Return the cases that more than half of the strategies have: the ranking is on them.
@@ -123,9 +123,9 @@ def _ranked(
     return tuple(sorted(case for case, count in counts.items() if 2 * count > len(listed)))
 
 
-def _described(version: _Version, findings: Sequence[Finding], ground: Ground) -> dict[str, Any]:
+def _described(version: _Version, findings: Sequence[Outcome], ground: Scope) -> dict[str, Any]:
     """Return a version with its results on every case and what they come to."""
-    groups: dict[tuple[str, str], list[Finding]] = {}
+    groups: dict[tuple[str, str], list[Outcome]] = {}
     for item in findings:
         job = item.result.case, str(item.result.provenance["case"])
         groups.setdefault(job, []).append(item)
@@ -156,7 +156,7 @@ def _described(version: _Version, findings: Sequence[Finding], ground: Ground) -
     }
 
 
-def _marks(strategy: str, findings: Iterable[Finding]) -> list[str]:
+def _marks(strategy: str, findings: Iterable[Outcome]) -> list[str]:
     """Return what a reader has to know of a version: who vouches for it, and what is odd."""
     listed = list(findings)
     runs = {run.name: run for item in listed for run in item.runs}.values()
@@ -208,7 +208,7 @@ def _strategy_entries(
     ]
 
 
-def _case_entries(submissions: Iterable[Submission], ground: Ground) -> list[dict[str, Any]]:
+def _case_entries(submissions: Iterable[Submission], ground: Scope) -> list[dict[str, Any]]:
     titles: dict[str, str] = {}
     digests: dict[str, dict[str, None]] = {}
     for item in submissions:
@@ -230,7 +230,7 @@ def _case_entries(submissions: Iterable[Submission], ground: Ground) -> list[dic
     ]
 
 
-def _conflict(item: Finding) -> dict[str, Any]:
+def _conflict(item: Outcome) -> dict[str, Any]:
     result = item.result
     return {
         "case": result.case,

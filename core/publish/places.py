@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from femubench.core.publish.agreement import Finding, References
+from femubench.core.publish.agreement import Outcome, References
 from femubench.core.schema.results import BLOCKS, DONE, JobResult
 from femubench.core.score.counting import block_shares
 from femubench.core.score.ranking import geometric_mean, ranked as in_order, score_of
@@ -21,7 +21,7 @@ _FEWEST_OF_CLASS = 2  # structures; a class of one is its case
 
 
 @dataclass(frozen=True)
-class Ground:
+class Scope:
     """What a ranking is on.
 
     Arguments:
@@ -59,7 +59,7 @@ class Ground:
             found.setdefault(self.structures.get(case, case), []).append(case)
         return found
 
-    def classes(self) -> Iterator[tuple[str, Ground]]:
+    def classes(self) -> Iterator[tuple[str, Scope]]:
         """Yield all, without a name, and every class that some structures have and others not."""
         yield "", self
         for kind in sorted({kind for case in self.cases for kind in self.kinds.get(case, ())}):
@@ -68,7 +68,7 @@ class Ground:
                 yield kind, replace(self, cases=cases)
 
 
-def board_on(ground: Ground, entrants: Mapping[str, Sequence[Finding]]) -> dict[str, Any]:
+def board_on(ground: Scope, entrants: Mapping[str, Sequence[Outcome]]) -> dict[str, Any]:
     """Return the strategies on the cases of a ranking, best first, and how sure the best one is.
 
     Those that lack a case have no rank.
@@ -78,7 +78,7 @@ def board_on(ground: Ground, entrants: Mapping[str, Sequence[Finding]]) -> dict[
     """
     rows = {}
     for name, findings in entrants.items():
-        groups: dict[str, list[Finding]] = {}
+        groups: dict[str, list[Outcome]] = {}
         for item in findings:
             case = item.result.case, str(item.result.provenance["case"])
             if ground.counts(case):
@@ -120,7 +120,7 @@ def board_on(ground: Ground, entrants: Mapping[str, Sequence[Finding]]) -> dict[
     }
 
 
-def logs_of(ground: Ground, counted: Iterable[Mapping[str, Any]]) -> dict[str, float]:
+def logs_of(ground: Scope, counted: Iterable[Mapping[str, Any]]) -> dict[str, float]:
     """Return the logarithm of what is left of the error, by structure.
 
     Arguments:
@@ -135,7 +135,7 @@ def logs_of(ground: Ground, counted: Iterable[Mapping[str, Any]]) -> dict[str, f
     return found
 
 
-def skill_on(ground: Ground, counted: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def skill_on(ground: Scope, counted: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return what results on cases come to: skill with its interval, errors, failures.
 
     Arguments:
@@ -161,7 +161,7 @@ def skill_on(ground: Ground, counted: Sequence[Mapping[str, Any]]) -> dict[str, 
 
 
 def on_case(
-    findings: Sequence[Finding], reference: Mapping[str, float], shares: Mapping[str, float] | None
+    findings: Sequence[Outcome], reference: Mapping[str, float], shares: Mapping[str, float] | None
 ) -> dict[str, Any]:
     """Return the result on one case: of the data as recorded, or the median over noise draws."""
     recorded = [item for item in findings if item.result.seed == 0]

@@ -18,7 +18,7 @@ from femubench.core.plugin.distribution import DOI, HOMEPAGE, LONGEST_LINE
 from femubench.core.schema.bounds import Name
 from femubench.core.schema.records import (
     LARGEST_RUN,
-    Record,
+    BaseRecord,
     parse_json,
     result_to_json,
     run_from_json,
@@ -40,7 +40,7 @@ _OF_VERIFIED = ("plan", "sandbox", "twins")  # meta data of those alone
 
 
 class _Record(BaseModel):
-    model_config = Record.model_config
+    model_config = BaseRecord.model_config
 
 
 class _Machine(_Record):

@@ -22,7 +22,7 @@ _JUDGED = ("model", "samples", "discrepancy_std")  # of an outcome, and no part 
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Dossier:
     """What it takes to judge an answer.
 
     Arguments:
@@ -45,7 +45,7 @@ def run_strategy(job: Job) -> bytes:
     return packed(*performed(job))
 
 
-def run_judge(verdict: Verdict, case: Case, reference: Reference) -> bytes:
+def run_judge(verdict: Dossier, case: Case, reference: Reference) -> bytes:
     """Return the result of a job and its exhibit as JSON; runs in a judge's process."""
     try:
         outcome = unpacked(verdict.answer, case.model)

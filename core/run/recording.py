@@ -25,7 +25,7 @@ OVERWRITE: tuple[Overwrite, ...] = ("always", "missing", "failed")
 
 
 @dataclass(frozen=True)
-class Known:
+class StoredResults:
     """Records of results that are in the store, by the key of their job.
 
     Arguments:
@@ -94,7 +94,7 @@ class Results:
             self._store.exhibits.put(slot.key, exhibit)
 
     @uncollected()
-    def keep(self, known: Known, workers: int) -> list[int]:
+    def keep(self, known: StoredResults, workers: int) -> list[int]:
         """Take the results that the store has, which lets go of them; return what is missing.
 
         That alone counts for how much is left.
@@ -138,10 +138,10 @@ def recorded(
     meta: dict[str, Any],
     overwrite: Overwrite | None,
     resume: bool,
-) -> tuple[dict[str, Any], Known]:
+) -> tuple[dict[str, Any], StoredResults]:
     """Begin a run in the store or go on with one; return its meta data and results to keep."""
     if store is None:
-        return meta, Known()
+        return meta, StoredResults()
     keep = overwrite or ("failed" if resume else "always")
     before = store.latest_of_plan(meta["plan"]) if resume else None
     if before is not None:
@@ -150,14 +150,14 @@ def recorded(
     if before is None:
         store.begin(meta)
     if keep == "always":
-        return meta, Known()
+        return meta, StoredResults()
     own = store.latest(meta["run"])
     found = store.latest(but=meta["run"])
     # A failure is no later result.
     found |= {key: r for key, r in own.items() if r.status in DONE or key not in found}
     if keep == "failed":
         found = {key: record for key, record in found.items() if record.status in DONE}
-    return meta, Known(found, own)
+    return meta, StoredResults(found, own)
 
 
 @contextmanager

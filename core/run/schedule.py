@@ -15,7 +15,7 @@ from typing import Any
 from femubench.core.errors import InputError
 from femubench.core.run.answers import AnswerError, head_of
 from femubench.core.run.jobs import JobOutcome
-from femubench.core.run.judging import Verdict, judged, run_strategy
+from femubench.core.run.judging import Dossier, judged, run_strategy
 from femubench.core.run.limits import Limits
 from femubench.core.run.slots import Slot, Start, first_seed
 from femubench.core.run.standing_judge import Judges
@@ -112,7 +112,7 @@ class _Bench:
             shown = self._show is not None and slot.seed == self._shown and not slot.varied
             names = slot.strategy, slot.seed, slot.nominal
             digest, case = self._case(slot.start)
-            verdict = Verdict(case, answer, *names, exhibited=shown)
+            verdict = Dossier(case, answer, *names, exhibited=shown)
             limits = self._limits[slot.strategy]
             seconds = None if limits.seconds is None else max(_LEAST_JUDGING, limits.seconds)
             ending = judges.start(

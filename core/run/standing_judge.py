@@ -20,7 +20,7 @@ from dataclasses import dataclass, field, replace
 from multiprocessing import connection, get_context
 from typing import Any, Generic
 
-from femubench.core.run.judging import Verdict, run_judge
+from femubench.core.run.judging import Dossier, run_judge
 from femubench.core.run.limits import MIB, Limits
 from femubench.core.run.worker import LENGTH_BYTES, address_space, stand_alone, write_all
 from femubench.core.run.workers import Ending, Key, Task, end_group, forked, parts_of, progress_of
@@ -40,14 +40,14 @@ class _Request:
     """What a judge is asked, all of it written by this program; the answer follows as it came.
 
     Arguments:
-        case: digest of the case; `Verdict.case` is empty where the judge has it already.
+        case: digest of the case; `Dossier.case` is empty where the judge has it already.
         forget: digests of cases that are sent anew should they come up again.
         memory: bytes that judging may take; None for no limit.
     """
 
     case: bytes
     forget: tuple[bytes, ...]
-    verdict: Verdict
+    verdict: Dossier
     memory: int | None
 
 
@@ -113,7 +113,7 @@ class _Judge:
     output: connection.Connection
     held: OrderedDict[bytes, int] = field(default_factory=OrderedDict)
 
-    def ask(self, case: bytes, verdict: Verdict, memory: int | None) -> None:
+    def ask(self, case: bytes, verdict: Dossier, memory: int | None) -> None:
         """Send an answer to be judged, the case too where it is not there yet."""
         answer, verdict = verdict.answer, replace(verdict, answer=b"")
         if case in self.held:
@@ -191,7 +191,7 @@ class Judges(Generic[Key]):
         """Return what there is to wait for."""
         return [part for task, _ in self._at_work for part in parts_of(task)]
 
-    def start(self, key: Key, case: bytes, verdict: Verdict, limits: Limits) -> Ending | None:
+    def start(self, key: Key, case: bytes, verdict: Dossier, limits: Limits) -> Ending | None:
         """Have an answer judged; return how it ended where no process could be started.
 
         Arguments:

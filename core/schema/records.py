@@ -48,14 +48,14 @@ _MOST_NAMES, _MOST_JOBS = 1_000, 1_000_000
 _DEEPEST = 32
 
 
-class Record(BaseModel):
+class BaseRecord(BaseModel):
     """Base of all records."""
 
     # What a later version adds is left out; what it must have is checked.
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
 
 
-class _ModeRecord(Record):
+class _ModeRecord(BaseRecord):
     mode: Whole = 0
     measured_hz: Hertz
     predicted_hz: PredictedHertz | None
@@ -67,7 +67,7 @@ class _ModeRecord(Record):
 _MODE = tuple(_ModeRecord.model_fields)
 
 
-class _BlockRecord(Record):
+class _BlockRecord(BaseRecord):
     rms_percent: Percent
     mean_mac: Mac | None = None
     modes: list[_ModeRecord]
@@ -78,7 +78,7 @@ class _BlockRecord(Record):
         return Block(self.rms_percent, self.mean_mac, tuple(modes))
 
 
-class ResultRecord(Record):
+class ResultRecord(BaseRecord):
     """One result."""
 
     case: Name
@@ -108,7 +108,7 @@ class ResultRecord(Record):
     provenance: dict[Name, Text | int | float | None] = {}
 
 
-class RunRecord(Record):
+class RunRecord(BaseRecord):
     """What ``bench run --json`` writes; results are checked one by one."""
 
     meta: dict[str, Any]
@@ -116,7 +116,7 @@ class RunRecord(Record):
     beside: Annotated[list[Any], Field(max_length=MOST_RESULTS)] = []
 
 
-class _CaseMeta(Record):
+class _CaseMeta(BaseRecord):
     title: Text | None = None
 
 

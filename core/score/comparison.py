@@ -12,7 +12,7 @@ from femubench.core.schema.results import BLOCKS, DONE, NOMINALS, JobResult, Nom
 from femubench.core.score.counting import block_shares, counted_blocks
 from femubench.core.score.ranking import OFFSET_PERCENT, geometric_mean, score_of
 from femubench.core.score.repeatability import environment_differences
-from femubench.core.score.statistics import Evidence, ScoreTable, evidence_of, structures_of
+from femubench.core.score.statistics import ScoreTable, Significance, evidence_of, structures_of
 
 Metric = Literal["unseen", "used", "higher", "modified", "seconds", "failures"]
 METRICS: tuple[Metric, ...] = get_args(Metric)
@@ -38,7 +38,7 @@ DEFAULT_THRESHOLDS = (Threshold("unseen", 1.01), Threshold("failures", 0.0))
 
 
 @dataclass(frozen=True)
-class Job:
+class NamedJob:
     """A job by its names."""
 
     strategy: str
@@ -47,7 +47,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Change(Job):
+class StatusChange(NamedJob):
     """A job that ended otherwise in B.
 
     Arguments:
@@ -64,7 +64,7 @@ class Change(Job):
 
 
 @dataclass(frozen=True)
-class Row:
+class RatioRow:
     """Ratios B / A of one strategy in one scenario; less than 1 is better in B.
 
     Arguments:
@@ -121,12 +121,12 @@ class Comparison:
     after: str
     against: tuple[Against, ...]
     jobs: int
-    changes: tuple[Change, ...]
-    rows: tuple[Row, ...]
-    evidence: tuple[Evidence, ...]
-    only_before: tuple[Job, ...]
-    only_after: tuple[Job, ...]
-    other_cases: tuple[Job, ...]
+    changes: tuple[StatusChange, ...]
+    rows: tuple[RatioRow, ...]
+    evidence: tuple[Significance, ...]
+    only_before: tuple[NamedJob, ...]
+    only_after: tuple[NamedJob, ...]
+    other_cases: tuple[NamedJob, ...]
     environment: tuple[str, ...]
     notes: tuple[str, ...]
     thresholds: tuple[Threshold, ...]
@@ -147,7 +147,7 @@ _ROUNDING = 1e-9  # relative; two machines may differ by it
 
 
 @dataclass(frozen=True)
-class _Pair:
+class _JobPair:
     """One job in both runs; the errors of the nominal model and its shares stand for both."""
 
     strategy: str
@@ -231,7 +231,7 @@ def compare_runs(
     structures = {**structures_of(after), **structures_of(before)}
     shares = block_shares(references, structures)
     pairs = [
-        _Pair(j.strategy, old[j], new[j], references.get(j.case) or {}, shares.get(j.case))
+        _JobPair(j.strategy, old[j], new[j], references.get(j.case) or {}, shares.get(j.case))
         for j in shared
     ]
     rows = tuple(_rows(pairs))
@@ -286,10 +286,10 @@ def _common_start(before: Run, after: Run) -> Nominal:
     raise InputError(f"the two runs start from {starts}", expected="one nominal model in both")
 
 
-def _by_job(results: Iterable[JobResult], names: Mapping[str, str]) -> dict[Job, JobResult]:
+def _by_job(results: Iterable[JobResult], names: Mapping[str, str]) -> dict[NamedJob, JobResult]:
     """Return the results by job, under the strategy's name in B where A has another."""
     chosen = (r for r in results if r.strategy in names)
-    return {Job(names[r.strategy], r.case, r.seed): r for r in chosen}
+    return {NamedJob(names[r.strategy], r.case, r.seed): r for r in chosen}
 
 
 def _strategies(run: Run) -> list[str]:
@@ -335,7 +335,7 @@ def _state(result: JobResult) -> str:
     return "unphysical" if result.unphysical else result.status
 
 
-def _changes(pairs: Iterable[_Pair]) -> tuple[Change, ...]:
+def _changes(pairs: Iterable[_JobPair]) -> tuple[StatusChange, ...]:
     found = []
     for pair in pairs:
         before, after = _state(pair.before), _state(pair.after)
@@ -347,7 +347,7 @@ def _changes(pairs: Iterable[_Pair]) -> tuple[Change, ...]:
         result = pair.before if kind == "gained" else pair.after
         reason = result.reason or ("" if not result.unphysical else _damage(result))
         job = pair.strategy, result.case, result.seed
-        found.append(Change(*job, kind, before, after, reason))
+        found.append(StatusChange(*job, kind, before, after, reason))
     return tuple(sorted(found, key=lambda change: get_args(Kind).index(change.kind)))
 
 
@@ -360,8 +360,8 @@ def _damage(result: JobResult) -> str:
     return ", ".join(f"{number} {what}" for what, number in counts.items() if number)
 
 
-def _rows(pairs: Iterable[_Pair]) -> Iterable[Row]:
-    groups: dict[str, dict[str | None, list[_Pair]]] = {}
+def _rows(pairs: Iterable[_JobPair]) -> Iterable[RatioRow]:
+    groups: dict[str, dict[str | None, list[_JobPair]]] = {}
     for pair in pairs:
         group = groups.setdefault(pair.strategy, {None: []})
         group[None].append(pair)
@@ -381,4 +381,4 @@ def _rows(pairs: Iterable[_Pair]) -> Iterable[Row]:
             ratio = sum(pair.after.seconds for pair in timed) / total if total > 0.0 else math.inf
             values["seconds"] = ratio if math.isfinite(ratio) else None
             values["failures"] = float(sum(change.kind == "lost" for change in _changes(listed)))
-            yield Row(strategy, scenario, len(listed), values)
+            yield RatioRow(strategy, scenario, len(listed), values)

@@ -151,7 +151,7 @@ def leaderboard(run: Run, floor_percent: float = OFFSET_PERCENT) -> pd.DataFrame
     """
     import pandas as pd
 
-    table = _Table.of(run, floor_percent)
+    table = _RankTable.of(run, floor_percent)
     scored = run.ranked
     if any(block == WHOLE for _, block in table.grid.weights):
         reference = run.meta.get("reference") or None
@@ -172,7 +172,7 @@ def row_of(run: Run, strategy: str) -> dict[str, Any]:
         strategy: its name.
     """
     found = [result for result in run.ranked if result.strategy == strategy]
-    return _row(strategy, found, _Table.of(run, OFFSET_PERCENT))
+    return _row(strategy, found, _RankTable.of(run, OFFSET_PERCENT))
 
 
 def ranks_by_floor(run: Run) -> dict[str, tuple[int, ...]]:
@@ -214,7 +214,7 @@ def is_test(classes: Sequence[str] | None) -> bool:
 
 
 @dataclass(frozen=True)
-class _Table:
+class _RankTable:
     """What the rows of a leaderboard are made from.
 
     Arguments:
@@ -233,7 +233,7 @@ class _Table:
     floor_percent: float
 
     @classmethod
-    def of(cls, run: Run, floor_percent: float) -> _Table:
+    def of(cls, run: Run, floor_percent: float) -> _RankTable:
         grid = _Grid.of(run)
         classes = run.meta.get("classes") or {}
         tests = [case for case in grid.cases if is_test(classes.get(case))]
@@ -255,7 +255,7 @@ def _order(row: dict[str, Any]) -> tuple[tuple[bool, bool], float, str]:
     return (nothing, row["unphysical"]), 1.0 - row["skill"], row["strategy"]
 
 
-def _row(strategy: str, results: Sequence[JobResult], table: _Table) -> dict[str, Any]:
+def _row(strategy: str, results: Sequence[JobResult], table: _RankTable) -> dict[str, Any]:
     grid = table.grid
     logs = grid.logs(results, table.floor_percent)
     left = np.exp(logs.mean(axis=0))

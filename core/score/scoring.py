@@ -34,7 +34,7 @@ from femubench.core.score.ranking import TIE, rank_results, score_of
 from femubench.core.typing import FloatArray, IntArray
 
 __all__ = [
-    "Judgement",
+    "JudgedModel",
     "Reference",
     "frequency_error",
     "given_errors",
@@ -74,7 +74,7 @@ class Reference:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class JudgedModel:
     """A model judged against a case.
 
     Arguments:
@@ -230,7 +230,7 @@ def given_errors(case: Case, reference: Mapping[str, float]) -> dict[str, float]
 
 def judge(
     case: Case, model: Model, reference: Reference, spread: Spread | None = None
-) -> Judgement:
+) -> JudgedModel:
     """Return errors, rigid-body modes kept, negative eigenvalues and surplus partners of a model.
 
     A rigid-body mode is kept where |lambda| <= 1e-6 times the first elastic eigenvalue of the
@@ -260,7 +260,7 @@ def judge(
         basis = still @ (turn[:, keep] / np.sqrt(values[keep]))
         cosines = la.svdvals(rigid.T @ (mass @ basis))
         kept = int(np.count_nonzero(np.square(cosines) > _SAME_MOTION))
-    return Judgement(blocks, kept, negative, surplus.count, surplus.reason)
+    return JudgedModel(blocks, kept, negative, surplus.count, surplus.reason)
 
 
 def _modes_for(model: Model, measurements: Sequence[Measurement]) -> Modes:

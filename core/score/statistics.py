@@ -48,7 +48,7 @@ _MOST_GROUPS = 26  # more overlapping groups than letters say nothing to a reade
 
 
 @dataclass(frozen=True)
-class Evidence:
+class Significance:
     """What the structures of one comparison say.
 
     Arguments:
@@ -236,7 +236,7 @@ def interval_tail(count: int) -> float:
     return float(ndtr(math.sqrt(count / (count - 1)) * stdtrit(count - 1, 0.025)))
 
 
-def evidence_of(ratios: Mapping[str, Sequence[float] | FloatArray]) -> tuple[Evidence, ...]:
+def evidence_of(ratios: Mapping[str, Sequence[float] | FloatArray]) -> tuple[Significance, ...]:
     """Return what every comparison says, with Holm's correction over those that can be tested.
 
     Arguments:
@@ -256,7 +256,7 @@ def evidence_of(ratios: Mapping[str, Sequence[float] | FloatArray]) -> tuple[Evi
                 verdict = "worse" if _signed_rank(differing)[1] else "better"
         if p is not None or (verdict == "same" and len(values) >= FEWEST):
             low, high = interval_over_structures(values)
-        found.append(Evidence(name, len(values), len(differing), ratio, low, high, p, verdict))
+        found.append(Significance(name, len(values), len(differing), ratio, low, high, p, verdict))
     return tuple(found)
 
 

@@ -21,7 +21,7 @@ _Number = Annotated[int, Field(ge=0)]
 
 
 @dataclass(frozen=True)
-class Setting:
+class CaseConditions:
     """A case under conditions.
 
     Arguments:
@@ -36,7 +36,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Choice:
+class OptionSet:
     """A strategy with options.
 
     Arguments:
@@ -60,8 +60,8 @@ class StudyAxes:
         nominals: the models that strategies start from.
     """
 
-    cases: Mapping[Name, Setting]
-    strategies: Mapping[Name, Choice]
+    cases: Mapping[Name, CaseConditions]
+    strategies: Mapping[Name, OptionSet]
     title: Name = ""
     heat_map: tuple[Name, Name] | None = None
     nominals: tuple[Nominal, ...] = NOMINALS[1:]
@@ -77,8 +77,8 @@ class StudyAxes:
         cases = [*(run.meta.get("cases") or ()), *(result.case for result in run.results)]
         names = [*run.meta.get("strategies", ()), *(result.strategy for result in run.results)]
         return cls(
-            {name: found.cases.get(name, Setting(name)) for name in dict.fromkeys(cases)},
-            {name: found.strategies.get(name, Choice(name)) for name in dict.fromkeys(names)},
+            {name: found.cases.get(name, CaseConditions(name)) for name in dict.fromkeys(cases)},
+            {name: found.strategies.get(name, OptionSet(name)) for name in dict.fromkeys(names)},
             found.title,
             found.heat_map,
             run.nominals,

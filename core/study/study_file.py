@@ -11,8 +11,8 @@ from typing import Annotated, TypeVar
 
 from pydantic import AfterValidator, Field, PlainValidator
 
-from femubench.core.case.faults import Fault, dotted
-from femubench.core.case.schema import Many, Table, Text, misfit
+from femubench.core.case.faults import BadKey, dotted
+from femubench.core.case.schema import Many, Text, TomlTable, misfit
 from femubench.core.case.toml_text import key_line, located, spec_of
 from femubench.core.errors import InputError
 from femubench.core.files import MIB, read_text
@@ -63,7 +63,7 @@ _Seeds = Annotated[int | tuple[int, ...], PlainValidator(_seeds)]
 _Values = Annotated[tuple[Value, ...], PlainValidator(_values)]
 
 
-class StudyKeys(Table):
+class StudyKeys(TomlTable):
     """`[study]`."""
 
     title: Text = Field("", description="a text on one line")
@@ -72,7 +72,7 @@ class StudyKeys(Table):
     )
 
 
-class AxesKeys(Table):
+class AxesKeys(TomlTable):
     """`[axes]`."""
 
     cases: _Words = Field(description='names of cases or folders, ["NAME", "./FOLDER"]')
@@ -86,21 +86,21 @@ class AxesKeys(Table):
     )
 
 
-class StrategyKeys(Table):
+class StrategyKeys(TomlTable):
     """`[[strategies]]`."""
 
     name: _Word = Field(description="the name of a strategy")
     options: dict[str, _Values] = Field({}, description=_VALUES)
 
 
-class HeatMapKeys(Table):
+class HeatMapKeys(TomlTable):
     """`[heat_map]`."""
 
     x: _Word = Field(description=_AXIS)
     y: _Word = Field(description=_AXIS)
 
 
-class StudyTables(Table):
+class StudyTables(TomlTable):
     """The whole of a study file."""
 
     study: StudyKeys | None = Field(None, description="a table")
@@ -180,8 +180,8 @@ def read_study(file: str | PathLike[str]) -> StudyFile:
         if axes.noise != (1.0,) and 0 in found.seeds:
             where = ("axes", "noise") if axes.seeds is None else ("axes", "seeds")
             what = "noise is a factor on what is drawn, and seed 0 draws none"
-            raise Fault(where, what, "seeds = N, or a list of seeds >= 1")
-    except Fault as fault:
+            raise BadKey(where, what, "seeds = N, or a list of seeds >= 1")
+    except BadKey as fault:
         raise located(fault, text, path) from None
     return found
 

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from femubench.core.errors import ModelError, NotApplicable, SelfCheckFailed, StrategyFailure
 from femubench.core.fem.model import Model
-from femubench.core.modal.factorisation import LU, Cholesky, Factor, cholmod_obstacle
+from femubench.core.modal.factorisation import LU, Cholesky, Symmetric, cholmod_obstacle
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import AnyArray, FloatArray, IntArray, SparseArray
 from femubench.core.update.promise import (
@@ -248,7 +248,7 @@ class _Dual:
     fitted: SparseArray
     exact: AnyArray
     damping: float
-    factor: Factor
+    factor: Symmetric
 
     @classmethod
     def of(cls, equations: Equations) -> _Dual:
@@ -277,7 +277,7 @@ class _Dual:
         return found
 
 
-def _factor(normal: SparseArray) -> Factor:
+def _factor(normal: SparseArray) -> Symmetric:
     """Factorise a matrix that is positive definite but for rounding."""
     if cholmod_obstacle() is None:
         cholesky = Cholesky(normal)

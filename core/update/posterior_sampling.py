@@ -28,10 +28,10 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.neighbour_modes import followed_frequencies
 from femubench.core.typing import BoolArray, FloatArray
 from femubench.core.update.quadratic_fit import QuadraticFit, coefficients_of
-from femubench.core.update.residuals import Data
+from femubench.core.update.residuals import Targets
 from femubench.core.update.sensitivity_update import (
+    Iterate,
     Iteration,
-    Point,
     UpdateOptions,
     estimate_parameters,
 )
@@ -63,7 +63,7 @@ class Target:
     """
 
     iteration: Iteration
-    point: Point
+    point: Iterate
     measurement: Measurement
     discrepancy: Discrepancy
 
@@ -288,7 +288,7 @@ def most_probable(
     if len(parametric) > MANY:
         count = f"{len(parametric)} parameters"
         raise NotApplicable(f"{count}, and their covariance fills a dense matrix beyond {MANY}")
-    data = Data(whole, options.residual, True, options.shapes, True)
+    data = Targets(whole, options.residual, True, options.shapes, True)
     iteration = Iteration(parametric, data, options)
     point = iteration.run()
     covariance = iteration.covariance(point)

@@ -26,7 +26,7 @@ _SAME_MODE = 0.75
 
 
 @dataclass(frozen=True)
-class Data:
+class Targets:
     """What is fitted, and how it is weighted.
 
     Arguments:
@@ -116,7 +116,7 @@ class Prediction:
         mass: in kg.
     """
 
-    data: Data
+    data: Targets
     model: Model
     modes: Modes
     partner: IntArray
@@ -189,7 +189,7 @@ class Prediction:
 
 
 def predict(
-    data: Data, model: Model, previous: Prediction | None = None, *, mass: float | None = None
+    data: Targets, model: Model, previous: Prediction | None = None, *, mass: float | None = None
 ) -> Prediction:
     """Return the prediction of a model, its modes paired with the measured ones.
 

@@ -17,7 +17,7 @@ from femubench.core.fit.dual_least_squares import MANY, DualPosterior
 from femubench.core.fit.gauss_newton import Linearised
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import BoolArray, FloatArray
-from femubench.core.update.residuals import Data, Prediction, Residual, common_rows, predict
+from femubench.core.update.residuals import Prediction, Residual, Targets, common_rows, predict
 from femubench.core.update.strategy import ParameterEstimate, UpdateResult
 from femubench.core.update.uncertainty import Uncertainty, standard_normal
 
@@ -64,7 +64,7 @@ class UpdateOptions:
 
 
 @dataclass(frozen=True)
-class Point:
+class Iterate:
     """Coordinates q, (p,), and what the model predicts there."""
 
     q: FloatArray
@@ -79,7 +79,7 @@ class Point:
 class Iteration:
     """State of one update."""
 
-    def __init__(self, parametric: ParametricModel, data: Data, options: UpdateOptions) -> None:
+    def __init__(self, parametric: ParametricModel, data: Targets, options: UpdateOptions) -> None:
         self.parametric, self.data, self.options = parametric, data, options
         self.history: list[Mapping[str, float]] = []
         self.beta = 0.0
@@ -89,13 +89,13 @@ class Iteration:
         """Return the model at coordinates, (p,), taken within their limits."""
         return self.parametric.at(np.clip(q, self.parametric.lower, self.parametric.upper))
 
-    def at(self, q: FloatArray, previous: Prediction | None = None) -> Point:
+    def at(self, q: FloatArray, previous: Prediction | None = None) -> Iterate:
         """Return the prediction at coordinates, its pairs continued from a previous one."""
         model = self.parametric.at(q)
         mass = self.parametric.mass(q, model)
-        return Point(q, predict(self.data, model, previous, mass=mass))
+        return Iterate(q, predict(self.data, model, previous, mass=mass))
 
-    def linearised(self, point: Point) -> Linearised:
+    def linearised(self, point: Iterate) -> Linearised:
         """Return the least-squares problem about a point, of the data that have a partner."""
         parametric, prediction = self.parametric, point.prediction
         known = np.isfinite(prediction.residual)
@@ -104,7 +104,7 @@ class Iteration:
         s = (prediction.jacobian(slopes, masses) * parametric.steps(point.q))[known]
         return Linearised(s, prediction.residual[known], point.q, parametric.precision)
 
-    def gain(self, before: Point, after: Point) -> float:
+    def gain(self, before: Iterate, after: Iterate) -> float:
         """Return the share of the cost that a step took away."""
         rows, precision = (
             common_rows(before.prediction, after.prediction),
@@ -118,7 +118,7 @@ class Iteration:
         blur = _ROUNDING * float(np.linalg.norm(self.data.weight * self.data.target))
         return blur * (2.0 * float(np.sqrt(cost)) + blur)
 
-    def advance(self, point: Point, step: FloatArray) -> Point | None:
+    def advance(self, point: Iterate, step: FloatArray) -> Iterate | None:
         """Return the next point, the step halved until the cost does not grow; None for none.
 
         Costs that differ by no more than rounding are equal, so that the last steps towards an
@@ -139,7 +139,7 @@ class Iteration:
                 return trial
         return None
 
-    def run(self) -> Point:
+    def run(self) -> Iterate:
         """Return the optimum; raises StrategyFailure or Diverged where there is none."""
         parametric = self.parametric
         assert parametric.start is not None  # raises where changes do not go together
@@ -168,7 +168,7 @@ class Iteration:
         self.check(point)
         return point
 
-    def record(self, iteration: int, point: Point, step: float) -> None:
+    def record(self, iteration: int, point: Iterate, step: float) -> None:
         """Add a step to the history."""
         rows = np.isfinite(point.prediction.residual)
         entry = {
@@ -182,7 +182,7 @@ class Iteration:
             entry.update((name, float(value)) for name, value in pairs)
         self.history.append(entry)
 
-    def check(self, point: Point) -> None:
+    def check(self, point: Iterate) -> None:
         """Raise Diverged where a parameter ended at the limit of its sense."""
         at_limit = (point.q <= self.parametric.lower) | (point.q >= self.parametric.upper)
         for p, out in zip(self.parametric.parameters, at_limit, strict=True):
@@ -192,7 +192,7 @@ class Iteration:
                     f" at iteration {len(self.history) - 1}"
                 )
 
-    def covariance(self, point: Point) -> FloatArray | None:
+    def covariance(self, point: Iterate) -> FloatArray | None:
         """Return the posterior covariance of q, (p, p); None without statistics."""
         if not self.data.statistical:
             return None
@@ -202,7 +202,7 @@ class Iteration:
         except np.linalg.LinAlgError:
             return np.full(normal.shape, np.inf)
 
-    def known(self, point: Point) -> tuple[FloatArray | None, Uncertainty | None]:
+    def known(self, point: Iterate) -> tuple[FloatArray | None, Uncertainty | None]:
         """Return the deviations of q, (p,), and models of the posterior, where there are any."""
         if len(point.q) > MANY:
             return self.known_of_many(point)
@@ -218,7 +218,7 @@ class Iteration:
         except StrategyFailure:  # rounding made it no covariance; the model is none the worse
             return std, None
 
-    def known_of_many(self, point: Point) -> tuple[FloatArray | None, Uncertainty | None]:
+    def known_of_many(self, point: Iterate) -> tuple[FloatArray | None, Uncertainty | None]:
         """Return the same without a matrix of the size of the parameters."""
         precision = self.parametric.precision
         if not self.data.statistical or not (precision > 0.0).all():
@@ -289,7 +289,7 @@ def sensitivity_update(
         raise NotApplicable("there is no parameter to update")
     options = UpdateOptions() if options is None else options
     statistical = options.weighting == "statistical"
-    data = Data(measurement, options.residual, statistical, options.shapes, statistical)
+    data = Targets(measurement, options.residual, statistical, options.shapes, statistical)
     model = Model.of(source) if isinstance(source, Structure) else source
     iteration = Iteration(ParametricModel(model, tuple(changes)), data, options)
     point = iteration.run()

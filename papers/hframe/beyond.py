@@ -10,12 +10,12 @@ import numpy as np
 from femubench.fem import FloatArray
 from femubench.papers.hframe.meshes import frequencies
 from femubench.papers.hframe.physical import (
-    Physical,
+    TimoshenkoFit,
     in_plane,
     physical_model,
     shape_paired_errors,
 )
-from femubench.papers.hframe.rows import FREE_EI, ROWS, Row, at_printed, parameter_values, run
+from femubench.papers.hframe.rows import FREE_EI, ROWS, Update, at_printed, parameter_values, run
 from femubench.papers.hframe.updates import USED, follows, misprinted, unit_of
 from femubench.papers.printed import printed
 from femubench.reproduction import Bars, Extra, Workbench
@@ -27,7 +27,7 @@ _LONG, _EVERY = 16, 10  # tables of iterations
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ModelComparison:
     """Models beside each other on all in-plane modes that were measured.
 
     Arguments:
@@ -42,10 +42,10 @@ class Comparison:
     errors: Mapping[str, FloatArray]
     probability: float
     causes: tuple[str, ...]
-    physical: Physical
+    physical: TimoshenkoFit
 
 
-def compare(bench: Workbench) -> Comparison:
+def compare(bench: Workbench) -> ModelComparison:
     """Return every row of table 4 beside the model as built and the physical ones."""
     case = bench.cases["hframe"]
     diagnosed, physical = run(bench, DIAGNOSED), physical_model(case)
@@ -56,7 +56,7 @@ def compare(bench: Workbench) -> Comparison:
     found["d, EI free"] = f"as the text of (d) has it: {FREE_EI}", run(bench, FREE_EI).model
     found["diagnosed"] = f"the most probable cause: {DIAGNOSED}", diagnosed.model
     found[PHYSICAL] = "Timoshenko, k_theta at the column's face and E fitted", physical.model
-    return Comparison(
+    return ModelComparison(
         what={name: what for name, (what, _) in found.items()},
         errors={name: shape_paired_errors(case, model) for name, (_, model) in found.items()},
         probability=diagnosed.diagnostics["probability"],
@@ -65,7 +65,7 @@ def compare(bench: Workbench) -> Comparison:
     )
 
 
-def extras(bench: Workbench, comparison: Comparison) -> tuple[Extra, ...]:
+def extras(bench: Workbench, comparison: ModelComparison) -> tuple[Extra, ...]:
     """Return the tables that the paper does not print."""
     rows = []
     for row in ROWS:
@@ -92,7 +92,7 @@ def _signed(value: float, digits: int = 2) -> str:
     return f"{value:+.{digits}f}" if np.isfinite(value) else "no partner"
 
 
-def _held_out(bench: Workbench, comparison: Comparison) -> Extra:
+def _held_out(bench: Workbench, comparison: ModelComparison) -> Extra:
     data = in_plane(bench.cases["hframe"])
     rows = []
     for name, errors in comparison.errors.items():
@@ -135,7 +135,7 @@ def _converged(bench: Workbench) -> Extra:
     )
 
 
-def _history(bench: Workbench, row: Row) -> Extra:
+def _history(bench: Workbench, row: Update) -> Extra:
     words = row.converged or row.updated.words
     history = run(bench, words).history
     names = [name for name in history[0] if name not in ("iteration", "step")]
@@ -178,7 +178,7 @@ def _misprints(bench: Workbench) -> Extra:
     )
 
 
-def held_out_bars(bench: Workbench, comparison: Comparison) -> Bars:
+def held_out_bars(bench: Workbench, comparison: ModelComparison) -> Bars:
     """Return the errors of six models on seven modes."""
     data = in_plane(bench.cases["hframe"])
     kinds = ["used"] * USED + ["held out"] * (len(data) - USED)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from femubench.papers.hframe.beyond import BUILT, PHYSICAL, Comparison
+from femubench.papers.hframe.beyond import BUILT, PHYSICAL, ModelComparison
 from femubench.papers.hframe.physical import ARM
 from femubench.papers.hframe.rows import FREE_EI, parameter_values, row_of, run
 from femubench.papers.hframe.shapes import OUT_OF_PLANE, expanded_mac, partner
@@ -44,7 +44,7 @@ def premises(bench: Workbench) -> tuple[str, ...]:
     )
 
 
-def findings(bench: Workbench, comparison: Comparison) -> tuple[str, ...]:
+def findings(bench: Workbench, comparison: ModelComparison) -> tuple[str, ...]:
     """Return what the re-run shows, with the figures of this call."""
     return (
         _held_out(comparison),
@@ -56,7 +56,7 @@ def findings(bench: Workbench, comparison: Comparison) -> tuple[str, ...]:
     )
 
 
-def _held_out(comparison: Comparison) -> str:
+def _held_out(comparison: ModelComparison) -> str:
     errors = comparison.errors
     worst = max(float(np.abs(errors[name][:USED]).max()) for name in "bde")
     pairs = "; ".join(f"{k} {errors[k][-2]:+.2f}, {errors[k][-1]:+.2f} %" for k in "bde")
@@ -68,7 +68,7 @@ def _held_out(comparison: Comparison) -> str:
     )
 
 
-def _best(comparison: Comparison) -> str:
+def _best(comparison: ModelComparison) -> str:
     best, errors = comparison.physical, comparison.errors[PHYSICAL]
     named = comparison.errors["diagnosed"]
     rms = float(np.sqrt(np.mean(errors[:USED] ** 2)))
@@ -113,7 +113,7 @@ def _ratio(bench: Workbench) -> str:
     )
 
 
-def _offset(bench: Workbench, comparison: Comparison) -> str:
+def _offset(bench: Workbench, comparison: ModelComparison) -> str:
     row = row_of("e")
     length = parameter_values(bench, row, row.updated.words)["a_H"][1]
     errors = comparison.errors

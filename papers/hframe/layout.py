@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from femubench.papers.hframe.meshes import MODES
-from femubench.papers.hframe.rows import ROWS, Row, run
+from femubench.papers.hframe.rows import ROWS, Update, run
 from femubench.papers.hframe.shapes import OUT_OF_PLANE, partner
 from femubench.papers.hframe.updates import USED
 from femubench.papers.printed import printed
@@ -31,7 +31,7 @@ def layout(bench: Workbench) -> tuple[PrintedTable, ...]:
     )
 
 
-def _update(bench: Workbench, row: Row) -> PrintedTable:
+def _update(bench: Workbench, row: Update) -> PrintedTable:
     modes = [f"mode {i}" for i in range(1, USED + 1)]
 
     def pair(mode: str, column: str) -> Entry:
@@ -49,7 +49,7 @@ def _update(bench: Workbench, row: Row) -> PrintedTable:
     return PrintedTable(row.table, row.title, (frequencies, parameters), _convergence(bench, row))
 
 
-def _convergence(bench: Workbench, row: Row) -> Chart:
+def _convergence(bench: Workbench, row: Update) -> Chart:
     """Return every parameter over its initial value, step by step, and the printed ratios."""
     words = row.converged or row.updated.words
     history = run(bench, words).history

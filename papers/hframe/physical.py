@@ -24,7 +24,7 @@ _ENDS = ("horizontal@T1", "horizontal@T2")
 
 
 @dataclass(frozen=True)
-class Physical:
+class TimoshenkoFit:
     """A Timoshenko model with two fitted numbers.
 
     Arguments:
@@ -38,7 +38,7 @@ class Physical:
     young: float
 
 
-def physical_model(case: Case) -> Physical:
+def physical_model(case: Case) -> TimoshenkoFit:
     """Return the frame with textbook shear and rotary inertia, fitted by k_theta and E.
 
     The springs sit at the column's face, behind rigid arms; all frequencies count alike.
@@ -56,7 +56,7 @@ def physical_model(case: Case) -> Physical:
     options = UpdateOptions(residual="relative-eigenvalue")
     result = sensitivity_update(sprung, changes, case.used_measurement(0), options)
     spring, young = (parameter.after for parameter in result.parameters)
-    return Physical(result.model, spring, young)
+    return TimoshenkoFit(result.model, spring, young)
 
 
 def in_plane(case: Case) -> Measurement:

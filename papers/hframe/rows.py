@@ -28,7 +28,7 @@ _AS_TOLD = Ground(
 
 
 @dataclass(frozen=True)
-class Reading:
+class Setup:
     """What a column rests on.
 
     Arguments:
@@ -52,7 +52,7 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class Row:
+class Update:
     """One of the updates (a) to (e).
 
     Arguments:
@@ -70,11 +70,11 @@ class Row:
     letter: str
     key: str
     title: str
-    updated: Reading
+    updated: Setup
     names: Mapping[str, str]
     initial_ground: Ground
     before: str = ""
-    apart: Mapping[str, Reading] = field(default_factory=dict)
+    apart: Mapping[str, Setup] = field(default_factory=dict)
     converged: str = ""
 
     @property
@@ -83,12 +83,12 @@ class Row:
         return f"4{self.letter}"
 
     @property
-    def initial(self) -> Reading:
+    def initial(self) -> Setup:
         """Return what the initial column rests on."""
-        return Reading(self.before or self.updated.words, self.initial_ground)
+        return Setup(self.before or self.updated.words, self.initial_ground)
 
 
-_DAMPED = Reading(
+_DAMPED = Setup(
     f"spring:free_stiffness=false,{SPRINGS},options.damping=0.3,"
     f"options.max_iterations=200,{_TO_THE_LAST}",
     Ground(
@@ -107,19 +107,19 @@ _JOINTS = Ground(
     "the frame without joints; nothing is chosen for it",
 )
 ROWS = (
-    Row(
+    Update(
         "a",
         "a_global_prototype",
         "EI of all members",
-        Reading("global:options.residual=eigenvalue"),
+        Setup("global:options.residual=eigenvalue"),
         {"EI": "EI all members"},
         RECOVERED,
     ),
-    Row(
+    Update(
         "b",
         "b_local_prototype",
         "EI of the elements at the joints",
-        Reading(
+        Setup(
             "local:options.damping=0.01,options.max_iterations=6",
             Ground(
                 "fitted",
@@ -131,11 +131,11 @@ ROWS = (
         RECOVERED,
         converged="local",
     ),
-    Row(
+    Update(
         "c",
         "c_global_spring",
         "EI and rho A of all members, springs at the joints",
-        Reading(
+        Setup(
             f"spring:variant=global,{RIGID_SPRINGS},options.damping=1.0,"
             f"options.max_iterations=30,{_TO_THE_LAST}",
             Ground(
@@ -149,11 +149,11 @@ ROWS = (
         _JOINTS,
         before=f"spring:variant=global,{SPRINGS}",
     ),
-    Row(
+    Update(
         "d",
         "d_spring",
         "springs at the joints",
-        Reading(
+        Setup(
             f"spring:free_stiffness=false,{SPRINGS},{_DAMPING}",
             Ground(
                 "under-convention",
@@ -164,17 +164,17 @@ ROWS = (
         | {"EI": "EI all members"},
         Ground("input", "the initial column of table 4(c), printed again"),
         apart=dict.fromkeys(("k_x", "k_z"), _DAMPED)
-        | {"EI": Reading(f"spring:free_stiffness=false,{SPRINGS},{_DAMPING}", _HELD)},
+        | {"EI": Setup(f"spring:free_stiffness=false,{SPRINGS},{_DAMPING}", _HELD)},
     ),
-    Row(
+    Update(
         "e",
         "e_offset",
         "partly rigid elements at the joints and EI",
-        Reading("offset"),
+        Setup("offset"),
         {"a_H": "a T branch", "a_V": "a T through", "EI": "EI all members"},
         _JOINTS,
         apart={
-            "a_V": Reading(
+            "a_V": Setup(
                 "offset:options.damping=3e-3",
                 Ground("fitted", "the damping was chosen strong enough to hold it still"),
             )
@@ -196,7 +196,7 @@ def nominal(case: Case, symbol: str) -> float:
     return member.material.rho * member.section.A if symbol == "rhoA" else 1.0
 
 
-def parameter_values(bench: Workbench, row: Row, words: str) -> dict[str, tuple[float, float]]:
+def parameter_values(bench: Workbench, row: Update, words: str) -> dict[str, tuple[float, float]]:
     """Return initial and updated value of every parameter of a row by the paper's symbol."""
     found = {p.name: (p.before, p.after) for p in run(bench, words).parameters}
     values = {}
@@ -207,7 +207,7 @@ def parameter_values(bench: Workbench, row: Row, words: str) -> dict[str, tuple[
     return values
 
 
-def at_printed(bench: Workbench, row: Row) -> Model:
+def at_printed(bench: Workbench, row: Update) -> Model:
     """Return the model of the updated column with the parameters that the paper prints."""
     structure = run(bench, row.updated.start).model.frame_structure
     known = {parameter.name: parameter for parameter, _ in structure.changes}
@@ -222,6 +222,6 @@ def at_printed(bench: Workbench, row: Row) -> Model:
     return Model.of(structure.with_values(chosen, values))
 
 
-def row_of(letter: str) -> Row:
+def row_of(letter: str) -> Update:
     """Return one of the rows a to e."""
     return next(row for row in ROWS if row.letter == letter)

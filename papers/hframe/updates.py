@@ -11,8 +11,8 @@ from femubench import Model
 from femubench.papers.hframe.meshes import frequencies
 from femubench.papers.hframe.rows import (
     ROWS,
-    Reading,
-    Row,
+    Setup,
+    Update,
     at_printed,
     parameter_values,
     run,
@@ -67,7 +67,7 @@ def misprinted(frequency: float, measured: float, error: float) -> bool:
 
 
 def _mode_cells(
-    bench: Workbench, row: Row, theirs: dict[str, Any], column: str, reading: Reading, limit: float
+    bench: Workbench, row: Update, theirs: dict[str, Any], column: str, reading: Setup, limit: float
 ) -> Iterator[Cell]:
     words = reading.start if column == "initial" else reading.words
     ours = frequencies(run(bench, words).model, USED)
@@ -82,7 +82,7 @@ def _mode_cells(
         yield page.cell(f"mode {i + 1}", f"{column} error", theirs[f"{column}_error"][i], own)
 
 
-def _parameter_cells(bench: Workbench, row: Row, theirs: dict[str, Any]) -> Iterator[Cell]:
+def _parameter_cells(bench: Workbench, row: Update, theirs: dict[str, Any]) -> Iterator[Cell]:
     at_test = printed("hframe")["table4"][row.key]["updated"]
     here = largest_miss(run(bench, row.updated.words).model, at_test)
     there = largest_miss(at_printed(bench, row), at_test)

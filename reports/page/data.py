@@ -56,7 +56,7 @@ _FILES: tuple[tuple[str, str, Reporter], ...] = (
 _Named = Mapping[str, Any]
 
 
-class Exhibits(Protocol):
+class ExhibitSource(Protocol):
     """What can be drawn of a run; either is None where nothing is known."""
 
     def case(self, digest: str) -> Mapping[str, Any] | None:
@@ -68,7 +68,7 @@ class Exhibits(Protocol):
         ...
 
 
-def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
+def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]:
     """Return everything that the page of a run shows.
 
     Errors, scores and skills are those of the run to the last digit; other numbers are rounded.
@@ -157,7 +157,7 @@ def _strategies(run: Run) -> list[dict[str, Any]]:
     ]
 
 
-def _case(run: Run, case: str, exhibits: Exhibits | None) -> dict[str, Any]:
+def _case(run: Run, case: str, exhibits: ExhibitSource | None) -> dict[str, Any]:
     about = (run.meta.get("cases") or {}).get(case) or {}
     digest = (run.meta.get("drawings") or {}).get(case, about.get("digest"))
     stage = exhibits.case(digest) if exhibits is not None and isinstance(digest, str) else None
@@ -212,7 +212,7 @@ def _forecast(result: JobResult, name: str) -> dict[str, Any] | None:
 
 
 def _details(
-    run: Run, stages: Mapping[str, _Named | None], exhibits: Exhibits | None
+    run: Run, stages: Mapping[str, _Named | None], exhibits: ExhibitSource | None
 ) -> tuple[dict[str, Any], list[str]]:
     """Return the details of the first seed's results, the best ones first, and what is missing.
 

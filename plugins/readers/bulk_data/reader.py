@@ -7,7 +7,7 @@ from typing import NoReturn
 
 from femubench import InputError, Model
 from femubench.plugins.readers.bulk_data.cards import read_deck
-from femubench.plugins.readers.bulk_data.structure import Reading, grids_of
+from femubench.plugins.readers.bulk_data.structure import BulkFrame, grids_of
 from femubench.plugins.readers.bulk_data.writing import write_cards
 
 
@@ -31,7 +31,7 @@ class BulkDataReader:
         Raises:
             InputError: at the line of the first card that is wrong or is not read.
         """
-        return Reading(read_deck(path)).model()
+        return BulkFrame(read_deck(path)).model()
 
     def read_remarks(self, path: Path) -> tuple[str, ...]:
         """Return what the model leaves out or takes otherwise, one sentence each.
@@ -39,7 +39,7 @@ class BulkDataReader:
         Raises:
             InputError: as `read_model`.
         """
-        reading = Reading(read_deck(path))
+        reading = BulkFrame(read_deck(path))
         reading.frame()
         return reading.remarks()
 

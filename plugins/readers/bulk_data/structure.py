@@ -69,7 +69,7 @@ _SUPERELEMENT = re.compile(r"SE(?!T)\w+|CSUP(ER|EXT)|EXTRN")
 
 
 @dataclass(frozen=True)
-class Grid:
+class GridPoint:
     """A grid: its place in basic coordinates, and the axes of its displacements as rows."""
 
     card: Card
@@ -101,7 +101,7 @@ def numbered(deck: Deck, *names: str) -> dict[int, Card]:
     return found
 
 
-def grids_of(deck: Deck) -> dict[int, Grid]:
+def grids_of(deck: Deck) -> dict[int, GridPoint]:
     """Return the grids by their numbers; raises InputError."""
     usual = next((card for card in deck.cards if card.name == "GRDSET"), None)
     shown = 0 if usual is None else usual.id(6, "CD", 0)
@@ -111,7 +111,7 @@ def grids_of(deck: Deck) -> dict[int, Grid]:
         if card.text(6) == "-1":
             raise card.error("a point of a fluid", "a grid of a structure", "CD")
         motion = systems.find(card.id(6, "CD", shown), card, "CD")
-        found[number] = Grid(card, xyz, motion.axes_at(xyz))
+        found[number] = GridPoint(card, xyz, motion.axes_at(xyz))
     return found
 
 
@@ -157,7 +157,7 @@ def _unread(card: Card) -> InputError:
     return card.error("this card is not read", expected)
 
 
-class Reading:
+class BulkFrame:
     """Bulk data as a frame.
 
     Arguments:
@@ -247,11 +247,11 @@ class Reading:
         for name in names:
             yield from self.named.get(name, ())
 
-    def grid(self, card: Card, number: int, key: str) -> Grid:
+    def grid(self, card: Card, number: int, key: str) -> GridPoint:
         """Return the grid that a field names, and make a joint of it; raises InputError."""
         return self._known(card, card.id(number, key), key)
 
-    def _known(self, card: Card, number: int, key: str) -> Grid:
+    def _known(self, card: Card, number: int, key: str) -> GridPoint:
         grid = self.grids.get(number)
         if grid is None:
             raise card.error(f"there is no GRID {number}", "the number of a GRID", key)
@@ -263,7 +263,7 @@ class Reading:
         self.parts.joints.setdefault(name, Joint(name, (x, y, z)))
         return name
 
-    def _motions(self, grid: Grid, components: str, card: Card, key: str) -> list[str]:
+    def _motions(self, grid: GridPoint, components: str, card: Card, key: str) -> list[str]:
         """Return the global directions that components at a grid are.
 
         Raises:
@@ -342,7 +342,7 @@ class Reading:
             raise card.error(f"there is no {wanted} {number}", f"the number of a {wanted}", "PID")
         return bar
 
-    def _end(self, grid: Grid, offset: FloatArray, card: Card) -> str:
+    def _end(self, grid: GridPoint, offset: FloatArray, card: Card) -> str:
         """Return the joint of an end of a bar: its grid, or a joint that is linked to it."""
         if not offset.any():
             return grid.name
@@ -360,7 +360,7 @@ class Reading:
         bars = (m for m in self.parts.members if self.card_of[m.name].name != "CROD")
         return found | {name for member in bars for name in member.ends}
 
-    def _rod(self, card: Card, bar: Bar, ends: tuple[Grid, ...], *, lumped: bool) -> None:
+    def _rod(self, card: Card, bar: Bar, ends: tuple[GridPoint, ...], *, lumped: bool) -> None:
         """Add a member that does not bend; lumped: half of its mass at either end, else its own.
 
         Where a joint turns, mass of a member would turn with it.
@@ -490,7 +490,7 @@ class Reading:
             if fixed:
                 self.parts.supports.append(Support(Place(joint=name), fixed))
 
-    def _constraints(self) -> Iterator[tuple[Grid, str, Card]]:
+    def _constraints(self) -> Iterator[tuple[GridPoint, str, Card]]:
         cards = list(self._cards("SPC", "SPC1"))
         sets = {card.id(1, "SID") for card in cards}
         if "MPC" in self.deck.chosen:

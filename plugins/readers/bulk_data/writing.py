@@ -29,8 +29,8 @@ from femubench.plugins.readers.bulk_data.structure import (
     DIRECTIONS,
     ELEMENTS,
     PROPERTIES,
-    Grid,
-    Reading,
+    BulkFrame,
+    GridPoint,
 )
 
 _SAME = 1e-12  # far below any update, above the rounding of a change of units
@@ -61,7 +61,7 @@ def write_cards(model: Model, path: Path, original: Path) -> None:
         InputError: for what cards of properties cannot say.
     """
     deck = read_deck(original)
-    reading = Reading(deck)
+    reading = BulkFrame(deck)
     nominal = reading.model().frame_structure
     if model.structure is None or model.mass_change or model.stiffness_change:
         raise _refusal(path)
@@ -161,7 +161,7 @@ def _parted(bar: Bar, ratio: Mapping[str, float], e: float) -> tuple[Numbers, Nu
 class _Cards:
     """Gives every bar a property card, and every property a material card, with its numbers."""
 
-    def __init__(self, reading: Reading) -> None:
+    def __init__(self, reading: BulkFrame) -> None:
         self.reading, self.lines = reading, reading.deck.lines
         self.edits: _Changes = {}
         self.highest = {
@@ -237,7 +237,7 @@ class _Cards:
                 new[:0] = [b"\n"]
             self.edits.setdefault(file, {}).setdefault(line, (line - 1, []))[1][:0] = new
 
-    def _grid(self, place: Place, path: Path) -> tuple[Grid, FloatArray]:
+    def _grid(self, place: Place, path: Path) -> tuple[GridPoint, FloatArray]:
         """Return the grid of a joint, and where the joint is from there."""
         joint = self.reading.parts.joints.get(place.joint or "")
         if joint is None:
