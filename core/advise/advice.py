@@ -199,7 +199,7 @@ def _deflection(group: Group) -> Iterator[Option]:
     best = int(predicted[0].values.argmax())
     text = f"measure the static deflection under a known load at {points.sensors[best]}"
     softest = [p.take([best]) for p in predicted]
-    std = settings.reachable_deflection_std * softest[0].values
+    std = settings.width_sensor_gains * softest[0].values
     yield group.option("deflection", text, softest, std)
 
 

@@ -109,7 +109,8 @@ def antiresonances(outlook: Outlook) -> list[Predicted]:
     frequencies, spread = outlook.hertz(eigenvalues[:, :kept], basis @ vectors[:, :, :kept])
     poles, zero = signed_hz(values), outlook.zero
     gap = np.abs(frequencies[..., None] - poles).min(axis=-1)
-    shown = (frequencies > zero) & (gap > settings.hidden_by_resonance * frequencies)
+    hidden = settings.notable_deviations * settings.reachable_antiresonance_std
+    shown = (frequencies > zero) & (gap > hidden * frequencies)
     return [Predicted(f[i], s[i]) for f, s, i in zip(frequencies, spread, shown, strict=True)]
 
 

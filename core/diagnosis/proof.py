@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import chdtrc, logsumexp
 
 from femubench.core.case.case import Case, Modification
-from femubench.core.diagnosis.verdict import inseparable
+from femubench.core.diagnosis.verdict import elsewhere, inseparable
 from femubench.core.fem.model import Model
 from femubench.core.fit.discrepancy import Discrepancy
 from femubench.core.fit.extended_model import extended, raw_residual
@@ -21,7 +21,7 @@ from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.examine import Examination, Terms
-from femubench.core.inference.posterior import Explanation, Key, Posterior
+from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import enough_modes, modes_of, once_for
 from femubench.core.modal.measurement import Measurement
@@ -137,7 +137,7 @@ class Unseen:
         # missing: errors that stay more than noise must fall by a factor, in the mean of their
         # logarithms. A fitted cause must carry further.
         enough = len(self.seeing.before) * (1 + bool(fitted)) * log(settings.error_ratio)
-        return self.probability > settings.unseen_noise_p or log_bayes > enough
+        return self.probability > settings.noise_p or log_bayes > enough
 
 
 def held_out(
@@ -444,7 +444,8 @@ def borne_out(
     others = inseparable(posterior)[0][1:] if name else ()
     with effort.piece("unseen"):
         first = _judged(case, examination, best)
-    places = _other_places(posterior, name) if name and not first[0] else []
+    places = elsewhere(posterior, best) if name and not first[0] else []
+    places = places[: settings.largest_group]
     effort.expect("unseen", len(others) + len(places))
     rivals = []
     for key in others:
@@ -474,9 +475,3 @@ def _judged(case: Case, examination: Examination, found: Explanation) -> tuple[b
     unseen = unseen_of(case, examination, found, model)
     log_bayes = sum(part.log_bayes for part in unseen)
     return stands(case, examination, found, model, unseen), log_bayes
-
-
-def _other_places(posterior: Posterior, key: Key) -> list[Explanation]:
-    """Return the explanations of a name at other places that are not much less likely."""
-    (_, most), *rest = posterior.members(key)
-    return [e for e, p in rest if p >= settings.tied_place_share * most][: settings.largest_group]

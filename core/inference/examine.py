@@ -246,7 +246,7 @@ def examine(
                 explanations = searched(problem, error, known, pairs, effort)
         own = replace(problem, noise=beam_noise(basis, slopes, before, tolerance, log(beam)))
         slopes = slopes[: len(measurement)].copy()  # those of shapes fill the memory
-        floor = max((e.log_weight for e in explanations), default=-np.inf) - settings.hopeless
+        floor = max((e.log_weight for e in explanations), default=-np.inf) - settings.lag
         more, atlas = Search(own, known, pairs=pairs, floor=floor, effort=effort).run()
     posterior = Posterior.of([*explanations, *more])
     basis.solver.forget()

@@ -125,7 +125,7 @@ def _definite(now: _Drawn, ranked: Weighed, terms: Terms) -> Mended | None:
     seen = single.examine(now.model, now.measurement)
     without = _with_causes(seen, now.log_density, now.measurement)
     sound = seen.adequacy > settings.adequate_p and len(seen.best.parts) < 2
-    least = without - now.log_density - (0.0 if sound else settings.fault_lag)
+    least = without - now.log_density - (0.0 if sound else settings.lag)
     tried = [(c, gain) for c, gain in pairs if gain > least][: settings.candidates]
     densities = [_density(now, *pair, single.examine(*pair[0].mended)) for pair in tried]
     if not tried:
@@ -149,7 +149,7 @@ def _reweighed(
     again = (best.screened(charge) for charge in charges)
     found += [(charge, caused + gain) for charge, gain in again]
     charge, density = max(found, key=lambda pair: pair[1], default=(None, -np.inf))
-    if charge is None or density < without - settings.fault_lag:
+    if charge is None or density < without - settings.lag:
         return None
     if charge.loosens < 1.0 and seen.adequacy > settings.adequate_p:
         return None
@@ -375,7 +375,7 @@ class _Drawn:
         error = problem.data.by_mode(self.state.raw)[:count] * self.measurement.frequency_std
         if not (np.abs(error / self.measurement.frequencies) > settings.gross_error).any():
             return []
-        return charges[: settings.typed_solved if self.model.size > DENSE_LIMIT else len(charges)]
+        return charges[: settings.shortlist // 2 if self.model.size > DENSE_LIMIT else len(charges)]
 
     def typed(self, charge: Charge) -> Weighed:
         """Return a fault of what was typed in with what it gains at the present scales."""
@@ -438,7 +438,7 @@ def _possible(
         costs = [_half_chi2(charge, model, measurement) for charge in blatant]
         best = int(np.argmin(costs))
         gain = _half_chi2(None, model, measurement) - costs[best]
-        if not gain > settings.fault_lag:
+        if not gain > settings.lag:
             break
         others = float(logsumexp(np.array(costs)[best] - np.array(costs)))
         mended.append(Mended(blatant[best], exp(-others) / (1.0 + exp(-gain))))

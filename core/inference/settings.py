@@ -94,7 +94,9 @@ class Settings:
     width_general: float = _prior(
         0.02, "relative", "random changes between modes, for what no other class is"
     )
-    width_sensor_gains: float = _prior(0.01, "relative", "sensors are calibrated to a per cent")
+    width_sensor_gains: float = _prior(
+        0.01, "relative", "sensors and dial gauges are calibrated to a per cent"
+    )
     width_shapes: float = _prior(
         1.0, "deviations", "stated deviations of shapes are right only within their own size"
     )
@@ -128,17 +130,13 @@ class Settings:
     widest_coordinate: float = _prior(
         3.0, "prior deviations", "beyond this a parameter or a size is not believed"
     )
-    default_shape_std: float = _prior(
-        0.02, "of the largest component", "of a shape that states no deviation"
-    )
     reachable_mass_std: float = _prior(0.002, "relative", "scales of a careful test")
     reachable_antiresonance_std: float = _prior(
         0.005, "relative", "antiresonances shift with where the hammer hits"
     )
     reachable_shape_std: float = _prior(
-        0.015, "of the largest component", "accelerometers of a careful test"
+        0.015, "of the largest component", "accelerometers of a careful test; where none is stated"
     )
-    reachable_deflection_std: float = _prior(0.01, "relative", "dial gauges of a careful test")
 
     # Where a verdict begins.
     nothing_missing: float = _decision(
@@ -157,7 +155,7 @@ class Settings:
         0.05, "probability", "what is left, were it noise: above it nothing more is sought"
     )
     noise_p: float = _decision(
-        1e-3, "probability", "what is left, were it noise: below it no known effect explains it"
+        1e-3, "probability", "what is left, were it noise: below it nothing known explains it"
     )
     rival_share: float = _decision(0.05, "probability", "from which a rival stays in the group")
     parallel_rival_share: float = _decision(
@@ -192,9 +190,6 @@ class Settings:
     telling_deviations: float = _decision(
         0.5, "deviations", "by which a single mode must change to say anything"
     )
-    unseen_noise_p: float = _decision(
-        2e-3, "probability", "of errors on unseen data, were they noise: above it they confirm"
-    )
     decisive: float = _decision(
         5.0, "nats", "odds of 150 to 1, from which unseen data outweigh used ones"
     )
@@ -207,13 +202,10 @@ class Settings:
     unusual_error: float = _decision(
         5.0, "times the usual error", "a mode farther off was not measured, or is not that mode"
     )
-    tied_place_share: float = _decision(
-        0.1, "of the probability", "of the best place, from which unseen data judge another one"
-    )
     # Where a fault begins.
     sure_fault: float = _decision(0.9, "probability", "from which data or input are mended")
-    fault_lag: float = _decision(
-        20.0, "nats", "by which a fault and causes may differ, and both be tried"
+    lag: float = _decision(
+        20.0, "nats", "behind which a fault, causes or a pure beam model are not tried"
     )
     fault_remainder: float = _decision(
         0.3, "of the squared misfit", "which may be left where a fault is most of what is wrong"
@@ -228,7 +220,9 @@ class Settings:
     notable_physics: float = _decision(
         0.005, "of a frequency", "change by physics that a model leaves out that is worth one"
     )
-    notable_deviations: float = _decision(2.0, "deviations", "the same beside the measurement")
+    notable_deviations: float = _decision(
+        2.0, "deviations", "the same beside the measurement; a resonance so close hides"
+    )
     unequal_elements: float = _decision(
         20.0, "ratio of lengths", "of neighbours, above which a mesh is ill made"
     )
@@ -240,17 +234,13 @@ class Settings:
         "of a frequency",
         "deviations that tests have, from the best to the worst",
     )
-    clear_reading: float = _decision(
-        6.0, "deviations", "by which a reading must stand out to judge a gain"
-    )
     alike_readings: float = _decision(
-        0.97, "cosine", "of readings and expectations over the modes, from which a gain is one"
+        0.97, "cosine", "of readings and expectations: a gain; of two shapes: a sound pair"
     )
     lone_misfit: float = _decision(
         10.0, "times an ordinary sensor's", "what a model lacks gave up to 6"
     )
     least_modes: int = _decision(2, "modes", "fewer have no pattern that says anything")
-    well_paired: float = _decision(0.9, "MAC", "from which no wrong sensor can have spoilt a pair")
     stubby: float = _decision(8.0, "length over height", "below which a member is hardly a beam")
     quiet_share: float = _decision(
         0.05, "of the energy", "below which a member has no say, or counts as that much"
@@ -274,9 +264,6 @@ class Settings:
     same_antiresonance: float = _decision(
         1.25, "ratio of frequencies", "within which two explanations mean the same one"
     )
-    hidden_by_resonance: float = _decision(
-        0.01, "of a frequency", "a resonance closer than this hides an antiresonance"
-    )
 
     # How much work is spent: the search.
     candidates: int = _cost(2, "candidates", "followed where the best alone might be wrong")
@@ -289,11 +276,12 @@ class Settings:
     approximation: float = _cost(
         0.05, "of what it explains", "which interpolation may miss, or first order near a resonance"
     )
-    shortlist: int = _cost(40, "hypotheses", "fitted exactly, or weighed as partners, at most")
+    shortlist: int = _cost(
+        40, "hypotheses", "fitted exactly, or weighed as partners, at most; half of input"
+    )
     given_up: float = _cost(
         20.0, "of the cost", "so far behind the best a fit is not brought to its end"
     )
-    hopeless: float = _cost(30.0, "nats", "behind which a pure beam model is not pursued")
     seeds: int = _cost(6, "causes", "about which pairs are sought where no single one suffices")
     partners: int = _cost(8, "causes", "fitted beside a seed, or carried on from other scales")
     promise_share: float = _cost(
@@ -315,7 +303,6 @@ class Settings:
     scale_settled: float = _cost(1e-5, "relative", "change of the cost at which these steps end")
     general_modes: int = _cost(20, "elastic modes", "that random changes couple")
     faults_mended: int = _cost(3, "faults", "more are no matter of mending")
-    typed_solved: int = _cost(20, "suspects", "of the input that are solved of a large model")
     grid_points: int = _cost(13, "points", "on which the parameter of a fault is sought first")
     coordinate_margin: float = _cost(
         0.02, "prior deviations", "step of a curvature, and what is off a bound"

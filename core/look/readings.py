@@ -93,7 +93,7 @@ def _partners(seen: Seen) -> IntArray:
     """
     best = seen.pairing
     likeness = np.nan_to_num(best.mac, nan=0.0)
-    if len(likeness) == 0 or likeness.min() >= settings.well_paired:
+    if len(likeness) == 0 or likeness.min() >= settings.alike_readings**2:
         return best.index
     m, predicted = seen.measurement, seen.modes.natural_frequencies
     for row in range(min(len(m.sensors), settings.block)):
@@ -129,10 +129,12 @@ def _worst(
     size = np.einsum("sm,sm->s", measured, measured)
     gain = inner / np.maximum(norm, 1e-300)
     alike = np.abs(inner) > settings.alike_readings * np.sqrt(norm * size)
-    clear = (np.abs(expected) > settings.clear_reading * noise).sum(axis=1) >= settings.least_modes
+    factor = settings.wrong_factor
+    # So large that the smallest wrong gain would stand out of the noise.
+    off = (1.0 - 1.0 / factor) * np.abs(expected)
+    clear = (off > settings.visible_deviations * noise).sum(axis=1) >= settings.least_modes
     misfit = np.square((measured - expected) / noise).sum(axis=1)
     alone = misfit > settings.lone_misfit * np.median(misfit)
-    factor = settings.wrong_factor
     odd = clear & alike & alone & ((gain < 1.0 / factor) | (gain > factor))
     if not odd.any():
         return None

@@ -107,7 +107,7 @@ def expand(comparison: ModalCorrelation) -> Expansion:
         reading = m.shapes[known, j]
         size = float(np.abs(reading).max())
         std = m.shape_std[known, j]
-        std = np.where(np.isfinite(std) & (std > 0.0), std, settings.default_shape_std * size)
+        std = np.where(np.isfinite(std) & (std > 0.0), std, settings.reachable_shape_std * size)
         sensors = np.asarray(rows[np.flatnonzero(known)].toarray()) / std[:, None]
         if size > 0.0:
             columns.append(_expanded(comparison, sensors, reading / std, float(eigenvalue)))
