@@ -54,10 +54,15 @@ core/modal/eigen.py :: eigen rigid_modes
     _ROUNDOFF = 32.0 => _ROUNDOFF = 0.0
 core/modal/expansion.py :: expansion
     full @ rotation.T), rotation => full @ rotation), rotation
+core/change/change.py :: change_lists
+    (up - down).diagonal() => 2.0 * _SLOPE_STEP
+core/change/parametric_model.py :: change_lists
+    sums[term.matrix] + factor * matrix => sums[term.matrix] - factor * matrix
+    np.where(set_alone, self.growth(x), 1.0) => np.where(set_alone, 1.0, 1.0)
 core/fit/gauss_newton.py :: diagnosis_fit
     (at <= low) & (step < 0.0) => (at <= low) & (step > 0.0)
+    np.diag(self.precision) => 1e-9 * np.diag(self.precision)
 core/fit/modal_fit.py :: diagnosis_fit
-    np.eye(jacobian.shape[1]) => 1e-9 * np.eye(jacobian.shape[1])
     (8.0 * np.pi**2 * moving) => (4.0 * np.pi**2 * moving)
 core/fit/noise.py :: model_error
     log_weight - float(np.log => log_weight + float(np.log
