@@ -76,10 +76,9 @@ def in_child(module: str, function: str, path: str, result: str) -> None:
     try:
         with opened(Path(path), ""):
             # Arrays of NPZ, those of sparse matrices by part, and the list of all names.
-            found = called(Path(path))
             arrays: dict[str, Any] = {}
             names: list[str] = []
-            for name, value in found.items():
+            for name, value in called(Path(path)).items():
                 key = f"v{len(names)}"
                 if sp.issparse(value):
                     matrix = sp.csc_array(value)
@@ -92,10 +91,10 @@ def in_child(module: str, function: str, path: str, result: str) -> None:
                 else:
                     continue
                 names.append(name)
-            found = arrays | {_NAMES: np.array(names, dtype=str)}
+            arrays[_NAMES] = np.array(names, dtype=str)
     except InputError as error:
         sys.exit(" ".join(error.what.split()))
-    np.savez(result, **found)
+    np.savez(result, **arrays)
 
 
 def limit_memory(path: Path) -> None:
