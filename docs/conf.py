@@ -56,7 +56,11 @@ autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
 autodoc_type_aliases = {
-    name: name for name in ("AnyArray", "BoolArray", "FloatArray", "IntArray", "SparseArray")
+    name: name
+    for name in (
+        *("AnyArray", "BoolArray", "FloatArray", "IntArray", "SparseArray"),
+        "Coefficients",
+    )
 }
 # Inside another type, as in tuple[FloatArray, ...], Sphinx writes the repr of an alias.
 TypeAliasForwardRef.__repr__ = lambda self: self.name  # type: ignore[method-assign]

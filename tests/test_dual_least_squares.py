@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import femubench
+from femubench.core.fit import gauss_newton
 from femubench.core.fit.dual_least_squares import DualPosterior, dual_step
 from femubench.core.update import sensitivity_update as iteration
 from femubench.update import UpdateOptions, scale_parts, sensitivity_update
@@ -40,7 +41,8 @@ def test_an_update_of_many_parameters_is_that_of_few(
     options = UpdateOptions(weighting="statistical" if statistical else "unit")
     used = case.used_measurement()
     dense = sensitivity_update(case.model, unknowns, used, options)
-    monkeypatch.setattr(iteration, "MANY", 3)
+    for module in (iteration, gauss_newton):
+        monkeypatch.setattr(module, "MANY", 3)
     dual = sensitivity_update(case.model, unknowns, used, options)
     assert len(unknowns) > 3
     for one, two in zip(dense.parameters, dual.parameters, strict=True):
@@ -55,7 +57,8 @@ def test_many_parameters_without_a_prior_and_damping_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     case = femubench.cases["frame"]
-    monkeypatch.setattr(iteration, "MANY", 3)
+    for module in (iteration, gauss_newton):
+        monkeypatch.setattr(module, "MANY", 3)
     unknowns = scale_parts(case.model, "elements")
     with pytest.raises(femubench.NotApplicable, match="without damping or a prior"):
         sensitivity_update(

@@ -291,7 +291,7 @@ class TestCatalogues:
         assert local(**{"options.damping": 1e-3}) == local(damping=1e-3)
         assert local(damping=1e-5).name == local().name == "local"
         softer = femubench.strategies["spring"](**{"stiffness.ry": 3e6}, damping=0.1)
-        assert softer.name == "spring:stiffness.ry=3000000.0,damping=0.1"
+        assert softer.name == "spring:damping=0.1,stiffness.ry=3000000.0"
         words = femubench.strategies["generic-ls"](orthogonality=False, plain="full")
         assert words.name == "generic-ls:orthogonality=false,plain=full"
 
