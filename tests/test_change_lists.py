@@ -141,6 +141,9 @@ def test_a_value_that_is_set_moves_in_its_unit_and_keeps_its_sign() -> None:
     assert soft.values(np.array([[np.log(2.0)]]))[0, 0] == pytest.approx(2e4)
     assert signed.values(np.array([[2.0]]))[0, 0] == pytest.approx(0.02)
     assert signed.bounds[0] == pytest.approx([-4.0])
+    both = ParametricModel(FRAME.model, (soft, signed, scale_property("E", "E", ())))
+    steps = both.steps(np.array([np.log(2.0), 2.0, 0.3]))
+    assert steps == pytest.approx([2e4, 0.02, 1.0])  # a factor counts about its present value
     factor = scale_property("E", "E", ("rung-middle/1",), prior_std=0.1)
     result = sensitivity_update(FRAME.model, [factor], FRAME.used_measurement())
     assert result.parameters[0].places == ("rung-middle/1",)
