@@ -46,10 +46,8 @@ class TermSlopes:
         """Return left_j' dK/dx right_j and the same for dM, two arrays (m, n_parameters)."""
         found = {name: np.zeros((left.shape[1], self.count)) for name in ("stiffness", "mass")}
         for term, own in zip(self.terms, self.factors.T, strict=True):
-            energy, used = (
-                np.einsum("nm,nm->m", left, term.operator.apply(right)),
-                np.flatnonzero(own),
-            )
+            energy = np.einsum("nm,nm->m", left, term.operator.apply(right))
+            used = np.flatnonzero(own)
             found[term.matrix][:, used] += np.outer(energy, own[used])
         return found["stiffness"], found["mass"]
 

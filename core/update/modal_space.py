@@ -304,7 +304,7 @@ def modal_space(
         >>> space.fit(np.zeros(7)).paired
         3
     """
-    assert parametric.start is not None  # raises where changes do not go together
+    _ = parametric.start  # raises where changes do not go together
     x = np.zeros(len(parametric)) if at is None else at
     model = parametric.model if not x.any() else parametric.at(x)
     modes = solve_modes(model, enough_modes(model, len(measurement)))

@@ -142,7 +142,7 @@ class Iteration:
     def run(self) -> Iterate:
         """Return the optimum; raises StrategyFailure or Diverged where there is none."""
         parametric = self.parametric
-        assert parametric.start is not None  # raises where changes do not go together
+        _ = parametric.start  # raises where changes do not go together
         point = self.at(np.clip(np.zeros(len(parametric)), parametric.lower, parametric.upper))
         if not (point.prediction.partner >= 0).any():
             raise StrategyFailure("no mode of the model looks like any measured mode")
@@ -239,20 +239,16 @@ def estimate_parameters(
         std: their standard deviations, (p,); None where unknown.
     """
     values = parametric.values(q)
-    deviations = [None] * len(q) if std is None else [*map(float, std * parametric.growth(q))]
+    deviations = (
+        [None] * len(q) if std is None else [*map(float, np.abs(std * parametric.growth(q)))]
+    )
     names, owners, parameters = parametric.names, parametric.owners, parametric.parameters
     return tuple(
-        ParameterEstimate(
-            name, float(p.neutral), float(value), p.unit, _size(deviation), owner.places
-        )
+        ParameterEstimate(name, float(p.neutral), float(value), p.unit, deviation, owner.places)
         for name, owner, p, value, deviation in zip(
             names, owners, parameters, values, deviations, strict=True
         )
     )
-
-
-def _size(deviation: float | None) -> float | None:
-    return None if deviation is None else abs(deviation)
 
 
 def sensitivity_update(
