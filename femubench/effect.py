@@ -18,7 +18,6 @@ from femubench.core.effect.attachments import (
     elongation_row,
     free_translations,
     mass_term,
-    once_for,
     point_in,
     point_motion,
     total_mass,
@@ -73,6 +72,7 @@ from femubench.core.effect.sizes import Site, Size
 from femubench.core.effect.suspect import Corrected, Suspect
 from femubench.core.effect.textbook import textbook_model, textbook_values
 from femubench.core.look.modes import Seen
+from femubench.core.modal.eigen import once_for
 from femubench.core.roles import Effect, Fault
 from femubench.core.schema.diagnosis import LookWarning
 

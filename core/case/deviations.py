@@ -6,7 +6,6 @@ is 0 or 1e-16. It was measured no better than the others, so it gets what they h
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -73,14 +72,9 @@ def _sentence(file: str, what: str, shares: FloatArray, of: str) -> str:
 
 
 def _places(m: Measurement, lows: BoolArray) -> str:
-    rows = np.flatnonzero(lows.any(axis=1))
-    named = [
-        _place(m.sensors.labels[s], [m.numbers[k] for k in np.flatnonzero(lows[s])])
-        for s in rows[:_MOST_NAMED]
-    ]
+    rows, named = np.flatnonzero(lows.any(axis=1)), []
+    for s in rows[:_MOST_NAMED]:
+        modes = ", ".join(str(m.numbers[k]) for k in np.flatnonzero(lows[s]))
+        named.append(f"{m.sensors.labels[s]} (mode {modes})")
     more = [f"{len(rows) - _MOST_NAMED} more sensors"] if len(rows) > _MOST_NAMED else []
     return "the shape at " + ", ".join([*named, *more])
-
-
-def _place(label: str, modes: Sequence[int]) -> str:
-    return f"{label} (mode {', '.join(map(str, modes))})"

@@ -19,110 +19,10 @@ from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import solve_modes
 
+_FILES = Path(__file__).with_name("example_files")
 _ELEMENTS = 40  # a member, in the model that stands for the real frame
 _CORNER = 4.0e5  # N m/rad, its corners
 _MODES = 6
-
-CASE_TOML = """\
-# A case for femubench: a nominal model and what was measured on the structure.
-# Every key is explained in docs/case-format.md; an unknown key is an error. Units are SI.
-
-[case]
-name = "portal"
-title = "Steel portal frame on clamped feet"
-source = "Example of `bench init`: computed, not measured; see modes.csv below"
-
-# --- the nominal model: what you would have drawn before the test -----------------------------
-[model]
-kind = "frame"              # or "matrices": files with mass and stiffness
-plane = "in-plane"          # x-z plane; or "out-of-plane" (structure in x-y), "3d"
-beam = "euler-bernoulli"    # or "timoshenko"
-
-[model.materials.steel]
-E = 210e9                   # Pa
-nu = 0.3
-rho = 7850.0                # kg/m3
-
-[model.sections.tube]       # a shape with its sizes, or numbers: A, Iy, Iz, J, Jp, kappa
-shape = "rectangular-tube"
-width = 0.04                # m, along local y
-height = 0.06               # m, along local z
-wall = 0.003                # m
-
-[[model.joints]]
-name = "A"
-xyz = [0.0, 0.0, 0.0]       # m
-type = "foot"
-[[model.joints]]
-name = "B"
-xyz = [0.0, 0.0, 1.0]
-type = "corner"             # joints of one type are expected to behave alike
-[[model.joints]]
-name = "C"
-xyz = [1.4, 0.0, 1.0]
-type = "corner"
-[[model.joints]]
-name = "D"
-xyz = [1.4, 0.0, 0.0]
-type = "foot"
-
-[[model.members]]
-name = "left"
-ends = ["A", "B"]
-elements = 4
-section = "tube"
-material = "steel"
-[[model.members]]
-name = "beam"
-ends = ["B", "C"]
-elements = 6
-section = "tube"
-material = "steel"
-[[model.members]]
-name = "right"
-ends = ["D", "C"]
-elements = 4
-section = "tube"
-material = "steel"
-
-[[model.masses]]            # what hung on the structure during the test, e.g. accelerometers
-at = "beam@0.25"            # a joint, or a point of a member
-mass = 0.05                 # kg
-
-[[model.supports]]
-at = "A"
-fixed = ["x", "z", "ry"]
-[[model.supports]]
-at = "D"
-fixed = ["x", "z", "ry"]
-
-# --- the measurement ----------------------------------------------------------------------------
-[measurement]
-sensors = "sensors.csv"
-# These modes come from a finer Timoshenko mesh of the same frame whose corners turn on springs of
-# 4e5 N m/rad. Put your own in their place.
-modes = "modes.csv"
-shape_std = 0.015           # of the largest component of each shape
-used = [1, 2, 3]            # what an updating strategy is given
-held_out = [4, 5, 6]        # what only the score sees
-
-# --- a known change of the structure, measured as well: the test that counts --------------------
-[[modification]]
-name = "2 kg at midspan"
-masses = [{at = "beam@0.5", mass = 2.0}]
-modes = "modified.csv"
-"""
-
-SENSORS_CSV = """\
-label,at,direction
-left_mid,left@0.5,x
-left_top,B,x
-beam_quarter,beam@0.25,z
-beam_mid,beam@0.5,z
-beam_three_quarters,beam@0.75,z
-right_top,C,x
-right_mid,right@0.5,x
-"""
 
 
 def write_example(folder: Path) -> tuple[Path, ...]:
@@ -136,9 +36,9 @@ def write_example(folder: Path) -> tuple[Path, ...]:
         if any(folder.iterdir()):
             raise InputError("is not empty", file=folder, expected="a new or an empty folder")
         files = (folder / CASE_FILE, folder / "sensors.csv")
-        for path, text in zip(files, (CASE_TOML, SENSORS_CSV), strict=True):
-            path.write_text(text, encoding="utf-8")
-        spec = parse_spec(tomllib.loads(CASE_TOML))
+        for path in files:
+            path.write_bytes((_FILES / path.name).read_bytes())
+        spec = parse_spec(tomllib.loads(files[0].read_text(encoding="utf-8")))
         assert isinstance(spec.model, FrameSpec)
         better = _better(frame_of(spec.model))
         site = FrameSite(better)

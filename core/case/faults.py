@@ -105,15 +105,13 @@ def first_fault(error: ValidationError, schema: type[BaseModel]) -> BadKey:
         hint = f"; is {near[0]!r} meant?" if near else ""
         return BadKey(path, f"unknown key{hint}", f"one of {', '.join(owner.model_fields)}")
     if kind.startswith("union_tag"):
-        what = "missing key" if kind == "union_tag_not_found" else f"unknown kind {_tag(value)}"
+        kind_given = shown(value.get("kind") if isinstance(value, dict) else value)
+        missing = kind == "union_tag_not_found"
+        what = "missing key" if missing else f"unknown kind {kind_given}"
         return BadKey(("model", "kind"), what, "'frame', 'matrices' or 'file'")
     if kind == "misfit":
         return BadKey(path, context["what"], context["expected"])
     return BadKey(path, f"{shown(value)} is not allowed", expected)
-
-
-def _tag(value: object) -> str:
-    return shown(value.get("kind")) if isinstance(value, dict) else shown(value)
 
 
 def _described(schema: type[BaseModel], path: KeyPath, tag: str) -> tuple[type[BaseModel], str]:

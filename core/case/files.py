@@ -33,7 +33,7 @@ class CaseFiles:
     def __init__(self, folder: Path, *, links: bool = False) -> None:
         self.folder, self.links = folder, links
         self.names: set[str] = {CASE_FILE}
-        if not _is_folder(folder):
+        if not os.path.isdir(folder):  # False for what may not be looked into, where Path raises
             expected = f"a folder with a {CASE_FILE}"
             raise InputError("folder does not exist", file=folder, expected=expected)
         if not os.path.lexists(self.case_file):
@@ -94,10 +94,3 @@ class CaseFiles:
                 except OSError as error:
                     raise reading.unreadable(path, error) from None
         return total.hexdigest()
-
-
-def _is_folder(path: Path) -> bool:
-    try:
-        return path.is_dir()
-    except (OSError, ValueError):  # a name that is too long, a folder that may not be entered
-        return False

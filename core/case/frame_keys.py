@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields, replace
-from functools import partial
+from dataclasses import MISSING, astuple, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -17,16 +16,15 @@ from femubench.core.case.frame_tables import FrameTables
 from femubench.core.case.frames import CONSTANTS, section_of
 from femubench.core.case.schema import FrameSpec, MaterialSpec, MemberSpec, SectionSpec
 from femubench.core.errors import InputError
-from femubench.core.fem.frame import Factor, Frame, Member, Place, Plane, RigidEnd
+from femubench.core.fem.frame import Factor, Frame, Place, Plane, RigidEnd
 from femubench.core.fem.nominal import MAY_VANISH
-from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import (
     SHAPES,
+    BoxKappa,
+    CircleKappa,
     Section,
     ShearCoefficients,
-    constant_kappa,
-    rectangular_tube,
-    round_tube,
+    wall_of,
 )
 from femubench.core.fem.structure import Structure
 from femubench.core.files import read_text
@@ -79,7 +77,10 @@ def named_tables(
         tables: what the names meant before.
         plain: a name for what never had one.
     """
-    found = [_known_name(content, own.get(member), tables) for member, content in contents]
+    found: list[str | None] = []
+    for member, content in contents:
+        alike = [name for name, table in tables.items() if table == content]
+        found.append(own[member] if own.get(member) in alike else next(iter(alike), None))
     bases = [own.get(member, plain) for member, _ in contents]
     pairs = {(base, tuple(c.items())) for base, (_, c) in zip(bases, contents, strict=True)}
     taken = {name for name in found if name is not None}
@@ -102,15 +103,6 @@ def named_tables(
     return names, result
 
 
-def _known_name(content: Keys, own: str | None, tables: Mapping[str, Keys]) -> str | None:
-    if own is not None and tables.get(own) == content:
-        return own
-    return next((name for name, table in tables.items() if table == content), None)
-
-
-_Factors = dict[tuple[str, str], float]
-
-
 def described_frame(structure: Structure) -> Frame:
     """Return the frame with all parameter changes turned into factors, joint springs, rigid ends.
 
@@ -118,64 +110,44 @@ def described_frame(structure: Structure) -> Frame:
         BadKey: for a value that no key of a frame can have.
     """
     frame = structure.frame
-    factors: _Factors = {}
-    for parameter, value in structure.changes:
-        if not np.isfinite(value):
-            raise _refused(parameter, value)
-        if parameter.quantity == "spring":
-            frame = _with_springs(frame, parameter, value)
-        elif parameter.quantity == "rigid":
-            frame = _with_rigid_ends(frame, parameter, value)
-        else:
-            possible = value > 0.0 or (value == 0.0 and parameter.quantity in MAY_VANISH)
-            if not possible or "" in parameter.places:
-                raise _refused(parameter, value)
-            for place in dict.fromkeys(parameter.places):
-                key = parameter.quantity, place
-                factors[key] = factors.get(key, 1.0) * value
-    return replace(frame, factors=(*frame.factors, *_written(structure, factors)))
-
-
-def _refused(parameter: Property, value: float) -> BadKey:
-    what = f"{parameter.name} = {value:g} cannot be written as a key of a frame"
-    expected = "values > 0 of factors, >= 0 of springs, on members of the frame"
-    return BadKey(("model",), what, expected)
-
-
-def _with_springs(frame: Frame, parameter: Property, value: float) -> Frame:
-    if value < 0.0:
-        raise _refused(parameter, value)
-    springs = list(frame.joint_springs)
-    for place in parameter.places:
-        end, _, direction = place.rpartition(":")
-        for i, spring in enumerate(springs):
-            if f"{spring.member}@{spring.joint}" == end:
-                stiffness = {**spring.stiffness, direction: value}
-                springs[i] = replace(spring, stiffness=stiffness)
-    return replace(frame, joint_springs=tuple(springs))
-
-
-def _with_rigid_ends(frame: Frame, parameter: Property, value: float) -> Frame:
+    springs = {f"{s.member}@{s.joint}": s for s in frame.joint_springs}
     ends = {f"{end.member}@{end.joint}": end for end in frame.rigid_ends}
-    for place in parameter.places:
-        member, _, joint = place.rpartition("@")
-        old = ends.get(place, RigidEnd(joint, member, 0.0))
-        ends[place] = replace(old, stiffness_length=value)
-    return replace(frame, rigid_ends=tuple(ends.values()))
-
-
-def _written(structure: Structure, factors: _Factors) -> tuple[Factor, ...]:
+    factors: dict[tuple[str, str], float] = {}
+    for parameter, value in structure.changes:
+        quantity, places = parameter.quantity, parameter.places
+        possible = value > 0.0 or (value == 0.0 and quantity in (*MAY_VANISH, "spring"))
+        if not np.isfinite(value) or not (possible or quantity == "rigid") or "" in places:
+            what = f"{parameter.name} = {value:g} cannot be written as a key of a frame"
+            expected = "values > 0 of factors, >= 0 of springs, on members of the frame"
+            raise BadKey(("model",), what, expected)
+        for place in dict.fromkeys(places):
+            if quantity == "spring":
+                end, _, direction = place.rpartition(":")
+                stiffness = {**springs[end].stiffness, direction: value}
+                springs[end] = replace(springs[end], stiffness=stiffness)
+            elif quantity == "rigid":
+                member, _, joint = place.rpartition("@")
+                old = ends.get(place, RigidEnd(joint, member, 0.0))
+                ends[place] = replace(old, stiffness_length=value)
+            else:
+                factors[quantity, place] = factors.get((quantity, place), 1.0) * value
     groups: dict[tuple[str, float], list[str]] = {}
     for (quantity, place), factor in factors.items():
         if factor != 1.0:
             groups.setdefault((quantity, factor), []).append(place)
-    return tuple(
-        Factor(quantity, _shortened(structure, places), factor)
+    written = (
+        Factor(quantity, _shorten(structure, places), factor)
         for (quantity, factor), places in groups.items()
+    )
+    return replace(
+        frame,
+        joint_springs=tuple(springs.values()),
+        rigid_ends=tuple(ends.values()),
+        factors=(*frame.factors, *written),
     )
 
 
-def _shortened(structure: Structure, places: Sequence[str]) -> tuple[str, ...]:
+def _shorten(structure: Structure, places: Sequence[str]) -> tuple[str, ...]:
     """Return ``all`` for every element of the frame, a member's name for all elements of it."""
     rest = dict.fromkeys(places)
     short: list[str] = []
@@ -210,7 +182,12 @@ def frame_keys(frame: Frame, known: Known) -> Keys:
         name = own.get(member.name, "")
         key = id(member.section), member.material.nu, name
         if key not in seen:
-            seen[key] = _section_keys(member, frame.plane, known.sections.get(name))
+            hint = known.sections.get(name)
+            try:
+                seen[key] = section_keys(member.section, member.material.nu, frame.plane, hint)
+            except BadKey as fault:
+                what = f"member {member.name!r}: {fault.what}"
+                raise BadKey(("model", "sections"), what, fault.expected) from None
         contents.append((member.name, seen[key]))
     tables = {}
     for name, spec in known.sections.items():
@@ -271,14 +248,6 @@ def _plain(value: object) -> Any:  # noqa: ANN401 - what TOML can hold
     return float(value) if isinstance(value, (int, float, np.number)) else keys_of(value)
 
 
-def _section_keys(member: Member, plane: Plane, hint: SectionSpec | None) -> Keys:
-    try:
-        return section_keys(member.section, member.material.nu, plane, hint)
-    except BadKey as fault:
-        what = f"member {member.name!r}: {fault.what}"
-        raise BadKey(("model", "sections"), what, fault.expected) from None
-
-
 def section_keys(section: Section, nu: float, plane: Plane, hint: SectionSpec | None) -> Keys:
     """Return the table of a section: its shape with what differs from it, or numbers.
 
@@ -292,12 +261,16 @@ def section_keys(section: Section, nu: float, plane: Plane, hint: SectionSpec | 
         BadKey: when the shear coefficients of a frame in 3d differ in a way that no shape has.
     """
     best, least = None, np.inf
-    for shape, sizes in (*_hinted(hint), *_recovered(section)):
+    candidates = list(_recover_sizes(section))
+    if hint is not None and hint.shape is not None and hint.shape in SHAPES:
+        sizes = {key: getattr(hint, key) for key in SHAPES[hint.shape][1]}
+        candidates[:0] = [] if None in sizes.values() else [(hint.shape, sizes)]
+    for shape, sizes in candidates:
         made = SHAPES[shape][0](**sizes)
         if (made.shape, made.width, made.height) != (section.shape, section.width, section.height):
             continue
-        differ = {key: _number(section, key) for key in CONSTANTS}
-        differ = {key: value for key, value in differ.items() if value != _number(made, key)}
+        differ = {key: float(getattr(section, key)) for key in CONSTANTS}
+        differ = {key: value for key, value in differ.items() if value != getattr(made, key)}
         gap = _kappa_gap(made.kappa, section.kappa)
         if section.kappa is not None and gap > _SAME_KAPPA:
             differ["kappa"] = _kappa(section.kappa, nu, plane)
@@ -309,25 +282,13 @@ def section_keys(section: Section, nu: float, plane: Plane, hint: SectionSpec | 
             break
     if best is not None:
         return best
-    numbers: Keys = {key: _number(section, key) for key in CONSTANTS}
+    numbers: Keys = {key: float(getattr(section, key)) for key in CONSTANTS}
     if section.kappa is not None:
         numbers["kappa"] = _kappa(section.kappa, nu, plane)
     return {key: value for key, value in numbers.items() if value != 0.0}
 
 
-def _number(section: Section, key: str) -> float:
-    return float(getattr(section, key))
-
-
-def _hinted(hint: SectionSpec | None) -> Iterator[tuple[str, dict[str, float]]]:
-    shape = None if hint is None else hint.shape
-    if shape is not None and shape in SHAPES:
-        sizes = {key: getattr(hint, key) for key in SHAPES[shape][1]}
-        if None not in sizes.values():
-            yield shape, sizes
-
-
-def _recovered(section: Section) -> Iterator[tuple[str, dict[str, float]]]:
+def _recover_sizes(section: Section) -> Iterator[tuple[str, dict[str, float]]]:
     """Yield shapes with sizes that the section may come from, short numbers first."""
     width, height = section.width, section.height
     if width is None or height is None:
@@ -350,50 +311,34 @@ def _recovered(section: Section) -> Iterator[tuple[str, dict[str, float]]]:
 
 def _walls(section: Section, width: float, height: float) -> Iterator[float]:
     """Yield wall thicknesses that the shear coefficient or the area of a tube tells of."""
-    for wall in (*_walls_of_kappa(section, width, height), _wall_of_area(section, width, height)):
+    walls, kappa = [wall_of(section)], section.kappa
+    if isinstance(kappa, BoxKappa):
+        # It knows the centre-line sizes; the wall is what both of them round from.
+        pairs = [(width, kappa.b), (height, kappa.h)]
+        low = max(outer - line - np.spacing(line) / 2 for outer, line in pairs)
+        high = min(outer - line + np.spacing(line) / 2 for outer, line in pairs)
+        walls[:0] = [(low + high) / 2, low, high]
+    elif isinstance(kappa, CircleKappa):
+        walls[:0] = [(1.0 - kappa.ratio) * width / 2]
+    for wall in walls:
         for digits in range(3, 18):
             rounded = float(f"{wall:.{digits}g}")
-            if 0.0 < rounded < min(width, height) / 2:  # nan compares false
+            if 0.0 < rounded < min(width, height) / 2:
                 yield rounded
 
 
-def _walls_of_kappa(section: Section, width: float, height: float) -> Iterator[float]:
-    kappa, wall = section.kappa, min(width, height) / 4
-    box, ring = rectangular_tube(width, height, wall).kappa, round_tube(width, wall).kappa
-    if not isinstance(kappa, partial):
-        return
-    if isinstance(box, partial) and kappa.func is box.func:
-        # It knows the centre-line sizes; the wall is what both of them round from.
-        pairs = [(width, kappa.args[0]), (height, kappa.args[1])]
-        low = max(outer - line - np.spacing(line) / 2 for outer, line in pairs)
-        high = min(outer - line + np.spacing(line) / 2 for outer, line in pairs)
-        yield from (float((low + high) / 2), float(low), float(high))
-    elif isinstance(ring, partial) and kappa.func is ring.func:
-        yield float((1.0 - kappa.args[0]) * width / 2)  # inner over outer radius
-
-
-def _wall_of_area(section: Section, width: float, height: float) -> float:
-    with np.errstate(invalid="ignore"):
-        if section.shape == "round-tube":
-            return float(width / 2 - np.sqrt(width**2 / 4 - section.A / np.pi))
-        return float((width + height - np.sqrt((width + height) ** 2 - 4 * section.A)) / 4)
-
-
 def _kappa_gap(one: ShearCoefficients | None, other: ShearCoefficients | None) -> float:
-    """Return how far two shear coefficients are apart: `partial` objects are never equal."""
+    """Return how far the shear coefficients of two sections of one shape are apart, relative."""
     if one is other:
         return 0.0
-    if not (isinstance(one, partial) and isinstance(other, partial) and one.func is other.func):
+    if not (isinstance(one, BoxKappa | CircleKappa) and type(one) is type(other)):
         return float("inf")
-    apart = np.array(one.args) - np.array(other.args)
-    return float(np.abs(apart).max(initial=0.0) / max(np.abs(one.args).max(initial=0.0), 1e-300))
+    sizes, others = np.array(astuple(one)), np.array(astuple(other))
+    return float(np.abs(sizes - others).max() / max(np.abs(sizes).max(), 1e-300))
 
 
 def _kappa(kappa: ShearCoefficients, nu: float, plane: Plane) -> float:
     """Return the shear coefficient as the one number that a table can hold."""
-    constant = constant_kappa(1.0)
-    if isinstance(kappa, partial) and isinstance(constant, partial) and kappa.func is constant.func:
-        return float(kappa.args[0])
     along_y, along_z = kappa(nu)
     if plane == "3d" and along_y != along_z:
         what = f"shear coefficients {along_y:g} along y and {along_z:g} along z cannot be written"

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from femubench.core.case.checks import check_frame
 from femubench.core.case.faults import BadKey, Misfit, WrongDirection, at_key
+from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.schema import FrameSpec, SectionSpec, TomlTable
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import (
@@ -103,33 +104,8 @@ def _from_numbers(spec: SectionSpec, plane: Plane) -> Section:
     return Section(**dict.fromkeys(CONSTANTS, 0.0) | given)
 
 
-class Site(Protocol):
-    """A structure on which places and directions can be checked; every method raises Misfit."""
-
-    def point(self, place: Place) -> Vector:
-        """Return where a place lies in m."""
-        ...
-
-    def check_direction(self, place: Place, direction: str) -> None:
-        """Check that something may act in a direction there."""
-        ...
-
-    def check_sensor(self, xyz: Vector, direction: str) -> None:
-        """Check that a point lies on the structure and can be measured in a direction."""
-        ...
-
-    @property
-    def points(self) -> FloatArray:
-        """Return what the size of the structure is told from, in m, (k, 3)."""
-        ...
-
-    def nearest(self, xyz: FloatArray) -> list[tuple[str, FloatArray]]:
-        """Return the place of the structure nearest to every point, by name, and where it is."""
-        ...
-
-
 class FrameSite:
-    """The site of a frame: joints, and stations of members."""
+    """The site of a frame: joints, and stations of members; checks raise Misfit."""
 
     def __init__(self, frame: Frame) -> None:
         self.frame = frame
@@ -177,6 +153,8 @@ class FrameSite:
         return [nearest_place(self.frame, point) for point in xyz]
 
 
+# A structure on which places and directions can be checked.
+Site: TypeAlias = FrameSite | MatrixGeometry
 # The tables of `[model]` bear the names of the frame's lists, their keys those of its fields.
 _PARTS: dict[str, type] = {
     "joints": Joint,

@@ -59,13 +59,9 @@ class MatrixGeometry:
         return dict(zip(self.names, self.dofs.xyz[first], strict=True))
 
     @cached_property
-    def _points(self) -> FloatArray:
-        return np.array(list(self.places.values()))
-
-    @cached_property
     def points(self) -> FloatArray:
-        """Return what the size of the structure is told from, in m, (k, 3)."""
-        return self._points
+        """Return where the nodes are in m, (k, 3)."""
+        return np.array(list(self.places.values()))
 
     def nearest(self, xyz: FloatArray) -> list[tuple[str, FloatArray]]:
         """Return the nearest node of every point, by name, and where it is in m.
@@ -73,8 +69,8 @@ class MatrixGeometry:
         Arguments:
             xyz: in m, (k, 3).
         """
-        found = cKDTree(self._points).query(xyz)[1]
-        return [(self.names[i], self._points[i]) for i in np.atleast_1d(found)]
+        found = cKDTree(self.points).query(xyz)[1]
+        return [(self.names[i], self.points[i]) for i in np.atleast_1d(found)]
 
     def node(self, place: Place) -> str:
         """Return the node of a place; raises Misfit."""
@@ -105,7 +101,7 @@ class MatrixGeometry:
 
     def near(self, xyz: Vector | FloatArray) -> list[tuple[str, float]]:
         """Return the nodes within 1e-6 m of a point with their distances."""
-        gaps = np.linalg.norm(self._points - np.array(xyz), axis=1)
+        gaps = np.linalg.norm(self.points - np.array(xyz), axis=1)
         return [(self.names[i], float(gaps[i])) for i in np.flatnonzero(gaps <= ON_MEMBER)]
 
     def row_at(self, xyz: FloatArray, direction: str) -> int:

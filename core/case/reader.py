@@ -118,7 +118,10 @@ class _Building:
         )
         measurement = self.measurement(site)
         info = self.spec.case
-        case = Case(
+        modifications = self.modifications(model, site, measurement.sensors)
+        reference = self.reference(site, measurement.sensors)
+        frfs = self.frfs(measurement.sensors)
+        return Case(
             name=info.name if name is None else name,
             title=info.title or info.name,
             source=info.source,
@@ -127,18 +130,15 @@ class _Building:
             measurement=measurement,
             used=self.spec.measurement.used,
             held_out=self.spec.measurement.held_out,
-            modifications=self.modifications(model, site, measurement.sensors),
+            modifications=modifications,
             band=self.spec.measurement.band,
             tolerance=self.spec.diagnosis.tolerance,
-            reference=self.reference(site, measurement.sensors),
+            reference=reference,
             reference_used=self.reference_used,
             model_error=self.spec.diagnosis.model_error,
             beam_share=self.spec.diagnosis.beam_share,
             structure=info.structure,
-            frfs=self.frfs(measurement.sensors),
-        )
-        return replace(
-            case,
+            frfs=frfs,
             digest=self.files.digest(),  # of all that was read
             notes=tuple(self.notes),
             matches=self.matches,
@@ -181,10 +181,8 @@ class _Building:
             known = [".csv", *(suffix for r in self.readers for suffix in r.suffixes)]
             raise BadKey(key, f"unknown kind of file {name!r}", ", ".join(known))
         if path not in self.readings:
-            names, named = (
-                self.spec.measurement.variables,
-                getattr(reader, "read_named_modes", None),
-            )
+            names = self.spec.measurement.variables
+            named = getattr(reader, "read_named_modes", None)
             if names and named is None:
                 path_of = ("measurement", "variables")
                 raise BadKey(path_of, f"{reader.name} has no variables", "no such key")

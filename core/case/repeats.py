@@ -34,8 +34,9 @@ def with_repeats(measurement: Measurement, file: Path) -> tuple[Measurement, tup
     """
     table = read_table(file)
     columns = _columns(table, measurement, ("repeat",))
+    expected = "a number > 0 in Hz, or nothing"
     rows = [
-        [row.number(name, "a number > 0 in Hz, or nothing", _positive) for name in columns]
+        [row.number(name, expected, lambda v: SMALLEST <= v <= LARGEST) for name in columns]
         for row in table.rows
     ]
     cells = np.array(rows, dtype=float).reshape(len(rows), len(columns))
@@ -90,10 +91,6 @@ def with_covariance(measurement: Measurement, file: Path) -> Measurement:
     own = measurement.frequency_std[places]
     std = np.where(np.abs(std - own) <= _SAME_STD * own, own, std)
     return _with(measurement, places, measurement.frequencies[places], std, correlation)
-
-
-def _positive(value: float) -> bool:
-    return SMALLEST <= value <= LARGEST
 
 
 def _columns(table: CsvTable, measurement: Measurement, other: tuple[str, ...]) -> dict[str, int]:

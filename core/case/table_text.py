@@ -158,7 +158,9 @@ def _nested(value: Any, depth: int) -> Item:  # noqa: ANN401 - plain data
         for entry in value:
             entries.append(_table(entry, 0))
         return entries
-    return _inline(value)
+    # In an array, tables stand on one line.
+    item: Item = tomlkit.item(value, _parent=tomlkit.array())
+    return item
 
 
 def _table(keys: Keys, depth: int) -> Table:
@@ -166,18 +168,3 @@ def _table(keys: Keys, depth: int) -> Table:
     for key, value in keys.items():
         table.add(key, _nested(value, depth))
     return table
-
-
-def _inline(value: Any) -> Item:  # noqa: ANN401 - plain data
-    if isinstance(value, dict):
-        inline = tomlkit.inline_table()
-        for key, entry in value.items():
-            inline.append(key, _inline(entry))
-        return inline
-    if isinstance(value, list):
-        array = tomlkit.array()
-        for entry in value:
-            array.append(_inline(entry))
-        return array
-    item: Item = tomlkit.item(value)
-    return item

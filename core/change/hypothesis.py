@@ -13,7 +13,13 @@ import scipy.linalg as la
 from femubench.core.change.change import Change
 from femubench.core.change.tabulated import change_of, placed_change
 from femubench.core.fem.model import Model
-from femubench.core.modal.eigen import enough_modes, modes_of, once_for, zero_tolerance
+from femubench.core.modal.eigen import (
+    cached_by_model,
+    enough_modes,
+    modes_of,
+    once_for,
+    zero_tolerance,
+)
 from femubench.core.modal.generalised_mass import mass_normalised
 from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.roles import Effect, EffectParameter
@@ -238,7 +244,7 @@ def _hypotheses(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ..
 
 def _holds(model: Model, hypothesis: Hypothesis) -> bool:
     """Tell whether an effect makes it cost energy to move a model as a rigid body."""
-    rigid, least = once_for(model, "rigid motions", lambda: _rigid_motions(model))
+    rigid, least = _rigid_motions(model)
     extra, count = hypothesis.change.extra, rigid.shape[1]
     vectors = np.asarray(la.block_diag(rigid, np.eye(extra))) if extra else rigid
     energy = np.zeros((count + extra, count + extra))
@@ -251,6 +257,7 @@ def _holds(model: Model, hypothesis: Hypothesis) -> bool:
     return bool(np.abs(body).max(initial=0.0) > least)
 
 
+@cached_by_model
 def _rigid_motions(model: Model) -> tuple[FloatArray, float]:
     """Return the motions of a model as a rigid body, mass-normalised, and an energy like none."""
     modes = modes_of(model, enough_modes(model, 1))

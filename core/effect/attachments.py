@@ -17,8 +17,8 @@ from femubench.core.fem.kinematics import node_at, point_rows
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import DIRECTIONS
-from femubench.core.modal.eigen import modes_of, once_for as once_for
-from femubench.core.modal.rigid import rigid_body_vectors
+from femubench.core.modal.eigen import cached_by_model, modes_of
+from femubench.core.modal.rigid import mass_orthonormal, rigid_body_vectors, rigid_share
 from femubench.core.typing import FloatArray, SparseArray
 
 TRANSLATIONS = ("x", "y", "z")
@@ -84,6 +84,7 @@ def directed_places(model: Model, points: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"{p}:{d}" for p in points for d in free_translations(model, point_in(model, p)))
 
 
+@cached_by_model
 def point_motion(model: Model, at: Place) -> SparseArray:
     """Return the displacement and rotation of a point from the dofs, sparse (6, n).
 
@@ -99,22 +100,13 @@ def point_motion(model: Model, at: Place) -> SparseArray:
         >>> effect.point_motion(model, fem.Place(joint="J1")).shape
         (6, 81)
     """
-    return once_for(model, ("motion", at), lambda: _point_motion(model, at))
-
-
-def _point_motion(model: Model, at: Place) -> SparseArray:
-    structure = model.structure
-    if structure is None:
-        return _node_motion(model, at)
-    mesh, transform = structure.mesh, structure.kinematics.transform
-    node = node_at(structure.frame, mesh, at)
-    if node is not None:
-        return transform[6 * node : 6 * node + 6]
-    return point_rows(structure.frame, mesh, structure.properties, at) @ transform
-
-
-def _node_motion(model: Model, at: Place) -> SparseArray:
-    geometry = model.geometry
+    structure, geometry = model.structure, model.geometry
+    if structure is not None:
+        mesh, transform = structure.mesh, structure.kinematics.transform
+        node = node_at(structure.frame, mesh, at)
+        if node is not None:
+            return transform[6 * node : 6 * node + 6]
+        return point_rows(structure.frame, mesh, structure.properties, at) @ transform
     if not isinstance(geometry, MatrixGeometry) or at.joint not in geometry.places:
         raise ModelError(f"there is no node {str(at)!r}")
     found = [(i, geometry.rows.get((str(at.joint), d))) for i, d in enumerate(DIRECTIONS)]
@@ -123,6 +115,7 @@ def _node_motion(model: Model, at: Place) -> SparseArray:
     return sp.csr_array((np.ones(len(entries)), index), shape=(6, model.size))
 
 
+@cached_by_model
 def free_translations(model: Model, at: Place) -> tuple[str, ...]:
     """Return the global directions in which a point can move, of x, y, z.
 
@@ -133,10 +126,6 @@ def free_translations(model: Model, at: Place) -> tuple[str, ...]:
         >>> effect.free_translations(model, fem.Place(joint="J1"))
         ('z',)
     """
-    return once_for(model, ("free", at), lambda: _free_translations(model, at))
-
-
-def _free_translations(model: Model, at: Place) -> tuple[str, ...]:
     structure, motion = model.structure, point_motion(model, at)
     active = TRANSLATIONS if structure is None else ACTIVE[structure.frame.plane]
     spans = pairwise(motion.indptr[:4])
@@ -228,6 +217,7 @@ def total_mass(model: Model) -> float:
     return model.total_mass
 
 
+@cached_by_model
 def elastic_band(model: Model) -> FloatArray:
     """Return the lowest six elastic natural frequencies in Hz, fewer where there are fewer.
 
@@ -238,23 +228,12 @@ def elastic_band(model: Model) -> FloatArray:
         >>> print(effect.elastic_band(model).round())
         [ 256.  278.  581.  911. 1049. 1318.]
     """
-    return once_for(model, "band", lambda: _elastic_band(model))
-
-
-def _elastic_band(model: Model) -> FloatArray:
     modes = modes_of(model, _BAND + _RIGID).elastic
     frequencies = modes.natural_frequencies
     # On a soft suspension the structure still moves as a rigid body: no scale to go by.
-    bodily = _rigid_share(model, modes.shapes) > _SUSPENDED
+    rigid = mass_orthonormal(model, rigid_body_vectors(model.dofs))
+    bodily = rigid_share(model, modes.shapes, rigid) > _SUSPENDED
     for chosen in (frequencies[(frequencies > 0.0) & ~bodily], frequencies[frequencies > 0.0]):
         if len(chosen):
             return np.asarray(chosen[:_BAND])
     raise ModelError("the model has no elastic mode")
-
-
-def _rigid_share(model: Model, shapes: FloatArray) -> FloatArray:
-    """Return the share of each shape's kinetic energy that moves the model as a body, (m,)."""
-    rigid = rigid_body_vectors(model.dofs)
-    inertia = rigid.T @ model.mass_times(rigid)
-    seen = rigid.T @ model.mass_times(shapes)
-    return np.asarray(np.einsum("rm,rm->m", seen, np.linalg.pinv(inertia, hermitian=True) @ seen))

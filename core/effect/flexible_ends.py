@@ -17,13 +17,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
 from femubench.core.change.change import Change
 from femubench.core.change.interpolation import barycentric, chebyshev_nodes
 from femubench.core.change.terms import ElementOperator, RowOperator, Term
-from femubench.core.effect.attachments import once_for
 from femubench.core.effect.places import member_length
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices
 from femubench.core.fem.frame import Frame
@@ -32,6 +32,7 @@ from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.fem.structure import Structure
+from femubench.core.modal.eigen import once_for
 from femubench.core.typing import FloatArray, IntArray
 
 _MOST = 24
@@ -69,8 +70,13 @@ def rate_nodes(rates: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.exp(points), barycentric(points, np.log(rates))
 
 
-_Key = tuple[int, float, float]
 _Parts = tuple[FloatArray, FloatArray, FloatArray]
+# The matrix of every block of an element, and the power of tau that it comes with.
+_POWERS: tuple[tuple[Literal["mass", "stiffness"], int], ...] = (
+    ("stiffness", 1),
+    ("mass", 1),
+    ("mass", 2),
+)
 _EMPTY = 1e-12
 _ALIKE = 1e-9
 
@@ -206,33 +212,33 @@ def flexible_ends_change(
         length = once_for(model, ("arm", end), partial(end_arm, structure, end))
         arms[np.searchsorted(rows, element), side] = arm * length
     elements = _Elements.of(model, rows, arms)
-    terms, rates, powers, where = elements.arm_terms(model), [], [], []
-    fixed = len(terms)
+    arm_terms, terms, sprung = elements.arm_terms(model), [], []
+    # Of every term the rate and the power of tau, or the stiffness of the springs, and its value.
+    rates: list[tuple[float, int, int]] = []
+    present: list[tuple[float, int]] = []
     for column, directions in enumerate(parts):
         items = elements.items(_slots(structure, ends, directions))
         nodes, weights = rate_nodes(np.array([item.rate for item in items]))
         for node, weight in zip(nodes, weights.T, strict=True):
-            for term, power in _node_terms(structure, items, weight):
-                terms.append(term)
-                rates.append(float(node))
-                powers.append(power)
-                where.append(column)
-    series = [
-        (*found, column)
-        for column, directions in enumerate(parts)
-        for found in _series_terms(structure, ends, directions)
-    ]
-    rate, power_of, taken = np.array(rates), np.array(powers), np.array(where, dtype=np.int64)
-    present = np.array([stiffness for _, stiffness, _ in series])
-    beside = np.array([column for _, _, column in series], dtype=np.int64)
+            used = [int(i) for i in np.flatnonzero(weight)]
+            own = np.array([items[i].row for i in used], dtype=np.int64)
+            for kind, (matrix, power) in enumerate(_POWERS):
+                blocks = np.array([weight[i] * items[i].blocks[kind] for i in used])
+                terms.append(Term(matrix, ElementOperator(structure, own, blocks)))
+                rates.append((float(node), power, column))
+        for term, stiffness in _series_terms(structure, ends, directions):
+            sprung.append(term)
+            present.append((stiffness, column))
+    rate, power_of, taken = np.array(rates).reshape(-1, 3).T
+    there, beside = np.array(present).reshape(-1, 2).T
 
     def coefficients(values: FloatArray) -> FloatArray:
-        arm = np.ones((len(values), fixed))
-        share = (rate / (rate + values[:, taken])) ** power_of
-        softer = -(present**2) / (present + values[:, beside])
+        arm = np.ones((len(values), len(arm_terms)))
+        share = (rate / (rate + values[:, taken.astype(int)])) ** power_of
+        softer = -(there**2) / (there + values[:, beside.astype(int)])
         return np.hstack([arm, share, softer])
 
-    return Change((*terms, *(term for term, _, _ in series)), coefficients)
+    return Change((*arm_terms, *terms, *sprung), coefficients)
 
 
 def _slots(
@@ -269,7 +275,9 @@ class _Elements:
     def of(cls, model: Model, rows: IntArray, arms: FloatArray) -> _Elements:
         """Return elements of a model, each with given arms made once for all who ask."""
         keys = [(int(row), float(a), float(b)) for row, (a, b) in zip(rows, arms, strict=True)]
-        known: dict[_Key, _Parts] = once_for(model, "elements behind arms", dict)
+        known: dict[tuple[int, float, float], _Parts] = once_for(
+            model, "elements behind arms", dict
+        )
         fresh = [i for i, key in enumerate(keys) if key not in known]
         if fresh:
             made = _behind_arms(model.frame_structure, rows[fresh], arms[fresh])
@@ -335,22 +343,6 @@ def _element_items(
         )
         items.append(_Item(row, float(own), blocks))
     return items
-
-
-def _node_terms(
-    structure: Structure, items: Sequence[_Item], weight: FloatArray
-) -> list[tuple[Term, int]]:
-    """Return the terms of one rate with the power of tau that they come with."""
-    used = [int(i) for i in np.flatnonzero(weight)]
-    elements = np.array([items[i].row for i in used], dtype=np.int64)
-    stiffness, linear, square = (
-        np.array([weight[i] * items[i].blocks[kind] for i in used]) for kind in range(3)
-    )
-    return [
-        (Term("stiffness", ElementOperator(structure, elements, stiffness)), 1),
-        (Term("mass", ElementOperator(structure, elements, linear)), 1),
-        (Term("mass", ElementOperator(structure, elements, square)), 2),
-    ]
 
 
 def _series_terms(

@@ -23,11 +23,12 @@ from scipy.sparse.csgraph import connected_components
 
 from femubench.core.change.change import Change
 from femubench.core.change.terms import RowOperator, Term
-from femubench.core.effect.attachments import once_for, point_motion
+from femubench.core.effect.attachments import point_motion
 from femubench.core.effect.places import point_of, supports_of
 from femubench.core.fem.frame import Frame, GroundSpring
 from femubench.core.fem.model import Model, common_dofs
 from femubench.core.fem.sensors import DIRECTIONS
+from femubench.core.modal.eigen import cached_by_model
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 Held = tuple[str, str]  # the word of a support, and a direction that it holds
@@ -110,7 +111,7 @@ def _condensed(model: Model, held: Sequence[Held], columns: Sequence[int]) -> Ch
     """Return what springs under fixed dofs do."""
     if not held:
         return Change((), lambda values: np.zeros((len(values), 0)))
-    stiffness, mass, own = once_for(model, "released supports", lambda: _released(model))
+    stiffness, mass, own = _release_supports(model)
     free = np.array([own[one] for one in held], dtype=np.int64)
     inner, inertia = (m[free][:, free].toarray() for m in (stiffness, mass))
     rows = sp.csr_array(sp.vstack([m[free, : model.size] for m in (stiffness, mass)]))
@@ -133,7 +134,8 @@ def _condensed(model: Model, held: Sequence[Held], columns: Sequence[int]) -> Ch
     return Change(tuple(terms), coefficients)
 
 
-def _released(model: Model) -> tuple[SparseArray, SparseArray, dict[Held, int]]:
+@cached_by_model
+def _release_supports(model: Model) -> tuple[SparseArray, SparseArray, dict[Held, int]]:
     """Return stiffness and mass with the dofs of all supports behind the free ones, and which."""
     structure = model.frame_structure
     listed = supports_of(structure.frame, "support:all").items()

@@ -14,7 +14,7 @@ from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Place
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.model import Model
-from femubench.core.modal.eigen import once_for
+from femubench.core.modal.eigen import cached_by_model
 from femubench.core.typing import FloatArray
 
 _MOST = 300  # pairs
@@ -29,6 +29,7 @@ def _nodes(model: Model) -> dict[str, FloatArray]:
     return model.geometry.places if isinstance(model.geometry, MatrixGeometry) else {}
 
 
+@cached_by_model
 def facing_nodes(model: Model) -> tuple[Pair, ...]:
     """Return the pairs of joints or nodes that share a place, 300 at most.
 
@@ -38,12 +39,8 @@ def facing_nodes(model: Model) -> tuple[Pair, ...]:
         >>> effect.facing_nodes(model)
         ()
     """
-    return once_for(model, "facing nodes", lambda: _facing(_nodes(model)))
-
-
-def _facing(nodes: dict[str, FloatArray]) -> tuple[Pair, ...]:
     at: dict[tuple[float, ...], list[str]] = {}
-    for name, xyz in nodes.items():
+    for name, xyz in _nodes(model).items():
         at.setdefault(tuple(np.round(xyz / ON_MEMBER).tolist()), []).append(name)
     pairs = [pair for names in at.values() for pair in pairwise(names)]
     return tuple(pairs[:_MOST])

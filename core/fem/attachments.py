@@ -1,4 +1,4 @@
-"""Braces and oscillators: springs between two points, and masses that hang on one."""
+"""Braces, oscillators, and the stiffness of a meshed frame with all of its springs."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
+from femubench.core.fem.beam import stiffness_matrices
 from femubench.core.fem.frame import ACTIVE, Frame
 from femubench.core.fem.kinematics import point_rows
 from femubench.core.fem.meshed_frame import MeshedFrame
@@ -83,11 +84,26 @@ def brace_rows(structure: MeshedFrame) -> SparseArray:
     return sp.csr_array((unit.ravel(), place), shape=(count, 3 * count)) @ brace_motion(structure)
 
 
-def brace_stiffness(structure: MeshedFrame) -> SparseArray:
-    """Return the stiffness of the braces, (n, n)."""
-    rows = brace_rows(structure)
-    stiffness = np.array([brace.stiffness for brace in structure.frame.braces], dtype=float)
-    return rows.T @ sp.diags_array(stiffness) @ rows
+def elastic_stiffness(structure: MeshedFrame) -> SparseArray:
+    """Return the stiffness of elements, joint springs, springs to ground and braces, (n, n)."""
+    properties = structure.properties
+    stiffness = structure.plan.assemble_from(lambda e: stiffness_matrices(properties.take(e)))
+    if len(structure.springs):
+        rows = structure.spring_rows
+        each = rows.data * np.repeat(structure.springs, np.diff(rows.indptr))
+        pull = sp.csr_array((each, rows.indices, rows.indptr), shape=rows.shape)
+        stiffness = stiffness + pull.T @ rows
+    if structure.frame.springs:
+        stiffness = stiffness + structure.once(
+            "springs",
+            structure.interpolation,
+            lambda: structure.attached((), structure.frame.springs)[1],
+        )
+    if structure.frame.braces:
+        rows = brace_rows(structure)
+        each = np.array([brace.stiffness for brace in structure.frame.braces], dtype=float)
+        stiffness = stiffness + rows.T @ sp.diags_array(each) @ rows
+    return stiffness
 
 
 def oscillator_matrices(structure: MeshedFrame) -> tuple[SparseArray, SparseArray]:

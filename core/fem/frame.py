@@ -297,10 +297,6 @@ class Frame:
         return float(self.beam == "timoshenko" if share is None else share)
 
     @cached_property
-    def _joints(self) -> Mapping[str, Joint]:
-        return {joint.name: joint for joint in self.joints}
-
-    @cached_property
     def joint_index(self) -> Mapping[str, int]:
         """Return the position of every joint in `joints`."""
         return {joint.name: i for i, joint in enumerate(self.joints)}
@@ -350,7 +346,7 @@ class Frame:
 
     def joint(self, name: str) -> Joint:
         """Return the joint of that name; raises KeyError."""
-        return self._joints[name]
+        return self.joints[self.joint_index[name]]
 
     def ends_at(self, joint: str) -> tuple[str, ...]:
         """Return the names of the members that end at a joint."""

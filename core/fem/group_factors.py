@@ -71,26 +71,16 @@ def with_group_factors(
         0.0
     """
     for parameter, value in zip(parameters, values, strict=True):
-        model = _scaled(model, _matrix(parameter), parameter.places, float(value))
-    return model
-
-
-def _scaled(model: Model, matrix: Matrix, places: Sequence[str], factor: float) -> Model:
-    groups = dict(model.groups if matrix == "stiffness" else model.mass_groups)
-    part = _part(model, matrix, places)
-    names = groups if _ALL in places else [place.removeprefix(GROUP) for place in places]
-    groups |= {name: factor * groups[name] for name in names}
-    if matrix == "mass":
-        change = model.mass_change
+        matrix, places, factor = _matrix(parameter), parameter.places, float(value)
+        own = "groups" if matrix == "stiffness" else "mass_groups"
+        groups, change = dict(getattr(model, own)), getattr(model, f"{matrix}_change")
+        names = groups if _ALL in places else [place.removeprefix(GROUP) for place in places]
+        whole = getattr(model, matrix) + (factor - 1.0) * _part(model, matrix, places)
+        groups |= {name: factor * groups[name] for name in names}
         if change is not None and _ALL in places:
             change = replace(change, core=factor * change.core)
-        mass = model.mass + (factor - 1.0) * part
-        return replace(model, mass=mass, mass_change=change, mass_groups=groups)
-    change = model.stiffness_change
-    if change is not None and _ALL in places:
-        change = replace(change, core=factor * change.core)
-    stiffness = model.stiffness + (factor - 1.0) * part
-    return replace(model, stiffness=stiffness, stiffness_change=change, groups=groups)
+        model = replace(model, **{matrix: whole, f"{matrix}_change": change, own: groups})
+    return model
 
 
 def _matrix(parameter: Property) -> Matrix:

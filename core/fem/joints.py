@@ -9,21 +9,14 @@ from itertools import combinations
 import numpy as np
 
 from femubench.core.errors import NotApplicable
-from femubench.core.fem.frame import Frame, JointSpring, Member, RigidEnd
+from femubench.core.fem.frame import ACTIVE, Frame, JointSpring, Member, RigidEnd
 from femubench.core.fem.mesh import member_axes
-from femubench.core.fem.sections import Section
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import FloatArray
 
 _COLLINEAR = np.cos(np.radians(175.0))
 # An arm takes this much of the element behind it at most; a rigid length likewise.
 _LARGEST_SHARE = 0.9
-
-SPRING_DIRECTIONS: Mapping[str, tuple[str, ...]] = {
-    "in-plane": ("x", "z", "ry"),
-    "out-of-plane": ("z", "rx", "ry"),
-    "3d": ("x", "y", "z", "rx", "ry", "rz"),
-}
 
 
 @dataclass(frozen=True)
@@ -209,11 +202,6 @@ def flexible_ends(frame: Frame, group: JointGroup) -> tuple[str, ...]:
     return tuple(end for end in ends if end not in taken)
 
 
-def section_depth(section: Section) -> tuple[float, float]:
-    """Return the sizes along local y and z in m; a section given as numbers has none, that is 0."""
-    return section.width or 0.0, section.height or 0.0
-
-
 def half_depth(frame: Frame, end: str) -> float:
     """Return half the depth of the member that crosses a member end, along that member, in m.
 
@@ -234,12 +222,9 @@ def half_depth(frame: Frame, end: str) -> float:
     across = np.abs(axes @ direction)
     if across[0] > -_COLLINEAR:
         return 0.0
-    width, height = section_depth(crossing.section)
-    return 0.5 * (width if across[1] > across[2] else height)
-
-
-def _element_length(structure: Structure, end: str) -> float:
-    return float(structure.properties.length[structure.element_ends[end][0]])
+    section = crossing.section
+    depth = section.width if across[1] > across[2] else section.height
+    return 0.5 * (depth or 0.0)
 
 
 def available_length(structure: Structure, end: str) -> float:
@@ -252,7 +237,7 @@ def available_length(structure: Structure, end: str) -> float:
     element, name = structure.element_ends[end][0], end.rpartition("@")[0]
     joints = structure.frame.members[structure.frame.member_index[name]].ends
     both = sum(structure.element_ends[f"{name}@{joint}"][0] == element for joint in joints)
-    return _LARGEST_SHARE * _element_length(structure, end) / both
+    return _LARGEST_SHARE * float(structure.properties.length[element]) / both
 
 
 def spring_estimates(frame: Frame, ends: tuple[str, ...]) -> dict[str, float]:
@@ -282,8 +267,7 @@ def spring_estimates(frame: Frame, ends: tuple[str, ...]) -> dict[str, float]:
                 "rz": 8.0 * m.E * s.Iz / length,
             }
         )
-    names = SPRING_DIRECTIONS[frame.plane]
-    return {name: float(np.mean([row[name] for row in rows])) for name in names}
+    return {name: float(np.mean([row[name] for row in rows])) for name in ACTIVE[frame.plane]}
 
 
 def with_joint_springs(

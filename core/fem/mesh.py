@@ -218,11 +218,6 @@ class _Attached:
         self.connections.append(Connection(spring, base, node, arm, axes))
         return node, spring.arm
 
-    def rigid_length(self, member: Member, end: int) -> float:
-        """Return how far from an end nothing can be split, since the element is rigid there."""
-        spec = self.rigid_ends.get((member.name, member.ends[end]))
-        return 0.0 if spec is None else max(spec.stiffness_length, spec.mass_length)
-
     def piece(self, m: int) -> _Piece:
         """Return the mesh of a member."""
         self.xyz, self.rows, self.connections = [], [], []
@@ -239,7 +234,9 @@ class _Attached:
                 self.springs[member.name, joint],
             )
         grid = _stations([low, *regular, high], self.held.get(member.name, []), ON_MEMBER / length)
-        stiff = [self.rigid_length(member, end) / length for end in (0, 1)]
+        # Where the end elements are rigid, nothing is split.
+        ends = [self.rigid_ends.get((member.name, joint)) for joint in member.ends]
+        stiff = [max(e.stiffness_length, e.mass_length) / length if e else 0.0 for e in ends]
         splits = [s for s in self.splits.get(member.name, []) if stiff[0] < s < 1.0 - stiff[1]]
         inner = _stations(grid, splits, SHORTEST_PIECE / member.elements)[1:-1]
         start = self.frame.corners[self.frame.member_ends[m, 0]]

@@ -9,6 +9,7 @@ from itertools import repeat
 from typing import Any, TypeVar
 
 import numpy as np
+import scipy.linalg as la
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
@@ -23,6 +24,7 @@ from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 _Kept = TypeVar("_Kept")
+_HELD = 1e-9  # of a motion whose largest translation is 1
 
 
 def _same(one: object, other: object, rounding: float) -> bool:
@@ -244,14 +246,15 @@ class MeshedFrame:
         rows = [point[row : row + 1] for point, row in zip(points, each, strict=True)]
         return sp.csr_array(sp.vstack(rows)) @ self.kinematics.transform
 
-    def held(self, motion: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
-        """Return what supports and springs to ground see of motions of the whole, (m, r).
+    def loose(self, motion: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
+        """Return the combinations of motions that no support or spring to ground sees, (n, f).
 
-        A motion is free where its column is zero. Exact on any mesh, unlike a strain energy
-        from the stiffness matrix, which loses a soft suspension in its rounding errors.
+        Exact on any mesh, unlike a strain energy from the stiffness matrix, which loses a soft
+        suspension in its rounding errors.
 
         Arguments:
-            motion: displacements from positions (k, 3) and axes (k, 6), as columns (k, r).
+            motion: displacements from positions (k, 3) and axes (k, 6), as columns (k, r), each
+                with a largest translation of 1 or none.
         """
         transform, xyz = self.kinematics.transform, self.mesh.xyz
         own = motion(xyz[self.kinematics.node], self.kinematics.motions())
@@ -261,7 +264,11 @@ class MeshedFrame:
         all_nodes = motion(xyz[active // 6], np.eye(6)[active % 6])
         springs = [spring for spring in self.frame.springs if spring.stiffness]
         pulled = [np.asarray(self._ground_rows(springs) @ own)] if springs else []
-        return np.vstack([transform[active] @ own - all_nodes, *pulled])
+        seen = np.vstack([transform[active] @ own - all_nodes, *pulled])
+        moving = np.abs(own).max(axis=0, initial=0.0) > _HELD
+        _, singular, turn = la.svd(np.linalg.qr(seen[:, moving], mode="r"))
+        rank = int(np.sum(singular > _HELD))
+        return np.asarray(own[:, moving] @ turn[rank:].T)
 
     @cached_property
     def active_local(self) -> BoolArray:

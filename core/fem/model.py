@@ -84,7 +84,7 @@ class Geometry(Protocol):
         ...
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Model(Shown):
     """A structural model; strategies return another one made by `dataclasses.replace`.
 
@@ -205,26 +205,20 @@ class Model(Shown):
             new = Model.of(meshed.rebuilt(frame))
             old_mass, old_stiffness = meshed.matrices()
             keep = common_dofs(meshed, new.frame_structure)
-            return replace(
-                new,
-                mass=new.mass + _spread(self.mass - old_mass, keep, new.size),
-                stiffness=new.stiffness + _spread(self.stiffness - old_stiffness, keep, new.size),
-                mass_change=_spread_low_rank(self.mass_change, keep, new.size),
-                stiffness_change=_spread_low_rank(self.stiffness_change, keep, new.size),
-            )
+            mass, stiffness = self.mass - old_mass, self.stiffness - old_stiffness
+            return _changed_at(new, keep, mass, stiffness, self)
         structure, change = found
         size = change.mass.shape[0]
         mass, stiffness = grown(self.mass, size), grown(self.stiffness, size)
-        if structure is None or size == self.size:
-            moved = {"mass": mass + change.mass, "stiffness": stiffness + change.stiffness}
-        else:
-            moved = {"mass": prune(mass + change.mass)}
-            moved["stiffness"] = prune(stiffness + change.stiffness)
+        mass, stiffness = mass + change.mass, stiffness + change.stiffness
         if structure is None:
-            return replace(self, **moved)
+            return replace(self, mass=mass, stiffness=stiffness)
+        if size > self.size:
+            mass, stiffness = prune(mass), prune(stiffness)
         return replace(
             self,
-            **moved,
+            mass=mass,
+            stiffness=stiffness,
             dofs=dofs_of(structure),
             geometry=structure,
             structure=structure,
@@ -284,25 +278,31 @@ def neighbours_of(model: Model, changed: Model, samples: Iterable[Model]) -> tup
         changed: what its `attach` returned.
         samples: models on the dofs of `model`.
     """
-    keep, size = np.arange(model.size), changed.size
+    keep = np.arange(model.size)
     if model.structure is not None:
         keep = common_dofs(model.structure, changed.frame_structure)
     return tuple(
-        replace(
-            changed,
-            mass=changed.mass + _spread(sample.mass - model.mass, keep, size),
-            stiffness=changed.stiffness + _spread(sample.stiffness - model.stiffness, keep, size),
-            mass_change=_spread_low_rank(sample.mass_change, keep, size),
-            stiffness_change=_spread_low_rank(sample.stiffness_change, keep, size),
-        )
-        for sample in samples
+        _changed_at(changed, keep, s.mass - model.mass, s.stiffness - model.stiffness, s)
+        for s in samples
     )
 
 
-def _spread(change: SparseArray, keep: IntArray, size: int) -> SparseArray:
-    entries = sp.coo_array(change)
-    triplet = (entries.data, (keep[entries.row], keep[entries.col]))
-    return sp.csc_array(triplet, shape=(size, size))
+def _changed_at(
+    model: Model, keep: IntArray, mass: SparseArray, stiffness: SparseArray, source: Model
+) -> Model:
+    """Return a model with further mass and stiffness, and a source's low rank, at some dofs."""
+    found = []
+    for whole, change in ((model.mass, mass), (model.stiffness, stiffness)):
+        entries = sp.coo_array(change)
+        triplet = (entries.data, (keep[entries.row], keep[entries.col]))
+        found.append(whole + sp.csc_array(triplet, shape=whole.shape))
+    return replace(
+        model,
+        mass=found[0],
+        stiffness=found[1],
+        mass_change=_spread_low_rank(source.mass_change, keep, model.size),
+        stiffness_change=_spread_low_rank(source.stiffness_change, keep, model.size),
+    )
 
 
 def _spread_low_rank(change: LowRank | None, keep: IntArray, size: int) -> LowRank | None:

@@ -36,7 +36,11 @@ def meshed(frame: Frame) -> MeshedFrame:
     kinematics = build_kinematics(frame, mesh)
     properties = nominal_properties(frame, mesh)
     built = MeshedFrame(frame, mesh, kinematics, properties, np.array(springs, dtype=float))
-    return replace(built, properties=factored_properties(built)) if frame.factors else built
+    if not frame.factors:
+        return built
+    parameters = [_parameter(built, item) for item in frame.factors]
+    factors = [item.factor for item in frame.factors]
+    return replace(built, properties=apply_values(built, parameters, factors)[0])
 
 
 def nominal_properties(frame: Frame, mesh: Mesh) -> BeamProperties:
@@ -100,19 +104,8 @@ def _of_members(
     return column
 
 
-def factored_properties(structure: MeshedFrame) -> BeamProperties:
-    """Return the properties of a frame with its factors; massless arms of joints have none.
-
-    Raises:
-        ModelError: for a quantity that is no factor, a place that is not there, or a factor that
-            leaves neither stiffness nor mass.
-    """
-    factors = structure.frame.factors
-    parameters = [_parameter(structure, item) for item in factors]
-    return apply_values(structure, parameters, [item.factor for item in factors])[0]
-
-
 def _parameter(structure: MeshedFrame, item: Factor) -> Property:
+    """Return what a factor of the frame multiplies; massless arms of joints have none."""
     name = f"factor on {item.quantity}"
     if item.quantity not in QUANTITIES or not QUANTITIES[item.quantity]:
         known = ", ".join(quantity for quantity, scaled in QUANTITIES.items() if scaled)

@@ -24,7 +24,13 @@ from scipy.sparse.linalg import splu
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.assembly import plan_assembly
-from femubench.core.fem.attachments import brace_ends, brace_lines, brace_motion, brace_rows
+from femubench.core.fem.attachments import (
+    brace_ends,
+    brace_lines,
+    brace_motion,
+    brace_rows,
+    elastic_stiffness,
+)
 from femubench.core.fem.beam import (
     GAUSS,
     cubic_rates,
@@ -33,7 +39,6 @@ from femubench.core.fem.beam import (
     rigid_transform,
     stiffness_matrices,
 )
-from femubench.core.fem.elastic_stiffness import elastic_stiffness
 from femubench.core.fem.frame import ACTIVE, Frame, Support
 from femubench.core.fem.kinematics import build_kinematics, node_at, point_rows, rigid_motions
 from femubench.core.fem.links import rigid_arm
@@ -43,7 +48,6 @@ from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 _TRANSLATIONS = ("x", "y", "z")
 _IN_PLANE = ("x", "y", "rz")  # of a frame that moves out of plane
-_HELD = 1e-9
 # Without redundancy rounding leaves some 1e-13 of EA times the misfit strain.
 _NO_FORCE = 1e-10
 _DRAWS = 2
@@ -264,11 +268,7 @@ def _prepare(structure: MeshedFrame) -> Statics:
         scale = np.repeat([1.0, size], 3)
         return np.asarray(rigid_motions(points - centre, axes) / scale)
 
-    own = motion(xyz[kinematics.node], kinematics.motions())
-    moving = np.abs(own).max(axis=0, initial=0.0) > _HELD
-    _, singular, turn = la.svd(np.linalg.qr(flat_structure.held(motion)[:, moving], mode="r"))
-    rank = int(np.sum(singular > _HELD))
-    loose = np.asarray(own[:, moving] @ turn[rank:].T)
+    loose = flat_structure.loose(motion)
     # As few dofs as possible stop the rigid motions.
     stopped = la.qr(loose.T, mode="r", pivoting=True)[1][: loose.shape[1]]
     free = np.setdiff1d(np.arange(len(loose)), stopped)
@@ -382,17 +382,24 @@ def _stiffness(structure: MeshedFrame, state: StressState) -> SparseArray:
 
 def _beside_elements(structure: MeshedFrame, state: StressState) -> SparseArray | None:
     """Return the geometric stiffness of all that is no element, sparse (n, n)."""
-    total = None
-    for given, part in (
-        (len(structure.mesh.connections), _connections),
-        (len(structure.kinematics.bodies), _links),
-        (len(structure.frame.braces), _braces),
-    ):
-        if given:
-            rows, forms = part(structure, state)
-            found = plan_assembly(rows, forms.shape[1]).assemble(forms)
-            total = found if total is None else total + found
-    return total
+    connections, bodies = structure.mesh.connections, structure.kinematics.bodies
+    parts = []  # relative motions, and their forms
+    if connections:
+        pairs = np.array([(c.base, c.node) for c in connections], dtype=np.int64)
+        arm = np.array([c.arm for c in connections])
+        parts.append(_behind_arms(structure, pairs, arm, state.spring_force, state.spring_moment))
+    if len(bodies):
+        pairs, xyz = bodies[:, ::-1], structure.mesh.xyz
+        arm = xyz[pairs[:, 1]] - xyz[pairs[:, 0]]
+        # A moment does no work on two ends that turn alike.
+        parts.append(_behind_arms(structure, pairs, arm, state.link_force, np.zeros(arm.shape)))
+    if structure.frame.braces:
+        unit, length = brace_lines(structure.frame)
+        across = np.eye(3) - unit[:, :, None] * unit[:, None, :]
+        forms = (state.brace_force / length)[:, None, None] * across
+        parts.append((brace_motion(structure), forms))
+    found = [plan_assembly(rows, forms.shape[1]).assemble(forms) for rows, forms in parts]
+    return sum(found[1:], start=found[0]) if found else None
 
 
 def redundant_members(structure: MeshedFrame) -> tuple[str, ...]:
@@ -474,22 +481,6 @@ def _density(
     return _symmetric(mixed) + back @ turned @ rotation + wagner
 
 
-def _connections(structure: MeshedFrame, state: StressState) -> tuple[SparseArray, FloatArray]:
-    """Return motions of base and hanging node of the joint springs, and their forms."""
-    connections = structure.mesh.connections
-    pairs = np.array([(c.base, c.node) for c in connections], dtype=np.int64).reshape(-1, 2)
-    arm = np.array([c.arm for c in connections]).reshape(-1, 3)
-    return _behind_arms(structure, pairs, arm, state.spring_force, state.spring_moment)
-
-
-def _links(structure: MeshedFrame, state: StressState) -> tuple[SparseArray, FloatArray]:
-    """Return motions of both ends of the arms of rigid links, and their forms."""
-    pairs, xyz = structure.kinematics.bodies[:, ::-1], structure.mesh.xyz
-    arm = xyz[pairs[:, 1]] - xyz[pairs[:, 0]]
-    # A moment does no work on two ends that turn alike.
-    return _behind_arms(structure, pairs, arm, state.link_force, np.zeros(arm.shape))
-
-
 def _behind_arms(
     structure: MeshedFrame,
     pairs: IntArray,
@@ -508,10 +499,3 @@ def _behind_arms(
     blocks[:, 6:9, 3:6], blocks[:, 0:3, 3:6] = -2.0 * _skew(force), 2.0 * _skew(force)
     blocks[:, 9:12, 3:6] = -_skew(moment)
     return structure.kinematics.transform[rows], _symmetric(blocks)
-
-
-def _braces(structure: MeshedFrame, state: StressState) -> tuple[SparseArray, FloatArray]:
-    """Return relative motions of the ends of the braces, and their forms."""
-    unit, length = brace_lines(structure.frame)
-    across = np.eye(3) - unit[:, :, None] * unit[:, None, :]
-    return brace_motion(structure), (state.brace_force / length)[:, None, None] * across

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 
@@ -56,19 +55,18 @@ def constant_kappa(value: float, along_z: float | None = None) -> ShearCoefficie
         >>> fem.constant_kappa(0.44, 0.85)(0.33)
         (0.44, 0.85)
     """
-    return partial(_constant, value) if along_z is None else _ConstantPair(value, along_z)
-
-
-def _constant(value: float, nu: float) -> tuple[float, float]:
-    return value, value
+    return ConstantKappa(value, value if along_z is None else along_z)
 
 
 @dataclass(frozen=True)
-class _ConstantPair:
+class ConstantKappa:
+    """Shear coefficients of every material."""
+
     along_y: float
     along_z: float
 
     def __call__(self, nu: float) -> tuple[float, float]:
+        """Return both coefficients."""
         return self.along_y, self.along_z
 
 
@@ -123,8 +121,16 @@ def _cowper_box(b: float, h: float, nu: float) -> float:
     return 10 * (1 + nu) * (1 + 3 * m) ** 2 / (flange + web)
 
 
-def _box_kappa(b: float, h: float, nu: float) -> tuple[float, float]:
-    return _cowper_box(h, b, nu), _cowper_box(b, h, nu)
+@dataclass(frozen=True)
+class BoxKappa:
+    """Shear coefficients of a thin box with centre-line sizes b along y and h along z in m."""
+
+    b: float
+    h: float
+
+    def __call__(self, nu: float) -> tuple[float, float]:
+        """Return both coefficients."""
+        return _cowper_box(self.h, self.b, nu), _cowper_box(self.b, self.h, nu)
 
 
 def _rectangle_kappa(nu: float) -> tuple[float, float]:
@@ -132,11 +138,17 @@ def _rectangle_kappa(nu: float) -> tuple[float, float]:
     return kappa, kappa
 
 
-def _circle_kappa(ratio: float, nu: float) -> tuple[float, float]:
-    """Return kappa of a hollow circle, ratio = inner over outer radius (Cowper 1966, table 1)."""
-    square = (1 + ratio**2) ** 2
-    kappa = 6 * (1 + nu) * square / ((7 + 6 * nu) * square + (20 + 12 * nu) * ratio**2)
-    return kappa, kappa
+@dataclass(frozen=True)
+class CircleKappa:
+    """Shear coefficients of a hollow circle by inner over outer radius (Cowper 1966, table 1)."""
+
+    ratio: float
+
+    def __call__(self, nu: float) -> tuple[float, float]:
+        """Return both coefficients."""
+        square = (1 + self.ratio**2) ** 2
+        kappa = 6 * (1 + nu) * square / ((7 + 6 * nu) * square + (20 + 12 * nu) * self.ratio**2)
+        return kappa, kappa
 
 
 def rectangular_tube(width: float, height: float, wall: float) -> Section:
@@ -156,7 +168,7 @@ def rectangular_tube(width: float, height: float, wall: float) -> Section:
         Iz=iz,
         J=bredt(b, h, wall),
         Jp=iy + iz,
-        kappa=partial(_box_kappa, b, h),
+        kappa=BoxKappa(b, h),
         width=width,
         height=height,
         shape="rectangular-tube",
@@ -218,32 +230,20 @@ def round_tube(diameter: float, wall: float) -> Section:
         Iz=float(second),
         J=float(2 * second),
         Jp=float(2 * second),
-        kappa=partial(_circle_kappa, inner / outer),
+        kappa=CircleKappa(inner / outer),
         width=diameter,
         height=diameter,
         shape="round-tube",
     )
 
 
-def _square_tube(width: float, wall: float) -> Section:
-    return rectangular_tube(width, width, wall)
-
-
-def _solid_square(width: float) -> Section:
-    return solid_rectangle(width, width)
-
-
-def _solid_circle(diameter: float) -> Section:
-    return round_tube(diameter, diameter / 2)
-
-
 # Name in case.toml -> (constructor, its keys); walls come last so that they can be checked.
 SHAPES: Mapping[str, tuple[Callable[..., Section], tuple[str, ...]]] = {
-    "square-tube": (_square_tube, ("width", "wall")),
+    "square-tube": (lambda width, wall: rectangular_tube(width, width, wall), ("width", "wall")),
     "rectangular-tube": (rectangular_tube, ("width", "height", "wall")),
     "round-tube": (round_tube, ("diameter", "wall")),
-    "solid-square": (_solid_square, ("width",)),
+    "solid-square": (lambda width: solid_rectangle(width, width), ("width",)),
     "solid": (solid_rectangle, ("width", "height")),
     "solid-rectangle": (solid_rectangle, ("width", "height")),
-    "solid-circle": (_solid_circle, ("diameter",)),
+    "solid-circle": (lambda diameter: round_tube(diameter, diameter / 2), ("diameter",)),
 }

@@ -6,17 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+import scipy.sparse as sp
+
 from femubench.core.fem.assembly import AT_ONCE, prune
-from femubench.core.fem.attachments import oscillator_matrices
+from femubench.core.fem.attachments import elastic_stiffness, oscillator_matrices
 from femubench.core.fem.beam import MASS_PROPERTIES, mass_matrices
 from femubench.core.fem.derivatives import apply_values
-from femubench.core.fem.elastic_stiffness import elastic_stiffness
 from femubench.core.fem.frame import Frame
+from femubench.core.fem.kinematics import point_block
+from femubench.core.fem.mesh import SAME_STATION, locate
 from femubench.core.fem.meshed_frame import MeshedFrame
 from femubench.core.fem.nominal import meshed
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.preload import gravity_stiffness, preload_stiffness
-from femubench.core.fem.sensing import sensor_rows
 from femubench.core.fem.sensors import Sensors
 from femubench.core.typing import FloatArray, SparseArray
 
@@ -109,4 +112,27 @@ class Structure(MeshedFrame):
         """
         rests_on = (sensors, *self.interpolation)
         # A factor on E leaves the ratio of shear to bending as it is, but for its last digit.
-        return self.once("readings", rests_on, lambda: sensor_rows(self, sensors), _ROUNDING)
+        return self.once("readings", rests_on, lambda: self._sensor_rows(sensors), _ROUNDING)
+
+    def _sensor_rows(self, sensors: Sensors) -> SparseArray:
+        """Return what sensors read: at nodes all at once, between nodes one by one."""
+        frame, mesh, transform = self.frame, self.mesh, self.kinematics.transform
+        if not len(sensors.xyz):
+            return sp.csr_array((0, transform.shape[1]))
+        # At a flexible connection several nodes lie at one point, of which only the joint is sure.
+        joints, hung = len(frame.joints), set(mesh.oscillators.tolist())
+        found = mesh.tree.query_ball_point(sensors.xyz, SAME_STATION, return_sorted=True)
+        near = [[node for node in at if node not in hung] for at in found]
+        # Joints are the first nodes, and of what is there the first one.
+        node = np.array([at[0] if at and (len(at) == 1 or at[0] < joints) else -1 for at in near])
+        axes = sensors.axes
+        values = list(axes)
+        columns = list(6 * np.maximum(node, 0)[:, None] + np.arange(6))
+        for i in np.flatnonzero(node < 0):
+            block, moved = point_block(frame, mesh, self.properties, locate(frame, sensors.xyz[i]))
+            values[i], columns[i] = axes[i] @ block, moved
+        bounds = np.cumsum([0, *map(len, values)])
+        entries = np.concatenate(values), np.concatenate(columns), bounds
+        rows = sp.csr_array(entries, shape=(len(node), transform.shape[0]))
+        rows.eliminate_zeros()
+        return rows @ transform

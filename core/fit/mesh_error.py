@@ -37,11 +37,6 @@ def refined(structure: Structure) -> Frame:
     return replace(frame, supports=(*frame.supports, *cuts))
 
 
-def _fine(model: Model) -> Model:
-    structure = model.frame_structure
-    return Model.of(structure.rebuilt(refined(structure)))
-
-
 def mesh_bias(model: Model, count: int, modes: Modes | None = None) -> FloatArray | None:
     """Return f_fine / f - 1 of the first elastic modes on a mesh twice as fine, (k,), k <= count.
 
@@ -53,12 +48,13 @@ def mesh_bias(model: Model, count: int, modes: Modes | None = None) -> FloatArra
         count: number of modes wanted.
         modes: elastic modes of the model where they are at hand, at least `count`.
     """
-    if model.structure is None or model.size > SOLVED_LIMIT:
+    structure = model.structure
+    if structure is None or model.size > SOLVED_LIMIT:
         return None
     try:
         coarse = elastic_modes(model, count + _MARGIN) if modes is None else modes
-        fine = once_for(model, "fine", lambda: _fine(model))
-        keep = common_dofs(model.structure, fine.frame_structure)
+        fine = once_for(model, "fine", lambda: Model.of(structure.rebuilt(refined(structure))))
+        keep = common_dofs(structure, fine.frame_structure)
         return frequency_changes(model, coarse, fine, count, lambda shapes: shapes[keep])
     except ModelError:
         return None

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, TypeVar
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy.linalg as la
@@ -232,8 +232,8 @@ def zero_tolerance(modes: Modes) -> float:
 
 
 _Kept = TypeVar("_Kept")
-# Models are compared by what they are, not by what they hold: equality of arrays is no key.
-_kept: dict[int, tuple[weakref.ref[Model], dict[Hashable, Any]]] = {}
+_Given = ParamSpec("_Given")
+_kept: WeakKeyDictionary[Model, dict[Hashable, Any]] = WeakKeyDictionary()
 
 
 def once_for(model: Model, key: Hashable, make: Callable[[], _Kept]) -> _Kept:
@@ -247,21 +247,23 @@ def once_for(model: Model, key: Hashable, make: Callable[[], _Kept]) -> _Kept:
         >>> effect.once_for(model, "size", lambda: model.size)
         81
     """
-    entry = _kept.get(id(model))
-    if entry is None or entry[0]() is not model:
-        number = id(model)
-        # Bound early: at the end of the interpreter the name may be gone before the model.
-        forget = partial(_forget, _kept, number)
-        entry = (weakref.ref(model, forget), {})
-        _kept[number] = entry
-    if key not in entry[1]:
-        entry[1][key] = make()
-    value: _Kept = entry[1][key]
+    entry = _kept.setdefault(model, {})
+    if key not in entry:
+        entry[key] = make()
+    value: _Kept = entry[key]
     return value
 
 
-def _forget(kept: dict[int, Any], number: int, _: object) -> None:
-    kept.pop(number, None)
+def cached_by_model(
+    function: Callable[Concatenate[Model, _Given], _Kept],
+) -> Callable[Concatenate[Model, _Given], _Kept]:
+    """Let a function of a model and of hashable values find each result once, as `once_for`."""
+
+    @wraps(function)
+    def cached(model: Model, /, *args: _Given.args, **kwargs: _Given.kwargs) -> _Kept:
+        return once_for(model, (function, args), lambda: function(model, *args, **kwargs))
+
+    return cached
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 
 from femubench.core.fem.model import Model
-from femubench.core.modal.eigen import once_for
+from femubench.core.modal.eigen import cached_by_model
 from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.typing import FloatArray, SparseArray
 
@@ -16,6 +17,7 @@ _FREE = 1e-8  # of the energy that the entries would have without cancelling eac
 _HELD = 0.1  # of it; a part of the structure with some dofs removed has less
 
 
+@cached_by_model
 def support_groups(model: Model) -> frozenset[str]:
     """Return the groups of the stiffness that hold the structure to ground.
 
@@ -28,22 +30,16 @@ def support_groups(model: Model) -> frozenset[str]:
         >>> modal.support_groups(model)
         frozenset()
     """
-    return once_for(model, "support groups", lambda: _support_groups(model))
-
-
-def _support_groups(model: Model) -> frozenset[str]:
-    apart = {name for name, part in model.groups.items() if not _couples(part)}
+    rest = {
+        k: part
+        for k, part in model.groups.items()
+        if (part - sp.diags_array(part.diagonal())).count_nonzero()
+    }
     rigid = rigid_body_vectors(model.dofs)
-    rest = {name: part for name, part in model.groups.items() if name not in apart}
     energy = {name: _energy(part, rigid) for name, part in rest.items()}
     known = any(share < _FREE for share in energy.values())
-    held = {name for name, share in energy.items() if known and share > _HELD}
-    return frozenset(apart | held)
-
-
-def _couples(part: SparseArray) -> bool:
-    entries = part.tocoo()
-    return bool(np.any(entries.data[entries.row != entries.col] != 0.0))
+    free = {name for name, share in energy.items() if not (known and share > _HELD)}
+    return frozenset(set(model.groups) - free)
 
 
 def _energy(part: SparseArray, rigid: FloatArray) -> float:

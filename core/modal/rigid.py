@@ -8,8 +8,7 @@ import numpy as np
 import scipy.linalg as la
 
 from femubench.core.fem.model import Dofs, Model
-from femubench.core.fem.structure import Structure
-from femubench.core.typing import BoolArray, FloatArray
+from femubench.core.typing import FloatArray
 
 _Motion = Callable[[FloatArray, FloatArray], FloatArray]
 _ZERO_ENERGY = 1e-12
@@ -26,12 +25,8 @@ def rigid_body_vectors(dofs: Dofs) -> FloatArray:
         (81, 3)
     """
     vectors = _motions(dofs)(dofs.xyz, dofs.motions)
-    return np.asarray(vectors[:, _moving(vectors)])
-
-
-def _moving(vectors: FloatArray) -> BoolArray:
-    """Tell which motions move anything: a plane off the origin leaves roundoff in the others."""
-    return np.asarray(np.abs(vectors).max(axis=0, initial=0.0) > _HELD)
+    # A plane off the origin leaves roundoff in what moves nothing.
+    return np.asarray(vectors[:, np.abs(vectors).max(axis=0, initial=0.0) > _HELD])
 
 
 def _motions(dofs: Dofs) -> _Motion:
@@ -58,9 +53,8 @@ def rigid_modes_of(model: Model) -> FloatArray:
         True
     """
     motion, structure = _motions(model.dofs), model.structure
-    vectors = motion(model.dofs.xyz, model.dofs.motions)
     if structure is None:
-        basis = vectors[:, _moving(vectors)]
+        basis = rigid_body_vectors(model.dofs)
         basis = _orthonormal(basis, basis.T @ (model.mass @ basis))
         candidates = basis
         if basis.shape[1] > 0:  # those without energy
@@ -71,18 +65,8 @@ def rigid_modes_of(model: Model) -> FloatArray:
             candidates = np.asarray(basis @ free)
     else:
         rests_on = structure.interpolation if structure.frame.springs else ()
-        candidates = structure.once(
-            "free motions", rests_on, lambda: _not_held(structure, motion, vectors)
-        )
-    return _orthonormal(candidates, candidates.T @ model.mass_times(candidates))
-
-
-def _not_held(structure: Structure, motion: _Motion, vectors: FloatArray) -> FloatArray:
-    """Return the combinations of motions that neither supports nor springs to ground see."""
-    moving = _moving(vectors)
-    _, singular, turn = la.svd(np.linalg.qr(structure.held(motion)[:, moving], mode="r"))
-    rank = int(np.sum(singular > _HELD))
-    return np.asarray(vectors[:, moving] @ turn[rank:].T)
+        candidates = structure.once("free motions", rests_on, lambda: structure.loose(motion))
+    return mass_orthonormal(model, candidates)
 
 
 def rigid_continuation(dofs: Dofs, rigid: FloatArray) -> _Motion:
@@ -95,6 +79,11 @@ def rigid_continuation(dofs: Dofs, rigid: FloatArray) -> _Motion:
     motion = _motions(dofs)
     combined = la.lstsq(motion(dofs.xyz, dofs.motions), rigid)[0]
     return lambda xyz, axes: np.asarray(motion(xyz, axes) @ combined)
+
+
+def mass_orthonormal(model: Model, vectors: FloatArray) -> FloatArray:
+    """Return a mass-orthonormal basis of some motions, dependent ones left out, (n, r)."""
+    return _orthonormal(vectors, vectors.T @ model.mass_times(vectors))
 
 
 def _orthonormal(vectors: FloatArray, gram: FloatArray) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -51,13 +51,19 @@ class MassOffset(FrameEffect):
         """Return the points along the members at which an arm can be felt."""
         if model.structure is None:
             return ()
+        along = [at for at in point_places(model) if "@" in at]
         # Asked for with every likely added mass, and the same for all of them.
-        return once_for(model, "points with an arm", lambda: _felt_points(model))
+        return once_for(
+            model,
+            "points with an arm",
+            lambda: [at for at in along if abs(_arm_rows(model, at)).max() > _FELT],
+        )
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the mass, and the arm, whose scale is the section's size that way."""
         frame = model.frame_structure.frame
-        size = section_size(_member_at(frame, place).section, "y" if _flat(frame) else "z")
+        axis: Literal["y", "z"] = "y" if frame.plane == "out-of-plane" else "z"
+        size = section_size(_member_at(frame, place).section, axis)
         mass = Parameter(
             "mass", "kg", _SHARE * model.total_mass, scaling="exponential", one_sided=True
         )
@@ -95,18 +101,8 @@ class MassOffset(FrameEffect):
         return Change(terms, factors)
 
 
-def _felt_points(model: Model) -> tuple[str, ...]:
-    along = [at for at in point_places(model) if "@" in at]
-    return tuple(at for at in along if abs(_arm_rows(model, at)).max() > _FELT)
-
-
 def _directions(model: Model) -> list[str]:
     return [d for d in ACTIVE[model.frame_structure.frame.plane] if d in "xyz"]
-
-
-def _flat(frame: Frame) -> bool:
-    """Tell whether the frame moves out of its plane alone: an arm up is not felt there."""
-    return frame.plane == "out-of-plane"
 
 
 def _member_at(frame: Frame, place: str) -> Member:
@@ -114,9 +110,9 @@ def _member_at(frame: Frame, place: str) -> Member:
 
 
 def _across(frame: Frame, place: str) -> FloatArray:
-    """Return the direction of an arm, global, (3,)."""
+    """Return the direction of an arm, global, (3,); an arm up is not felt out of plane."""
     axes, _ = member_axes(frame, _member_at(frame, place))
-    return np.asarray(axes[1] if _flat(frame) else axes[2])
+    return np.asarray(axes[1] if frame.plane == "out-of-plane" else axes[2])
 
 
 def _arm_rows(model: Model, place: str) -> SparseArray:

@@ -30,6 +30,7 @@ from femubench.fem import (
     round_tube,
     solid_rectangle,
     stiffness_matrices,
+    wall_of,
 )
 
 _SAME = 1e-6
@@ -142,15 +143,13 @@ def shape_torsion_constant(section: Section) -> float | None:
 
 def _of_shape(section: Section) -> Section | None:
     """Return the section with the shape, size and area of a section; the wall follows from A."""
-    width, height, area = section.width, section.height, section.A
+    width, height = section.width, section.height
     if width is None or height is None:
         return None
     if section.shape == "rectangular-tube":
-        root = max((width + height) ** 2 - 4.0 * area, 0.0)
-        return rectangular_tube(width, height, (width + height - np.sqrt(root)) / 4.0)
+        return rectangular_tube(width, height, wall_of(section))
     if section.shape == "round-tube":
-        root = max(width**2 - 4.0 * area / np.pi, 0.0)
-        return round_tube(width, (width - np.sqrt(root)) / 2.0)
+        return round_tube(width, wall_of(section))
     return solid_rectangle(width, height) if section.shape == "solid-rectangle" else None
 
 
