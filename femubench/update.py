@@ -15,6 +15,7 @@ from femubench.core.fem.joints import (
     with_joint_springs,
     with_rigid_ends,
 )
+from femubench.core.fem.model import total_change
 from femubench.core.fit.discrepancy import Discrepancy
 from femubench.core.update.change_lists import (
     OWN,
@@ -47,7 +48,6 @@ from femubench.core.update.equation_error import update_by_equation_error
 from femubench.core.update.l_curve import l_curve_corner, tikhonov
 from femubench.core.update.lasso import lasso
 from femubench.core.update.low_rank import (
-    total_change,
     with_measured_frequencies,
     with_stiffness_step,
 )

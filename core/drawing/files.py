@@ -154,13 +154,9 @@ class Exhibits:
                 found.append(fault)
         return found
 
-    def put(self, key: str, exhibit: Mapping[str, Any]) -> None:
-        """Keep the exhibit of a job; a store without room does without."""
-        self._write(key, exhibit)
-
     def put_case(self, digest: str, drawing: Mapping[str, Any]) -> None:
         """Keep what is drawn of a case."""
-        self._write(f"{_CASE}{digest[:32]}", drawing)
+        self.put(f"{_CASE}{digest[:32]}", drawing)
 
     def _path(self, name: str) -> Path | None:
         known = _KEY.fullmatch(name.removeprefix(_CASE))
@@ -180,8 +176,9 @@ class Exhibits:
             return None
         return plain
 
-    def _write(self, name: str, data: Mapping[str, Any]) -> None:
-        path = self._path(name)
+    def put(self, key: str, data: Mapping[str, Any]) -> None:
+        """Keep the exhibit of a job; a store without room does without."""
+        path = self._path(key)
         if path is None or path.exists():
             return
         # Pictures are worth no failed run: a full disk is told by the results.

@@ -25,7 +25,7 @@ _Where = tuple[str, PlaceKind, tuple[Span, ...], tuple[Point, ...]]
 
 _BETWEEN = "; "  # the places of one parameter, as results have them
 _MOST_WORDS = 2000  # of an update; more places are no picture
-_MOST_LABEL = 3  # parameters of one place that are told beside it
+_MOST_LABEL = 3  # parameters that the label of one place names
 _CHANGE = "change of "
 _SYMBOLS: tuple[tuple[str, Symbol], ...] = (
     *(("kg", "mass"), ("N/m", "spring"), ("N m/rad", "spring")),
@@ -92,23 +92,15 @@ def changes_found(source: Case | Model, parameters: Sequence[Data]) -> list[Find
         kind = own[0].kind if own else "elsewhere"
         where = _BETWEEN.join(dict.fromkeys(split_direction(place.place)[0] for place in own))
         groups.setdefault((where, kind, spans, points), []).append(item)
-    return [_changed(*place, items=items) for place, items in groups.items()]
-
-
-def _changed(
-    where: str,
-    kind: PlaceKind,
-    spans: tuple[Span, ...],
-    points: tuple[Point, ...],
-    items: Sequence[Data],
-) -> Finding:
-    values = [value for item in items if (value := relative_change(item)) is not None]
-    more = len(items) - _MOST_LABEL
-    told = [_estimate_label(item) for item in items[:_MOST_LABEL]]
-    label = ", ".join(told) + (f" and {more} more" if more > 0 else "")
-    value = max(values, key=abs, default=None)
-    symbol = symbol_of(item["unit"] for item in items)
-    return Finding(where, kind, spans, points, symbol, label, value)
+    found = []
+    for place, items in groups.items():
+        values = [value for item in items if (value := relative_change(item)) is not None]
+        more = len(items) - _MOST_LABEL
+        label = ", ".join(_estimate_label(item) for item in items[:_MOST_LABEL])
+        label += f" and {more} more" if more > 0 else ""
+        symbol = symbol_of(item["unit"] for item in items)
+        found.append(Finding(*place, symbol, label, max(values, key=abs, default=None)))
+    return found
 
 
 def _words(item: Data) -> list[str]:

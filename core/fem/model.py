@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+import scipy.linalg as la
 import scipy.sparse as sp
 
 from femubench.core.display import Shown, counted
@@ -18,6 +19,8 @@ from femubench.core.fem.frame import Frame, GroundSpring, PointMass
 from femubench.core.fem.sensors import Sensors, unit_motions
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import FloatArray, IntArray, SparseArray
+
+_NEGLIGIBLE = 1e-14  # of the largest eigenvalue of a change
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,27 @@ class LowRank:
         """Return the dense matrix, for small models."""
         dense: FloatArray = self.basis @ self.core @ self.basis.T
         return dense
+
+
+def total_change(parts: Sequence[LowRank | None]) -> LowRank | None:
+    """Return the sum of low-rank changes with the smallest rank that represents it.
+
+    Arguments:
+        parts: changes of one matrix; None stands for no change.
+
+    Examples:
+        >>> change = fem.LowRank(np.eye(4, 2), np.eye(2))
+        >>> np.allclose(update.total_change([change, None, change]).toarray(), 2 * change.toarray())
+        True
+    """
+    changes = [part for part in parts if part is not None]
+    if not changes:
+        return None
+    q, r = la.qr(np.hstack([change.basis for change in changes]), mode="economic")
+    core = r @ la.block_diag(*(change.core for change in changes)) @ r.T
+    values, turn = la.eigh(0.5 * (core + core.T))
+    keep = np.abs(values) > _NEGLIGIBLE * np.abs(values).max(initial=0.0)
+    return LowRank(q @ turn[:, keep], np.diag(values[keep]))
 
 
 class Geometry(Protocol):

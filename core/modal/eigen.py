@@ -28,7 +28,7 @@ _LOWEST = "lowest modes"
 
 @dataclass(eq=False)
 class Evaluations:
-    """How many eigenvalue solutions were made; nobody has to report their own."""
+    """How many eigenvalue solutions were made."""
 
     count: int = 0
 
@@ -48,7 +48,7 @@ def counted_evaluations() -> Iterator[Evaluations]:
 
 
 def count_evaluation() -> None:
-    """Count one more eigenvalue solution, for whoever makes one without `solve_modes`."""
+    """Count one more eigenvalue solution, made without `solve_modes`."""
     for counter in _counting:
         counter.count += 1
 
@@ -195,8 +195,9 @@ def solve_modes(model: Model, count: int | None = None) -> Modes:
         [255.8 277.7 581.3]
     """
     wanted = _MANY if count is None else count
-    if model.size > DENSE_LIMIT and (known := _known_modes(model, wanted)) is not None:
-        return known
+    lowest = _lowest_known(model).get(_LOWEST) if model.size > DENSE_LIMIT else None
+    if lowest is not None and lowest.count >= wanted:
+        return lowest.first(wanted)
     count_evaluation()
     if model.size <= DENSE_LIMIT:
         mass, stiffness = dense_matrices(model)
@@ -298,12 +299,6 @@ def keep_modes(model: Model, modes: Modes) -> None:
 def _lowest_known(model: Model) -> dict[str, _Lowest]:
     """Return where the lowest modes are that were kept or solved; empty where none were."""
     return once_for(model, _LOWEST, dict)
-
-
-def _known_modes(model: Model, wanted: int) -> Modes | None:
-    """Return so many modes and the negative ones, where they are known."""
-    lowest = _lowest_known(model).get(_LOWEST)
-    return None if lowest is None or lowest.count < wanted else lowest.first(wanted)
 
 
 def modes_of(model: Model, count: int | None = None) -> Modes:

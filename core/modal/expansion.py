@@ -42,8 +42,7 @@ def procrustes_rotation(measured: FloatArray, analytical: FloatArray) -> FloatAr
     Source: Ahmadian, Gladwell & Ismail (1997), equation (16). With measured' analytical = U S V'
     the minimiser is R = U V' (Golub & Van Loan); the paper prints its transpose.
     """
-    left, _, right = la.svd(measured.T @ analytical)
-    return np.asarray(left @ right)
+    return np.asarray(la.orthogonal_procrustes(measured, analytical)[0])
 
 
 def expand_by_rotation(

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -44,31 +44,6 @@ def _threads_of_numpy() -> Iterator[None]:
         return
     with pools.limit(limits=min(threads)):
         yield
-
-
-class Symmetric(Protocol):
-    """A factorised symmetric matrix."""
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Return the inverse times one or several right sides, (n,) or (n, m)."""
-        ...
-
-    @property
-    def negative(self) -> int | None:
-        """Return the number of negative pivots; None where rows were exchanged for stability."""
-        ...
-
-
-class Definite(Protocol):
-    """A factorised positive definite matrix, whose place others can take."""
-
-    def factorise(self, matrix: SparseArray) -> bool:
-        """Put another matrix into the place of the last; False where it is not definite."""
-        ...
-
-    def compliance(self, basis: SparseArray) -> FloatArray:
-        """Return basis' inverse basis of sparse columns, (p, p)."""
-        ...
 
 
 class Cholesky:
@@ -112,13 +87,10 @@ class Cholesky:
     def compliance(self, basis: SparseArray) -> FloatArray:
         """Return basis' inverse basis of sparse columns, (p, p)."""
         # A column is felt along its path in the elimination tree alone: the rest is zero.
-        half = sp.hstack([sp.csc_array(self._half(part)) for part in _blocks(basis)], format="csc")
+        permuted = map(self._factor.apply_P, _blocks(basis))
+        parts = (self._factor.solve_L(p, use_LDLt_decomposition=False) for p in permuted)
+        half = sp.hstack([sp.csc_array(part) for part in parts], format="csc")  # L^-1 basis
         return np.asarray((half.T @ half).toarray())
-
-    def _half(self, right: FloatArray) -> FloatArray:
-        """Return L^-1 right with the rows of L in its own order, so that half' half = solve."""
-        permuted = self._factor.apply_P(right)
-        return np.asarray(self._factor.solve_L(permuted, use_LDLt_decomposition=False))
 
 
 class LU:
@@ -176,6 +148,11 @@ class DefiniteLU:
         """Return basis' inverse basis of sparse columns, (p, p)."""
         assert self._factor is not None, "a definite matrix comes first"
         return np.hstack([basis.T @ self._factor.solve(part) for part in _blocks(basis)])
+
+
+# A factorised symmetric matrix, and one that is definite, whose place others can take.
+Symmetric: TypeAlias = Cholesky | LU
+Definite: TypeAlias = Cholesky | DefiniteLU
 
 
 def _blocks(columns: SparseArray) -> Iterator[FloatArray]:

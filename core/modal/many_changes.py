@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -70,13 +70,6 @@ class _Space(NamedTuple):
     mass: FloatArray
     shifted: FloatArray
     moments: list[FloatArray]
-
-
-class _Motions(NamedTuple):
-    """Free rigid-body motions: their momentum without the change, (n, r), and at its place."""
-
-    momentum: FloatArray
-    at: FloatArray
 
 
 @dataclass(frozen=True)
@@ -155,7 +148,7 @@ class ManyChanges:
         gram = turn.T @ (rigid.T @ momentum + at.T @ place.mass @ at) @ turn
         if gram.size:
             turn = la.solve_triangular(la.cholesky(gram, lower=True), turn.T, lower=True).T
-        free = _Motions(momentum @ turn, at @ turn)
+        free = momentum @ turn, at @ turn
         space = None
         for _ in range(_MOST_STEPS):
             space = self._space(place.old, space)
@@ -227,9 +220,18 @@ class ManyChanges:
         )
 
     def _ritz(
-        self, place: _Place, space: _Space, free: _Motions, count: int, above: float
+        self,
+        place: _Place,
+        space: _Space,
+        free: tuple[FloatArray, FloatArray],
+        count: int,
+        above: float,
     ) -> Modes | None:
-        """Return the modes in a space of shapes; None where they are not proven."""
+        """Return the modes in a space of shapes; None where they are not proven.
+
+        Arguments:
+            free: rigid-body motions: momentum without the change, (n, r), and motion at its place.
+        """
         count_evaluation()
         m, new = len(self.modes), place.new
         scale = 1.0 / np.sqrt(np.diagonal(space.mass))
@@ -250,7 +252,11 @@ class ManyChanges:
         wanted = max(wanted, int(np.searchsorted(values, above)) + 1 if above else 0)
         if wanted > len(values) or values[wanted - 1] >= _INSIDE * self.modes.eigenvalues[-1]:
             return None
-        if not self._is_proven(place, space, values, wanted):
+        # No eigenvalue may lie below a Ritz value by more than is allowed.
+        elastic = values[:wanted][np.abs(values[:wanted]) > _ZERO * self._first]
+        below = np.maximum(1.9 * self.known_to * np.abs(elastic), _NOISE * self._first)
+        most = self._most_below(place, space.moments, elastic - below)
+        if not len(elastic) or not np.array_equal(most, np.searchsorted(values, elastic - below)):
             return None
         values, vectors = values[:wanted], vectors[:, :wanted]
         shapes = self.modes.shapes @ vectors[:m]
@@ -264,21 +270,11 @@ class ManyChanges:
         total = np.hypot(la.norm(force, axis=0), la.norm(local[len(place.old) :], axis=0))
         if float((total / la.norm(size, axis=0)).max()) > _RESIDUAL:
             return None
-        share = free.momentum.T @ shapes + free.at.T @ place.mass @ moved
+        share = free[0].T @ shapes + free[1].T @ place.mass @ moved
         rigid = np.square(share).sum(axis=0) > _RIGID_SHARE
         still = rigid & (np.abs(values) < _ZERO * self._first)
         every = np.vstack([shapes, moved[len(place.old) :]])
         return Modes(np.where(still, 0.0, values), every, rigid)
-
-    def _is_proven(self, place: _Place, space: _Space, values: FloatArray, wanted: int) -> bool:
-        """Tell whether no eigenvalue lies below a Ritz value by more than is allowed."""
-        elastic = values[:wanted][np.abs(values[:wanted]) > _ZERO * self._first]
-        if len(elastic) == 0:
-            return False
-        below = np.maximum(1.9 * self.known_to * np.abs(elastic), _NOISE * self._first)
-        shifts = elastic - below
-        found = np.searchsorted(values, shifts)
-        return bool(np.array_equal(self._most_below(place, space.moments, shifts), found))
 
     def _most_below(
         self, place: _Place, moments: Sequence[FloatArray], shifts: FloatArray

@@ -1,4 +1,4 @@
-"""MatrixSlopes of eigenvalues and mode shapes with respect to model parameters."""
+"""Slopes of eigenvalues and mode shapes with respect to model parameters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from femubench.core.fem.model_parameters import MatrixSlopes, matrix_slopes
 from femubench.core.fem.parameters import Property
 from femubench.core.modal.eigen import Modes
 from femubench.core.modal.factorisation import LU
-from femubench.core.typing import FloatArray, IntArray
+from femubench.core.typing import FloatArray
 
 _REPEATED = 1e-8
 
@@ -70,22 +70,20 @@ def shape_sensitivities(
         (81, 1)
     """
     change = matrix_slopes(model, parameters) if isinstance(parameters, Sequence) else parameters
+    shape, eigenvalue = modes.shapes[:, index], float(modes.eigenvalues[index])
+    gap = eigenvalue - modes.eigenvalues
+    same = np.abs(gap) <= _REPEATED * max(abs(eigenvalue), 1.0)
+    own = -0.5 * change.quadratic(shape[:, None], shape[:, None])[1][0]  # keeps phi' M phi = 1
+    force = change.products(shape, eigenvalue)
     if len(modes) == model.size:
-        shapes, eigenvalue = modes.shapes, modes.eigenvalues[index]
-        shape = shapes[:, index]
-        force = change.products(shape, float(eigenvalue))
-        gap = eigenvalue - modes.eigenvalues
-        gap[_same_eigenvalue(modes, index)] = np.inf
-        share = (shapes.T @ force) / gap[:, None]
-        share[index] = -0.5 * _mass_part(shape, change)
-        return np.asarray(shapes @ share)
+        share = (modes.shapes.T @ force) / np.where(same, np.inf, gap)[:, None]
+        share[index] = own
+        return np.asarray(modes.shapes @ share)
     # Nelson's method, with the mode at hand alone.
     if model.stiffness_change is not None or model.mass_change is not None:
         raise ModelError("shape sensitivities of a model with low-rank changes need all its modes")
-    shape, eigenvalue = modes.shapes[:, index], float(modes.eigenvalues[index])
-    cluster = modes.shapes[:, _same_eigenvalue(modes, index)]
+    cluster = modes.shapes[:, same]
     weighted = model.mass_times(cluster)
-    force = change.products(shape, eigenvalue)
     right = weighted @ (cluster.T @ force) - force
     # The border replaces Nelson's deleted row: it keeps the matrix symmetric and regular.
     size = np.abs(model.stiffness.diagonal()).mean() / np.linalg.norm(weighted, axis=0)
@@ -99,20 +97,7 @@ def shape_sensitivities(
     except RuntimeError as error:
         raise ModelError(f"mode {index + 1}: shape sensitivities have no solution") from error
     particular = np.asarray(solved[: model.size])
-    return np.asarray(particular - 0.5 * np.outer(shape, _mass_part(shape, change)))
-
-
-def _same_eigenvalue(modes: Modes, index: int) -> IntArray:
-    """Return the modes whose eigenvalue cannot be told from the given one, itself included."""
-    gap = np.abs(modes.eigenvalues - modes.eigenvalues[index])
-    scale = max(abs(float(modes.eigenvalues[index])), 1.0)
-    return np.flatnonzero(gap <= _REPEATED * scale)
-
-
-def _mass_part(shape: FloatArray, change: MatrixSlopes) -> FloatArray:
-    """Return phi' dM/dp phi, (n_parameters,)."""
-    _, mass = change.quadratic(shape[:, None], shape[:, None])
-    return np.asarray(mass[0])
+    return np.asarray(particular + np.outer(shape, own))
 
 
 def frequency_sensitivities(

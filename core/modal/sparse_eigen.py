@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.model import LowRank, Model
+from femubench.core.fem.model import LowRank, Model, total_change
 from femubench.core.modal.factorisation import LU, Cholesky, DefiniteLU, Symmetric, cholmod_obstacle
 from femubench.core.modal.generalised_mass import generalised_masses
 from femubench.core.modal.inertia import Change, negative_after, negative_by_pins, signs_hold
@@ -84,18 +84,11 @@ class ShiftedModel:
     @cached_property
     def _change(self) -> Change | None:
         """Return (basis, eigenvalues) of the low-rank part of K - shift M, full rank."""
-        parts: list[tuple[LowRank, float]] = []
-        if self.model.stiffness_change is not None:
-            parts.append((self.model.stiffness_change, 1.0))
-        if self.model.mass_change is not None and self.shift != 0.0:
-            parts.append((self.model.mass_change, -self.shift))
-        if not parts:
-            return None
-        q, r = la.qr(np.hstack([part.basis for part, _ in parts]), mode="economic")
-        core = r @ la.block_diag(*(factor * part.core for part, factor in parts)) @ r.T
-        values, turn = la.eigh(0.5 * (core + core.T))
-        keep = np.abs(values) > 1e-14 * np.abs(values).max(initial=0.0)
-        return q @ turn[:, keep], values[keep]
+        mass = self.model.mass_change
+        if mass is not None:
+            mass = LowRank(mass.basis, -self.shift * mass.core) if self.shift else None
+        found = total_change([self.model.stiffness_change, mass])
+        return None if found is None else (found.basis, np.diagonal(found.core))
 
     @cached_property
     def _woodbury(self) -> tuple[FloatArray, FloatArray] | None:

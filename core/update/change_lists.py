@@ -99,7 +99,8 @@ def element_sets(structure: Structure, word: str) -> Mapping[str, tuple[str, ...
         }
         found = {name: elements for name, elements in parts.items() if elements}
     if not found:
-        raise NotApplicable(f"there are no {word} to scale: changes={word} needs {_need(word)}")
+        need = _MISSING.get(word, "a frame of members")
+        raise NotApplicable(f"there are no {word} to scale: changes={word} needs {need}")
     _check_apart(found)
     return found
 
@@ -114,10 +115,6 @@ def _check_apart(parts: Mapping[str, Sequence[str]]) -> None:
                     f"{element} is in {owner[element]} and in {name}: factors need sets that share "
                     "no element"
                 )
-
-
-def _need(word: str) -> str:
-    return _MISSING.get(word, "a frame of members")
 
 
 def scale_parts(
@@ -144,8 +141,8 @@ def scale_parts(
             for name, elements in element_sets(structure, word).items()
         ]
     if not isinstance(source, Model) or word != "groups" or not source.groups:
-        what = f"the model has no {word} to scale: changes={word} needs {_need(word)}"
-        raise NotApplicable(what)
+        need = _MISSING.get(word, "a frame of members")
+        raise NotApplicable(f"the model has no {word} to scale: changes={word} needs {need}")
     return scale_groups(source, "stiffness", own_prior=prior_std is not None)
 
 

@@ -42,7 +42,9 @@ def expand_measured_shapes(
         True
     """
     rows = model.observe(measurement.sensors)
-    at_rest = _at_rest(model, rigid)
+    # Rows of unit length that read the momentum of a shape.
+    momentum = model.mass_times(np.zeros((model.size, 0)) if rigid is None else rigid)
+    at_rest = sp.csr_array((momentum / np.linalg.norm(momentum, axis=0)).T)
     shapes = np.zeros((model.size, len(measurement)))
     for j, eigenvalue in enumerate(measurement.eigenvalues):
         known = np.isfinite(measurement.shapes[:, j])
@@ -57,14 +59,6 @@ def expand_measured_shapes(
         else:
             shapes[:, j] = expand_one_by_dynamics(model, met, readings, float(eigenvalue))
     return shapes
-
-
-def _at_rest(model: Model, rigid: FloatArray | None) -> SparseArray:
-    """Return rows of unit length that read the momentum of a shape, sparse (r, n)."""
-    if rigid is None or rigid.shape[1] == 0:
-        return sp.csr_array((0, model.size))
-    momentum = model.mass_times(rigid)
-    return sp.csr_array((momentum / np.linalg.norm(momentum, axis=0)).T)
 
 
 def expand_one_by_dynamics(

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError, NotApplicable
-from femubench.core.fem.beam import BeamProperties, stiffness_matrices
+from femubench.core.fem.beam import stiffness_matrices
 from femubench.core.fem.frame import Plane
 from femubench.core.fem.model import Model
 from femubench.core.fem.model_parameters import matrix_slopes, with_values
@@ -56,23 +56,40 @@ def mid_plane_mirror() -> FloatArray:
     return np.diag(signs)
 
 
-def strain_modes() -> FloatArray:
-    """Return the six strain modes of a beam of unit length, columns, (12, 6).
+_TRANSLATION_XZ, _SLOPE_XZ = [2, 8], [4, 10]
+_TRANSLATION_XY, _SLOPE_XY = [1, 7], [5, 11]
+_TWIST, _AXIAL = [3, 9], [0, 6]
+
+
+def strain_vectors(clear: FloatArray, rigid_1: FloatArray, rigid_2: FloatArray) -> FloatArray:
+    """Return the six strain modes of beams in forces per strain, columns, (n_e, 12, 6).
 
     Symmetric bending, antisymmetric bending (shear) in the local x-z plane, twist, extension, and
-    the same two bending modes in the local x-y plane.
+    the same two bending modes in the local x-y plane. A rigid end lengthens the lever of the shear
+    force, so that the columns stay free of rigid-body motion.
+
+    Arguments:
+        clear: flexible lengths in m, (n_e,).
+        rigid_1, rigid_2: rigid lengths at the ends in m, (n_e,).
 
     Source: Ahmadian, Gladwell & Ismail (1997), section 4.3, U0.
     """
-    modes = np.zeros((12, 6))
+    first, last = clear + 2.0 * rigid_1, clear + 2.0 * rigid_2
     a, b = np.sqrt(0.5), np.sqrt(0.1)
-    modes[[4, 10], 0] = [-a, a]  # slope = -ry
-    modes[[2, 4, 8, 10], 1] = [2 * b, -b, -2 * b, -b]
-    modes[[3, 9], 2] = [a, -a]
-    modes[[0, 6], 3] = [a, -a]
-    modes[[5, 11], 4] = [a, -a]
-    modes[[1, 5, 7, 11], 5] = [2 * b, b, -2 * b, b]
+    modes = np.zeros((len(clear), 12, 6))
+    for bend, shear, (w1, w2), (r1, r2), turn in (
+        (0, 1, _TRANSLATION_XZ, _SLOPE_XZ, -1.0),  # slope = -ry
+        (4, 5, _TRANSLATION_XY, _SLOPE_XY, 1.0),
+    ):
+        modes[:, r1, bend], modes[:, r2, bend] = turn * a * clear, -turn * a * clear
+        modes[:, w1, shear], modes[:, w2, shear] = 2.0 * b, -2.0 * b
+        modes[:, r1, shear], modes[:, r2, shear] = turn * b * first, turn * b * last
+    modes[:, _TWIST, 2] = np.stack([a * clear, -a * clear], axis=1)
+    modes[:, _AXIAL, 3] = [a, -a]
     return modes
+
+
+_UNIT_MODES = strain_vectors(np.ones(1), np.zeros(1), np.zeros(1))[0]  # of a beam of 1 m
 
 
 def active_strain_modes(active: BoolArray) -> list[int]:
@@ -81,7 +98,7 @@ def active_strain_modes(active: BoolArray) -> list[int]:
     Arguments:
         active: which of the twelve local dofs move, (12,).
     """
-    still = np.abs(strain_modes()[~active]).sum(axis=0) == 0.0
+    still = np.abs(_UNIT_MODES[~active]).sum(axis=0) == 0.0
     return [int(i) for i in np.flatnonzero(still)]
 
 
@@ -91,7 +108,7 @@ def strain_mode_signs(operation: FloatArray, active: BoolArray) -> FloatArray:
     Raises:
         ModelError: when the operation mixes strain modes.
     """
-    modes = strain_modes()[:, active_strain_modes(active)]
+    modes = _UNIT_MODES[:, active_strain_modes(active)]
     turned = operation_on_dofs(operation) @ modes
     signs = np.sign(np.einsum("iq,iq->q", modes, turned))
     if not np.allclose(turned, modes * signs):
@@ -127,11 +144,6 @@ def free_terms(operations: Sequence[FloatArray], active: BoolArray) -> list[tupl
         keep &= np.outer(signs, signs) > 0.0
     diagonal = [(i, i) for i in range(count)]
     return diagonal + [(i, j) for i in range(count) for j in range(i + 1, count) if keep[i, j]]
-
-
-_TRANSLATION_XZ, _SLOPE_XZ = [2, 8], [4, 10]
-_TRANSLATION_XY, _SLOPE_XY = [1, 7], [5, 11]
-_TWIST, _AXIAL = [3, 9], [0, 6]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -466,58 +478,15 @@ def nobari_family(structure: Structure) -> ElementFamily:
     )
 
 
-def strain_vectors(properties: BeamProperties) -> FloatArray:
-    """Return the strain modes of every element in forces per strain, (n_e, 12, 6).
-
-    The order is that of `element_symmetry.strain_modes`; a rigid end lengthens the lever of the
-    shear force, so that the columns stay free of rigid-body motion.
-    """
-    p = properties
-    clear = p.length - p.rigid_1 - p.rigid_2
-    first, last = clear + 2.0 * p.rigid_1, clear + 2.0 * p.rigid_2
-    a, b = np.sqrt(0.5), np.sqrt(0.1)
-    modes = np.zeros((len(p), 12, 6))
-    for bend, shear, (w1, w2), (r1, r2), turn in (
-        (0, 1, _TRANSLATION_XZ, _SLOPE_XZ, -1.0),
-        (4, 5, _TRANSLATION_XY, _SLOPE_XY, 1.0),
-    ):
-        modes[:, r1, bend], modes[:, r2, bend] = turn * a * clear, -turn * a * clear
-        modes[:, w1, shear], modes[:, w2, shear] = 2.0 * b, -2.0 * b
-        modes[:, r1, shear], modes[:, r2, shear] = turn * b * first, turn * b * last
-    modes[:, _TWIST, 2] = np.stack([a * clear, -a * clear], axis=1)
-    modes[:, _AXIAL, 3] = [a, -a]
-    return modes
-
-
 def scaled_strain_vectors(structure: Structure, elements: IntArray) -> FloatArray:
     """Return V with k_e0 = V V' on the dofs that the plane lets move, (n_e, 12, q)."""
-    properties = structure.properties.take(elements)
-    vectors = strain_vectors(properties)[:, :, active_strain_modes(structure.active_local)]
+    p = structure.properties.take(elements)
+    vectors = strain_vectors(p.length - p.rigid_1 - p.rigid_2, p.rigid_1, p.rigid_2)
+    vectors = vectors[:, :, active_strain_modes(structure.active_local)]
     inverse = np.linalg.pinv(vectors)
-    core = inverse @ stiffness_matrices(properties) @ np.swapaxes(inverse, 1, 2)
+    core = inverse @ stiffness_matrices(p) @ np.swapaxes(inverse, 1, 2)
     diagonal = np.einsum("eqq->eq", core)
     return np.asarray(vectors * np.sqrt(np.maximum(diagonal, 0.0))[:, None, :])
-
-
-def _joint_of(structure: Structure) -> tuple[list[str], list[int]]:
-    """Return the joint type that every element touches and the end by which it does."""
-    kinds, ends = [""] * len(structure.properties), [0] * len(structure.properties)
-    for kind, names in structure.joint_ends.items():
-        for name in names:
-            element, end = structure.element_ends[name]
-            kinds[element], ends[element] = kind, end
-    return kinds, ends
-
-
-def _core_patterns(
-    structure: Structure, terms: list[tuple[int, int]], turned: BoolArray
-) -> FloatArray:
-    """Return the core of each term, turned end for end where told, (n_e, n_a, q, q)."""
-    flip = end_swap_signs(structure.frame.plane, structure.active_local)
-    cores = np.zeros((len(terms), len(flip), len(flip)))
-    for a, (i, j) in enumerate(terms):
-        cores[a, i, j] = cores[a, j, i] = 1.0
-    return np.where(turned[:, None, None, None], np.outer(flip, flip) * cores, cores)
 
 
 def generic_family(
@@ -544,11 +513,19 @@ def generic_family(
         16
     """
     elements, _, labels = _changeable(structure)
-    kinds, ends = _joint_of(structure)
+    # The joint type that every element touches and the end by which it does.
+    kinds, ends = [""] * len(structure.properties), [0] * len(structure.properties)
+    for kind, touching in structure.joint_ends.items():
+        for end_name in touching:
+            element, end = structure.element_ends[end_name]
+            kinds[element], ends[element] = kind, end
     plane, active = structure.frame.plane, structure.active_local
-    terms = free_terms([], active)
-    turned = np.array([tied and ends[e] == 1 for e in elements])
-    cores = _core_patterns(structure, terms, turned)
+    terms, flip = free_terms([], active), end_swap_signs(plane, active)
+    plain_cores = np.zeros((len(terms), len(flip), len(flip)))
+    for a, (i, j) in enumerate(terms):
+        plain_cores[a, i, j] = plain_cores[a, j, i] = 1.0
+    turned = np.array([tied and ends[e] == 1 for e in elements])[:, None, None, None]
+    cores = np.where(turned, np.outer(flip, flip) * plain_cores, plain_cores)
     vectors = scaled_strain_vectors(structure, elements)[:, None]
     patterns = vectors @ cores @ np.swapaxes(vectors, 2, 3)
     allowed = {s: set(free_terms(operations_of(s, plane), active)) for s in (plain, joint)}

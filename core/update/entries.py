@@ -418,7 +418,15 @@ def update_entries(
         if free is None:
             raise
         found = _fitted(model, measurement, pattern, free, least_squares_cutoff)
-    _check_kept(model, found.model, rigid)
+    outside = (found.model.stiffness != 0.0).astype(int) - (model.stiffness != 0.0).astype(int)
+    if grown := int((outside > 0).sum()):
+        raise SelfCheckFailed("number of zeros of K that are zero no more", float(grown), 0.0)
+    if rigid.shape[1]:
+        force = np.abs(found.model.stiffness_times(rigid)).max()
+        size = (np.abs(found.model.stiffness) @ np.abs(rigid)).max()
+        if not force <= ALLOWED * size:
+            promise = "rigid-body motions of the updated model free of forces"
+            raise SelfCheckFailed(promise, float(force / size), ALLOWED)
     return found
 
 
@@ -433,7 +441,16 @@ def _met(
     changes, current, rank = np.zeros(len(pattern)), model, None
     history: list[Mapping[str, float]] = []
     for step in range(MOST_ITERATIONS):
-        quasi = _next_quasi(current, measurement, history)
+        try:
+            quasi = quasi_measured_modes(current, measurement)
+        except StrategyFailure as lost:
+            if not history:
+                raise
+            promise = (
+                f"after step {step} {lost}, with the zeros of K kept; stiffness forces against "
+                "inertia forces of the used modes"
+            )
+            raise SelfCheckFailed(promise, history[-1]["residual"], ALLOWED) from lost
         equations = equations_of(pattern, current, quasi, cutoff)
         if free is not None:
             change, rank = smallest_change(equations, free)
@@ -497,37 +514,6 @@ def _free_directions(pattern: EntryPattern, model: Model, rigid: FloatArray) -> 
     if rigid.shape[1] == 0 and len(pattern) > DENSE_UNKNOWNS:
         return None
     return null_space(pattern.products(rigid, force_scale(model)).toarray())
-
-
-def _check_kept(model: Model, updated: Model, rigid: FloatArray) -> None:
-    outside = (updated.stiffness != 0.0).astype(int) - (model.stiffness != 0.0).astype(int)
-    grown = int((outside > 0).sum())
-    if grown:
-        raise SelfCheckFailed("number of zeros of K that are zero no more", float(grown), 0.0)
-    if rigid.shape[1]:
-        force = np.abs(updated.stiffness_times(rigid)).max()
-        size = (np.abs(updated.stiffness) @ np.abs(rigid)).max()
-        if not force <= ALLOWED * size:
-            raise SelfCheckFailed(
-                "rigid-body motions of the updated model free of forces",
-                float(force / size),
-                ALLOWED,
-            )
-
-
-def _next_quasi(
-    current: Model, measurement: Measurement, history: list[Mapping[str, float]]
-) -> QuasiModes:
-    try:
-        return quasi_measured_modes(current, measurement)
-    except StrategyFailure as lost:
-        if not history:
-            raise
-        promise = (
-            f"after step {len(history)} {lost}, with the zeros of K kept; stiffness forces against "
-            "inertia forces of the used modes"
-        )
-        raise SelfCheckFailed(promise, history[-1]["residual"], ALLOWED) from lost
 
 
 def _quasi_after(step: int, current: Model, measurement: Measurement) -> QuasiModes:

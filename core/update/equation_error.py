@@ -281,48 +281,28 @@ def update_by_equation_error(
         raise NotApplicable("the model has no free rigid-body modes that could be kept")
     basis = rigid_basis(model, family, rigid) if keep_rigid else None
     modes = WantedModes(model, measurement, expansion, frequencies)
-    current, solution, history = _iterate(model, modes, family, basis, orthogonality)
+    current, x, history = model, np.zeros(len(family)), []
+    for _ in range(ITERATIONS):  # mass and zero point stay nominal
+        a, b, size = equations(model, family, modes.at(current), orthogonality=orthogonality)
+        solution = solve_least_change(a, b, family, basis)
+        change = np.linalg.norm(solution.x - x) / max(float(np.linalg.norm(solution.x)), 1e-300)
+        x = solution.x
+        current = family.changed(model, x)
+        history.append({"residual": solution.residual / size, "change": float(change)})
     promised = keep_rigid or family.cores is not None
     diagnostics = {
         "equations": float(solution.equations),
         "unknowns": float(len(family)),
         "rank": float(solution.rank),
         "condition": solution.condition,
-        **_self_check(current, family, solution.x, rigid, promised=promised),
+        **_self_check(current, family, x, rigid, promised=promised),
     }
-    return UpdateResult(
-        current, solution.free, _estimates(family, solution.x), history, diagnostics
-    )
-
-
-def _iterate(
-    model: Model,
-    modes: WantedModes,
-    family: Family,
-    basis: FloatArray | None,
-    orthogonality: bool,
-) -> tuple[Model, Solution, tuple[Mapping[str, float], ...]]:
-    """Return the last model, its solution and the history; mass and zero point stay nominal."""
-    current, x, history = model, np.zeros(len(family)), []
-    for _ in range(ITERATIONS):
-        quasi = modes.at(current)
-        a, b, size = equations(model, family, quasi, orthogonality=orthogonality)
-        solution = solve_least_change(a, b, family, basis)
-        change = np.linalg.norm(solution.x - x) / max(float(np.linalg.norm(solution.x)), 1e-300)
-        x = solution.x
-        current = family.changed(model, x)
-        history.append({"residual": solution.residual / size, "change": float(change)})
-    return current, solution, tuple(history)
-
-
-def _estimates(family: Family, x: FloatArray) -> tuple[ParameterEstimate, ...]:
-    listed = zip(
-        *(family.names, family.before, family.values(x), family.units, family.places), strict=True
-    )
-    return tuple(
+    columns = family.names, family.before, family.values(x), family.units, family.places
+    estimates = tuple(
         ParameterEstimate(name, float(before), float(after), unit, places=places)
-        for name, before, after, unit, places in listed
+        for name, before, after, unit, places in zip(*columns, strict=True)
     )
+    return UpdateResult(current, solution.free, estimates, tuple(history), diagnostics)
 
 
 def _self_check(

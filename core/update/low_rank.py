@@ -2,41 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.fem.model import LowRank, Model
+from femubench.core.fem.model import LowRank, Model, total_change
 from femubench.core.modal.eigen import DENSE_LIMIT, Modes, keep_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.update.promise import check_used_modes
 from femubench.core.update.quasi import partners_of
 
-_NEGLIGIBLE = 1e-14
 _OUTSIDE = 1e-10  # of a change, what rounding leaves outside the space it acts in
-
-
-def total_change(parts: Sequence[LowRank | None]) -> LowRank | None:
-    """Return the sum of low-rank changes with the smallest rank that represents it.
-
-    Arguments:
-        parts: changes of one matrix; None stands for no change.
-
-    Examples:
-        >>> change = fem.LowRank(np.eye(4, 2), np.eye(2))
-        >>> np.allclose(update.total_change([change, None, change]).toarray(), 2 * change.toarray())
-        True
-    """
-    changes = [part for part in parts if part is not None]
-    if not changes:
-        return None
-    q, r = la.qr(np.hstack([change.basis for change in changes]), mode="economic")
-    core = r @ la.block_diag(*(change.core for change in changes)) @ r.T
-    values, turn = la.eigh(0.5 * (core + core.T))
-    keep = np.abs(values) > _NEGLIGIBLE * np.abs(values).max(initial=0.0)
-    return LowRank(q @ turn[:, keep], np.diag(values[keep]))
 
 
 def with_stiffness_step(model: Model, modes: Modes, step: LowRank) -> Model:

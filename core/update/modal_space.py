@@ -155,15 +155,15 @@ class ModalSpace:
         The residual of a shape is that of both shapes at unit length, the measured less its share
         along the model's: the sum of its squares is 1 - MAC, whose own slope vanishes at its best.
         """
+        m, shapes, size = len(self.measurement), self._unit_shapes, len(x) if slopes else 0
         try:
             eigenvalues, vectors = self.eigenpairs(x)
-        except ModelError:
-            return self._none(len(x) if slopes else 0)
+        except ModelError:  # changes together leave no mass
+            rows = np.full(m + self._unit_shapes.size * bool(shapes.any()), _NO_MODEL)
+            return ModalFit(rows, np.zeros((len(rows), size)), 0)
         readings = self.readings @ vectors
         partner = self.partners(eigenvalues, readings)
-        m, shapes = len(self.measurement), self._unit_shapes
         rows, shape_rows = np.full(m, _LOST), np.zeros((m, len(readings) if shapes.any() else 0))
-        size = len(x) if slopes else 0
         slope, shape_slope = np.zeros((m, size)), np.zeros((*shape_rows.shape, size))
         there = np.flatnonzero(partner >= 0)
         own = np.sqrt(np.maximum(eigenvalues[partner[there]], 0.0)) / (2.0 * np.pi)
@@ -176,23 +176,22 @@ class ModalSpace:
             if not shapes[i].any():
                 continue
             read = np.where(self._known[i], readings[:, j], 0.0)
-            scale, shape_rows[i] = _shape_misfit(shapes[i], read)
+            # The measured shape less s times the model's.
+            square = max(float(read @ read), 1e-300)
+            scale = float(shapes[i] @ read) / square
+            shape_rows[i] = shapes[i] - scale * read
             if slopes:
                 gap = eigenvalues[j] - eigenvalues
                 gap[np.abs(gap) <= _DEPENDENT * np.abs(eigenvalues[j])] = np.inf
                 turn = np.where(self._known[i][:, None], readings @ (gain / gap).T, 0.0)
-                shape_slope[i] = _shape_slope(shapes[i], read, turn, scale)
+                scale_slope = ((shapes[i] - 2.0 * scale * read) @ turn) / square
+                shape_slope[i] = -scale * turn - np.outer(read, scale_slope)
         weight = self.shape_weight
         return ModalFit(
             np.append(rows, weight * shape_rows.ravel()),
             np.vstack([slope, weight * shape_slope.reshape(shape_rows.size, size)]),
             int((partner >= 0).sum()),
         )
-
-    def _none(self, size: int) -> ModalFit:
-        """Return a fit that no model is as bad as, where changes together leave no mass."""
-        rows = len(self.measurement) + self._unit_shapes.size * bool(self._unit_shapes.any())
-        return ModalFit(np.full(rows, _NO_MODEL), np.zeros((rows, size)), 0)
 
     @cached_property
     def _known(self) -> BoolArray:
@@ -243,33 +242,6 @@ class ModalSpace:
             if found.cost + penalty(trial) <= before:
                 return trial, found
         return x, fit
-
-
-def _shape_misfit(shape: FloatArray, own: FloatArray) -> tuple[float, FloatArray]:
-    """Return s and a measured shape less s times the model's.
-
-    Arguments:
-        shape: measured, at unit length, (n_sensors,).
-        own: the partner at the sensors, (n_sensors,).
-    """
-    scale = float(shape @ own) / _square(own)
-    return scale, shape - scale * own
-
-
-def _shape_slope(shape: FloatArray, own: FloatArray, turn: FloatArray, scale: float) -> FloatArray:
-    """Return how that changes with every factor, (n_sensors, p).
-
-    Arguments:
-        shape, own: as before.
-        turn: slope of the partner, (n_sensors, p).
-        scale: s, which follows.
-    """
-    scale_slope = ((shape - 2.0 * scale * own) @ turn) / _square(own)
-    return np.asarray(-scale * turn - np.outer(own, scale_slope))
-
-
-def _square(shape: FloatArray) -> float:
-    return max(float(shape @ shape), 1e-300)
 
 
 def modal_space(

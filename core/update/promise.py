@@ -62,37 +62,26 @@ class Residuals:
     """How far given shapes and eigenvalues are from modes of a model.
 
     Arguments:
-        forces: K phi - lambda M phi relative to lambda M phi, the largest.
-        frequencies: Rayleigh quotient relative to lambda, the largest.
-        masses: phi_i' M phi_j - delta_ij, the largest.
+        unbalanced: K phi - lambda M phi relative to lambda M phi, (m,).
+        gains: Rayleigh quotient relative to lambda, less 1, (m,).
+        products: phi_i' M phi_j - delta_ij, (m, m).
         rounding: what rounding alone can make of ``forces``: large on very fine meshes.
     """
 
-    forces: float
-    frequencies: float
-    masses: float
+    unbalanced: FloatArray
+    gains: FloatArray
+    products: FloatArray
     rounding: float
 
+    @property
+    def forces(self) -> float:
+        """Return the largest unbalanced force."""
+        return float(self.unbalanced.max())
 
-def _by_mode(
-    model: Model, shapes: FloatArray, eigenvalues: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Return unbalanced forces (m,), Rayleigh quotients (m,), mass products (m, m), rounding."""
-    scale = force_scale(model)[:, None]
-    momentum, force = model.mass_times(shapes), model.stiffness_times(shapes)
-    size = np.linalg.norm(scale * momentum * eigenvalues, axis=0)
-    sums = np.abs(model.stiffness) @ np.abs(shapes)
-    noise = ROUNDED_TERMS * np.finfo(float).eps * sums
-    # Elastic forces are in balance but for rounding, and what puts them there moves every dof.
-    rigid = rigid_modes_of(model)
-    resultant = np.minimum(np.abs(rigid.T @ (model.stiffness @ shapes)), np.abs(rigid).T @ noise)
-    noise = noise + np.abs(model.mass_times(rigid)) @ resultant
-    return (
-        np.asarray(np.linalg.norm(scale * (force - momentum * eigenvalues), axis=0) / size),
-        np.einsum("ij,ij->j", shapes, force) / np.einsum("ij,ij->j", shapes, momentum),
-        shapes.T @ momentum,
-        float((np.linalg.norm(scale * noise, axis=0) / size).max()),
-    )
+    @property
+    def frequencies(self) -> float:
+        """Return the largest error of an eigenvalue."""
+        return float(np.abs(self.gains).max())
 
 
 def measure_residuals(model: Model, shapes: FloatArray, eigenvalues: FloatArray) -> Residuals:
@@ -103,12 +92,21 @@ def measure_residuals(model: Model, shapes: FloatArray, eigenvalues: FloatArray)
         shapes: mass-orthonormal, (n, m).
         eigenvalues: in rad^2/s^2, (m,).
     """
-    forces, rayleigh, masses, rounding = _by_mode(model, shapes, eigenvalues)
+    scale = force_scale(model)[:, None]
+    momentum, force = model.mass_times(shapes), model.stiffness_times(shapes)
+    size = np.linalg.norm(scale * momentum * eigenvalues, axis=0)
+    sums = np.abs(model.stiffness) @ np.abs(shapes)
+    noise = ROUNDED_TERMS * np.finfo(float).eps * sums
+    # Elastic forces are in balance but for rounding, and what puts them there moves every dof.
+    rigid = rigid_modes_of(model)
+    resultant = np.minimum(np.abs(rigid.T @ (model.stiffness @ shapes)), np.abs(rigid).T @ noise)
+    noise = noise + np.abs(model.mass_times(rigid)) @ resultant
+    rayleigh = np.einsum("ij,ij->j", shapes, force) / np.einsum("ij,ij->j", shapes, momentum)
     return Residuals(
-        float(forces.max()),
-        float(np.abs(rayleigh / eigenvalues - 1.0).max()),
-        float(np.abs(masses - np.eye(len(eigenvalues))).max()),
-        rounding,
+        np.asarray(np.linalg.norm(scale * (force - momentum * eigenvalues), axis=0) / size),
+        rayleigh / eigenvalues - 1.0,
+        shapes.T @ momentum - np.eye(len(eigenvalues)),
+        float((np.linalg.norm(scale * noise, axis=0) / size).max()),
     )
 
 
@@ -133,21 +131,20 @@ def check_used_modes(model: Model, shapes: FloatArray, eigenvalues: FloatArray) 
     """
     found = measure_residuals(model, shapes, eigenvalues)
     allowed = max(ALLOWED, found.rounding)
-    forces, rayleigh, masses, _ = _by_mode(model, shapes, eigenvalues)
-    hertz, own = (np.sqrt(np.abs(values)) / (2.0 * np.pi) for values in (eigenvalues, rayleigh))
-    error = np.abs(rayleigh / eigenvalues - 1.0)
+    hertz, error = np.sqrt(np.abs(eigenvalues)) / (2.0 * np.pi), np.abs(found.gains)
     most = min(allowed, MOST_ALLOWED)
     known = np.maximum(most, eigenvalue_rounding(model, shapes, eigenvalues))
     mode = int(least(-error / known, 1e-9))
     if not np.all(error <= known):
-        percent = 100.0 * (own[mode] / hertz[mode] - 1.0)
+        ratio = float(np.sqrt(np.abs(1.0 + found.gains[mode])))
+        own, percent = ratio * hertz[mode], 100.0 * (ratio - 1.0)
         raise SelfCheckFailed(
-            f"the measured mode at {hertz[mode]:.5g} Hz comes out at {own[mode]:.5g} Hz in the "
+            f"the measured mode at {hertz[mode]:.5g} Hz comes out at {own:.5g} Hz in the "
             f"updated model ({percent:+.2g} %); the square of it",
             float(error[mode]),
             float(known[mode]),
         )
-    mode = int(np.argmax(forces))
+    mode = int(np.argmax(found.unbalanced))
     if not found.forces <= allowed:
         raise SelfCheckFailed(
             f"the measured mode at {hertz[mode]:.5g} Hz is no mode of the updated model; its "
@@ -155,12 +152,13 @@ def check_used_modes(model: Model, shapes: FloatArray, eigenvalues: FloatArray) 
             found.forces,
             allowed,
         )
-    if not found.masses <= most:
-        first, second = divmod(int(np.argmax(np.abs(masses - np.eye(len(masses))))), len(masses))
+    off = np.abs(found.products)
+    if not off.max() <= most:
+        first, second = divmod(int(off.argmax()), len(off))
         raise SelfCheckFailed(
             f"the measured shapes at {hertz[first]:.5g} and {hertz[second]:.5g} Hz are not "
             "orthonormal by the mass of the updated model",
-            found.masses,
+            float(off.max()),
             most,
         )
     return found

@@ -207,23 +207,17 @@ def predict(
     """
     count = enough_modes(model, len(data.measurement))
     modes = solve_modes(model, count)
-    if previous is None or _observed_anew(model):
+    if previous is None or (
+        model.structure is not None and any(map(np.any, model.structure.interpolation))
+    ):
         observer = model.observe(data.measurement.sensors)
-    else:
+    else:  # what lies between two nodes moves with them as before
         observer = previous.observer
     partner = pair_measured(data.measurement, modes, observer @ modes.shapes).index
     if previous is not None:
         partner = _followed(partner, model, modes, previous)
     mass = updated_mass(model) if mass is None else mass
     return Prediction(data, model, modes, partner, observer, mass)
-
-
-def _observed_anew(model: Model) -> bool:
-    """Tell whether the interpolation between nodes depends on parameters."""
-    if model.structure is None:
-        return False
-    p = model.structure.properties
-    return any(array.any() for array in (p.rigid_1, p.rigid_2, p.shear_shape))
 
 
 def _followed(partner: IntArray, model: Model, modes: Modes, previous: Prediction) -> IntArray:

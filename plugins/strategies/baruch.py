@@ -39,7 +39,10 @@ def stiffness_change(model: Model, quasi: QuasiModes) -> LowRank:
     rotation = momentum.T @ quasi.modes.shapes[:, quasi.partners]
     energy = (rotation * quasi.modes.eigenvalues[quasi.partners]) @ rotation.T
     force = model.stiffness_times(quasi.shapes)
-    if _is_rounding(model, quasi.shapes, force - momentum @ energy):
+    scale = force_scale(model)[:, None]
+    gross = np.linalg.norm(scale * (np.abs(model.stiffness) @ np.abs(quasi.shapes)), axis=0)
+    rest = np.linalg.norm(scale * (force - momentum @ energy), axis=0)
+    if np.all(rest <= _ROUNDING * gross):
         return LowRank(momentum, _symmetric(np.diag(quasi.eigenvalues) - energy))
     energy = quasi.shapes.T @ force
     core, one = _symmetric(np.diag(quasi.eigenvalues) - energy), np.eye(len(energy))
@@ -49,12 +52,6 @@ def stiffness_change(model: Model, quasi: QuasiModes) -> LowRank:
 
 def _symmetric(matrix: FloatArray) -> FloatArray:
     return np.asarray(0.5 * (matrix + matrix.T))
-
-
-def _is_rounding(model: Model, shapes: FloatArray, rest: FloatArray) -> bool:
-    scale = force_scale(model)[:, None]
-    gross = np.linalg.norm(scale * (np.abs(model.stiffness) @ np.abs(shapes)), axis=0)
-    return bool(np.all(np.linalg.norm(scale * rest, axis=0) <= _ROUNDING * gross))
 
 
 class Baruch(Strategy):

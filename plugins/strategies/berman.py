@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -17,23 +17,24 @@ from femubench.update import check_used_modes, expand_measured_shapes, total_cha
 _DEPENDENT = 1e-6
 
 
-@dataclass(frozen=True)
-class _Expanded:
-    """Expanded shapes with unit generalised mass, and their generalised mass matrix m_A."""
+def expand_without_momentum(
+    model: Model, measurement: Measurement, rigid: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return shapes of unit generalised mass, (n, m), and their generalised mass matrix, (m, m).
 
-    shapes: FloatArray
-    rigid: FloatArray
-    generalised_mass: FloatArray
-
-
-def _expanded(model: Model, measurement: Measurement) -> _Expanded:
-    """Return shapes by dynamic expansion that meet the readings and have no momentum.
-
+    They come by dynamic expansion, meet the readings and have no momentum.
     A free structure vibrates without moving its centre of mass, so its elastic shapes are
     orthogonal to its rigid-body modes; were expanded ones not, the update would give the
     rigid-body modes stiffness. Both are conditions of the expansion.
+
+    Arguments:
+        model: the nominal one.
+        measurement: the used modes.
+        rigid: free rigid-body modes, (n, r).
+
+    Raises:
+        StrategyFailure: when expanded shapes depend on each other.
     """
-    rigid = rigid_modes_of(model)
     shapes = expand_measured_shapes(model, measurement, rigid)
     shapes = shapes - rigid @ (rigid.T @ model.mass_times(shapes))  # what rounding left
     shapes = mass_normalised(model, shapes)
@@ -44,7 +45,7 @@ def _expanded(model: Model, measurement: Measurement) -> _Expanded:
             f"expanded shapes depend on each other: the generalised mass matrix has the "
             f"smallest eigenvalue {smallest:.3g}"
         )
-    return _Expanded(shapes, rigid, 0.5 * (mass + mass.T))
+    return shapes, 0.5 * (mass + mass.T)
 
 
 def mass_change(model: Model, shapes: FloatArray, generalised_mass: FloatArray) -> LowRank:
@@ -76,14 +77,18 @@ def stiffness_change(
 
     Source: Berman & Nagy (1983), stiffness matrix improvement.
     """
-    momentum, force = model.mass_times(shapes), model.stiffness_times(shapes)
-    # Elastic forces are in equilibrium; on fine meshes they are so only up to rounding.
-    force = force - model.mass_times(rigid) @ (rigid.T @ force)
+    momentum, force = model.mass_times(shapes), balance_forces(model, shapes, rigid)
     energy = shapes.T @ force
     m = len(eigenvalues)
     core = 0.5 * (energy + energy.T) + np.diag(eigenvalues)
     blocks = np.block([[core, -np.eye(m)], [-np.eye(m), np.zeros((m, m))]])
     return LowRank(np.hstack([momentum, force]), blocks)
+
+
+def balance_forces(model: Model, shapes: FloatArray, rigid: FloatArray) -> FloatArray:
+    """Return K phi in equilibrium, where elastic forces on fine meshes are up to rounding."""
+    force = model.stiffness_times(shapes)
+    return np.asarray(force - model.mass_times(rigid) @ (rigid.T @ force))
 
 
 class Berman(Strategy):
@@ -107,11 +112,11 @@ class Berman(Strategy):
             SelfCheckFailed: when the used modes are not reproduced to 1e-8.
             ModelError: when a measured frequency is one of the model's own to rounding.
         """
-        expanded = _expanded(model, measurement)
-        shapes, generalised_mass = expanded.shapes, expanded.generalised_mass
+        rigid = rigid_modes_of(model)
+        shapes, generalised_mass = expand_without_momentum(model, measurement, rigid)
         change = mass_change(model, shapes, generalised_mass)
         heavier = replace(model, mass_change=total_change([model.mass_change, change]))
-        step = stiffness_change(heavier, shapes, measurement.eigenvalues, expanded.rigid)
+        step = stiffness_change(heavier, shapes, measurement.eigenvalues, rigid)
         updated = replace(heavier, stiffness_change=total_change([model.stiffness_change, step]))
         found = check_used_modes(updated, shapes, measurement.eigenvalues)
         worst = float(np.abs(generalised_mass - np.eye(len(measurement))).max())

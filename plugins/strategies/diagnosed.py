@@ -134,7 +134,8 @@ class Diagnosed(Strategy):
 
 def _first_that_stands(model: Model, examination: Examination) -> tuple[Explanation, Model] | None:
     """Return the most probable explanation whose model is as free as the nominal one."""
-    free = rigid_modes_of(model).shape[1]
+    free, space = rigid_modes_of(model).shape[1], examination.problem.space
+    least = -_NEGATIVE * float(space.eigenvalues[space.rigid :][:1].sum())
     for name in examination.posterior.names:
         explanation = examination.posterior.best(name)
         try:
@@ -142,15 +143,9 @@ def _first_that_stands(model: Model, examination: Examination) -> tuple[Explanat
             lowest = float(solve_modes(extended).eigenvalues[0])
         except FemubenchError:
             continue
-        if rigid_modes_of(extended).shape[1] >= free and lowest >= -_negative(examination):
+        if rigid_modes_of(extended).shape[1] >= free and lowest >= least:
             return explanation, extended
     return None
-
-
-def _negative(examination: Examination) -> float:
-    """Return the size from which an eigenvalue below zero counts as negative."""
-    space = examination.problem.space
-    return _NEGATIVE * float(space.eigenvalues[space.rigid :][:1].sum())
 
 
 def _estimates(explanation: Explanation) -> tuple[ParameterEstimate, ...]:

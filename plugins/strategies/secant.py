@@ -8,13 +8,11 @@ from typing import ClassVar
 import numpy as np
 import scipy.linalg as la
 
-from femubench import Measurement, Model, Strategy, StrategyFailure, UpdateResult
+from femubench import Measurement, Model, Strategy, UpdateResult
 from femubench.fem import FloatArray, LowRank
-from femubench.modal import mass_normalised, rigid_modes_of
-from femubench.update import check_used_modes, expand_measured_shapes, total_change
-
-# Below this share of independent motion two expanded shapes are one.
-_DEPENDENT = 1e-6
+from femubench.modal import rigid_modes_of
+from femubench.plugins.strategies.berman import balance_forces, expand_without_momentum
+from femubench.update import check_used_modes, total_change
 
 
 class Secant(Strategy):
@@ -51,7 +49,10 @@ class Secant(Strategy):
             SelfCheckFailed: when the used modes are not reproduced to 1e-8.
         """
         rigid = rigid_modes_of(model)
-        shapes = orthonormal_shapes(model, expand_measured_shapes(model, measurement, rigid), rigid)
+        shapes, mass = expand_without_momentum(model, measurement, rigid)
+        # The nearest mass-orthonormal ones: Baruch & Bar-Itzhack (1978), Phi (Phi' M Phi)^-1/2.
+        values, turn = la.eigh(mass)
+        shapes = np.asarray(shapes @ (turn / np.sqrt(values)) @ turn.T)
         change = stiffness_change(model, shapes, measurement.eigenvalues, rigid)
         updated = replace(model, stiffness_change=total_change([model.stiffness_change, change]))
         found = check_used_modes(updated, shapes, measurement.eigenvalues)
@@ -60,22 +61,6 @@ class Secant(Strategy):
             parameter_count=model.size * (model.size + 1) // 2,
             diagnostics={"residual": found.forces},
         )
-
-
-def orthonormal_shapes(model: Model, shapes: FloatArray, rigid: FloatArray) -> FloatArray:
-    """Return the mass-orthonormal shapes nearest to given ones, without rigid motion, (n, m).
-
-    Source: Baruch & Bar-Itzhack (1978), Phi (Phi' M Phi)^-1/2.
-    """
-    shapes = shapes - rigid @ (rigid.T @ model.mass_times(shapes))
-    shapes = mass_normalised(model, shapes)
-    values, turn = la.eigh(shapes.T @ model.mass_times(shapes))
-    if not values[0] > _DEPENDENT:
-        raise StrategyFailure(
-            "expanded shapes depend on each other: the generalised mass matrix has the smallest "
-            f"eigenvalue {values[0]:.3g}"
-        )
-    return np.asarray(shapes @ (turn / np.sqrt(values)) @ turn.T)
 
 
 def stiffness_change(
@@ -89,9 +74,7 @@ def stiffness_change(
         eigenvalues: measured, in rad^2/s^2, (m,).
         rigid: free rigid-body modes, (n, r).
     """
-    momentum, force = model.mass_times(shapes), model.stiffness_times(shapes)
-    # Elastic forces are in equilibrium; on fine meshes they are so only up to rounding.
-    force = force - model.mass_times(rigid) @ (rigid.T @ force)
+    momentum, force = model.mass_times(shapes), balance_forces(model, shapes, rigid)
     energy = shapes.T @ force
     core = la.block_diag(np.diag(eigenvalues), -la.inv(0.5 * (energy + energy.T)))
     return LowRank(np.hstack([momentum, force]), np.asarray(core))
