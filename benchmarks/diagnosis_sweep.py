@@ -23,9 +23,16 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from threadpoolctl import threadpool_limits
-
-from femubench.core.challenge.calibration import (
+from blind_sweep import (
+    GROUPS,
+    Record,
+    SweepCase,
+    bars_table,
+    run_task,
+    stated,
+    tasks,
+)
+from stated_probabilities import (
     MATTERS,
     Statement,
     binned,
@@ -35,16 +42,8 @@ from femubench.core.challenge.calibration import (
     percent,
     wilson,
 )
-from femubench.core.challenge.sweep import (
-    GROUPS,
-    Record,
-    SweepCase,
-    bars_table,
-    run_task,
-    stated,
-    tasks,
-)
-from femubench.core.challenge.true_fit import fits_worse, is_search_fault
+from threadpoolctl import threadpool_limits
+from true_fit import fits_worse, is_search_fault
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "femubench-results" / "diagnosis-sweep.jsonl"

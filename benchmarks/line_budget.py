@@ -17,11 +17,11 @@ PACKAGE = ("core", "plugins", "reports", "papers", "scenarios", "femubench")
 ALL = "package"  # the rooms of PACKAGE together
 # What the rooms have now: they may shrink, and the package is to come to 77 500 lines.
 BUDGETS = {
-    ALL: 81_360,
+    ALL: 80_620,
     "core": 1_100,
     "core/advise": 700,
     "core/case": 6_100,
-    "core/challenge": 2_820,
+    "core/challenge": 2_060,
     "core/change": 1_300,
     "core/cli": 2_540,
     "core/conformance": 2_420,
@@ -50,9 +50,9 @@ BUDGETS = {
     "papers": 3_380,
     "scenarios": 780,
     "femubench": 840,
-    "tests": 49_520,
-    "truths": 8_000,
-    "benchmarks": 5_200,
+    "tests": 49_545,
+    "truths": 8_035,
+    "benchmarks": 5_880,
 }
 ADVICE = (
     "shorten the room: take out what nothing calls, make one of what is there twice; where a "

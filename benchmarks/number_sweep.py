@@ -19,9 +19,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from blind_sweep import GROUPS, Record, SweepCase, run_task, tasks
 from threadpoolctl import threadpool_limits
 
-from femubench.core.challenge.sweep import GROUPS, Record, SweepCase, run_task, tasks
 from femubench.core.inference.settings import Setting, Value, overridden, settings_table, shown
 
 ROOT = Path(__file__).parents[1]

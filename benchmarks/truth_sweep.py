@@ -33,9 +33,8 @@ from threadpoolctl import threadpool_limits
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the truths are not installed
 
-from femubench import read_case
-from femubench.core.challenge.answer import Answer, AnswerCause
-from femubench.core.challenge.calibration import (
+from blind_sweep import Record
+from stated_probabilities import (
     Statement,
     calibration_rows,
     coverage_rows,
@@ -44,6 +43,10 @@ from femubench.core.challenge.calibration import (
     statements,
     wilson,
 )
+from true_fit import CataloguedCause, fits_of, fits_worse, is_search_fault
+
+from femubench import read_case
+from femubench.core.challenge.answer import Answer, AnswerCause
 from femubench.core.challenge.outcome import (
     OUTCOMES,
     Same,
@@ -56,8 +59,6 @@ from femubench.core.challenge.outcome import (
     size_errors,
 )
 from femubench.core.challenge.posing import HEALTHY
-from femubench.core.challenge.sweep import Record
-from femubench.core.challenge.true_fit import CataloguedCause, fits_of, fits_worse, is_search_fault
 from femubench.core.challenge.truth_file import TRUTH_FILE, KnownCase, read_truth
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.plugin.loader import load_plugins

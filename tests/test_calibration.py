@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from femubench.core.challenge.answer import Answer
-from femubench.core.challenge.calibration import (
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from blind_sweep import Record
+from stated_probabilities import (
     Statement,
     binned,
     calibration_rows,
@@ -17,8 +22,7 @@ from femubench.core.challenge.calibration import (
     statements,
     wilson,
 )
-from femubench.core.challenge.sweep import Record
-from femubench.core.challenge.true_fit import fits_worse, is_search_fault
+from true_fit import fits_worse, is_search_fault
 
 
 def test_interval_of_a_proportion() -> None:

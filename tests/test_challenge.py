@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import shutil
+import sys
 import zlib
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,6 +16,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from blind_sweep import bars_table, run_task, tasks
+
 from femubench import Case, Diagnosis, InputError, Model, read_case
 from femubench.core.challenge.answer import Answer, AnswerCause, read_answer
 from femubench.core.challenge.draw import draw_case, registered_effects
@@ -23,7 +27,6 @@ from femubench.core.challenge.outside import OUTSIDE
 from femubench.core.challenge.score import judge_answer
 from femubench.core.challenge.sealed import SEALED_FILE, read_sealed, seal, unseal
 from femubench.core.challenge.structures import STRUCTURES, structure_named
-from femubench.core.challenge.sweep import bars_table, run_task, tasks
 from femubench.core.challenge.truth import (
     KINDS,
     DataKind,
@@ -33,7 +36,7 @@ from femubench.core.challenge.truth import (
     finer,
     scattered,
 )
-from femubench.core.challenge.truth_file import KnownCase, TrueCause, truth_text
+from femubench.core.challenge.truth_file import KnownCase, TrueCause
 from femubench.core.challenge.visibility import delta_chi2
 from femubench.core.cli.main import bench
 from femubench.core.errors import FemubenchError, ModelError
@@ -45,6 +48,7 @@ from femubench.core.plugin.loader import load_plugins
 from femubench.effect import FrameEffect, Parameter, Site, Size
 from femubench.fem import Frame, PointMass
 from femubench.plugins.effects.local_stiffness_loss import LocalStiffnessLoss
+from truths.truth_text import truth_text
 
 LADDER = structure_named("ladder")
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import sys
 from functools import cache
+from pathlib import Path
 
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from blind_sweep import Record, run_task, stated, tasks
+from true_fit import CataloguedCause, fits_worse, true_fit
+
 import femubench
 from femubench.core.challenge.draw import BlindCase
-from femubench.core.challenge.sweep import Record, run_task, stated, tasks
-from femubench.core.challenge.true_fit import CataloguedCause, fits_worse, true_fit
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import InputError

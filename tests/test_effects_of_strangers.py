@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
+from blind_sweep import SweepCase, run_task
 from stranger_effects import CAUTION, SUMMARY, Bare, Plain, Skin
 
 import femubench
@@ -19,7 +21,6 @@ from femubench import Diagnosis, InputError, Model, diagnose
 from femubench.core.case.case import Case
 from femubench.core.challenge import draw
 from femubench.core.challenge.draw import BlindCase, draw_case
-from femubench.core.challenge.sweep import SweepCase, run_task
 from femubench.core.conformance.checking import findings, subjects
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
 from femubench.core.look.look import look

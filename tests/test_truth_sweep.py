@@ -12,8 +12,9 @@ from typing import Any
 import pytest
 
 from femubench import read_case
-from femubench.core.challenge.truth_file import KnownCase, TrueCause, held, truth_text
+from femubench.core.challenge.truth_file import KnownCase, TrueCause, held
 from femubench.core.diagnosis import diagnose as diagnosing
+from truths.truth_text import truth_text
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 import truth_sweep as sweep

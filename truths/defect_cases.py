@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from femubench.core.challenge.truth_file import KnownCase, TrueCause, rounded, truth_text
+from femubench.core.challenge.truth_file import KnownCase, TrueCause
 from truths.defects import ATTACHED, KINDS, OUTSIDE, Defect, local
 from truths.eigenmodes import attach, statics
 from truths.elasticity import Matrices, basis_of
@@ -24,6 +24,7 @@ from truths.seats import rigid_fit
 from truths.solid import Solid
 from truths.structure import Place, Structure
 from truths.suite import mesh_differences, structures, write_files
+from truths.truth_text import rounded, truth_text
 
 Array = npt.NDArray[np.float64]
 SEED = 26_000

@@ -32,13 +32,12 @@ from femubench.core.challenge.truth_file import (
     KnownCase,
     TrueCause,
     read_truth,
-    rounded,
-    truth_text,
 )
 from femubench.core.errors import InputError
 from femubench.core.fit.residuals import Data
 from femubench.core.modal.eigen import enough_modes, solve_modes
 from truths.posing import FAULTS, SUITE
+from truths.truth_text import rounded, truth_text
 
 SEED = 12_000
 TURNED = 0.02  # a section whose sizes differ by less looks the same when turned

@@ -15,13 +15,14 @@ import numpy.typing as npt
 import pandas as pd
 import tomlkit
 
-from femubench.core.challenge.truth_file import KnownCase, TrueCause, rounded, truth_text
+from femubench.core.challenge.truth_file import KnownCase, TrueCause
 from truths.measurement import mac, paired, scaled
 from truths.opensees_faults import OUTSIDE, SINGLES, Fault
 from truths.opensees_frames import AXES, FREE, NU, RHO, Beams, E, Plan, cut, plans
 from truths.opensees_modes import modes
 from truths.posing import OPENSEES, STRUCTURES
 from truths.suite import write_files
+from truths.truth_text import rounded, truth_text
 
 Array = npt.NDArray[np.float64]
 SEED = 41_000

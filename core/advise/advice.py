@@ -118,9 +118,10 @@ def _masses(group: Group) -> Iterator[Option]:
     if not group.points.labels or group.weight <= 0.0:
         return
     size = float(f"{settings.test_mass * group.weight:.1e}")
+    kilograms = f"{size:.{max(0, 1 - int(np.floor(np.log10(size))))}f}"
     tables = [loaded_frequencies(view, group.points, size) for view in group.views]
     for label, *predicted in zip(group.points.labels, *tables, strict=True):
-        text = f"attach {_kilograms(size)} kg at {label} and measure again"
+        text = f"attach {kilograms} kg at {label} and measure again"
         yield group.option("load", text, predicted, group.hertz * predicted[0].values)
 
 
@@ -230,10 +231,6 @@ def second_level(group: Group) -> Option | None:
 
 def _hertz(frequency: float) -> str:
     return f"{frequency:.0f}" if frequency >= 99.5 else f"{frequency:.3g}"
-
-
-def _kilograms(mass: float) -> str:
-    return f"{mass:.{max(0, 1 - int(np.floor(np.log10(mass))))}f}"
 
 
 _KINDS: tuple[Callable[[Group], Iterator[Option]], ...] = (

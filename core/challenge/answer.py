@@ -8,13 +8,12 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from femubench.core.challenge.sealed import read_small
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import InputError
+from femubench.core.files import MIB, read_text
 from femubench.core.roles import Side
 from femubench.core.schema.diagnosis import Verdict
 
-_LARGEST = 4 * 2**20  # bytes
 _AND = " + "
 _ROUNDING = 1e-6
 
@@ -127,7 +126,7 @@ def read_answer(path: Path) -> Answer:
     Raises:
         InputError: when the file cannot be read, is too large or is no answer.
     """
-    text = read_small(path, _LARGEST)
+    text = read_text(path, 4 * MIB)
     try:
         return Answer.model_validate_json(text)
     except ValidationError as error:

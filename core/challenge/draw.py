@@ -242,20 +242,17 @@ def draw_values(
         rng: where the numbers come from.
     """
     ranges = [sizes[min(i, len(sizes) - 1)] if sizes else None for i in range(len(parameters))]
-    drawn = (
-        _from_prior(parameter, rng) if size is None else size.draw(site, rng)
-        for parameter, size in zip(parameters, ranges, strict=True)
-    )
-    return tuple(
-        float(np.clip(value, p.lower, p.upper)) for value, p in zip(drawn, parameters, strict=True)
-    )
-
-
-def _from_prior(parameter: Parameter, rng: np.random.Generator) -> float:
-    x = float(rng.uniform(0.5, 2.0))
-    if not parameter.one_sided and rng.random() < 0.5:
-        x = -x
-    return float(parameter.value(float(np.clip(x, *parameter.range))))
+    values = []
+    for parameter, size in zip(parameters, ranges, strict=True):
+        if size is not None:
+            value = size.draw(site, rng)
+        else:
+            x = float(rng.uniform(0.5, 2.0))
+            if not parameter.one_sided and rng.random() < 0.5:
+                x = -x
+            value = float(parameter.value(float(np.clip(x, *parameter.range))))
+        values.append(float(np.clip(value, parameter.lower, parameter.upper)))
+    return tuple(values)
 
 
 _ATTEMPTS = 200

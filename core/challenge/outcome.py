@@ -163,10 +163,7 @@ def size_errors(truth: KnownCase, record: Record, same: Same) -> tuple[SizeError
             sizes = [p for p in said.parameters if p.std and p.unit == cause.unit]
             here = said.effect == cause.effect and same(said.place, cause.place)
             if here and cause.size is not None and len(sizes) == 1:
-                (size,) = sizes
-                off = (size.value - cause.size) / size.std if size.std else None
-                words = cause.effect, size.name, size.unit
-                found.append(SizeError(*words, cause.size, size.value, off))
+                found.append(SizeError.of(cause.effect, cause.size, cause.unit, sizes[0]))
     return tuple(found)
 
 

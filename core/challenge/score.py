@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from femubench.core.challenge.answer import Answer, AnswerCause
+from femubench.core.challenge.answer import Answer, AnswerParameter
 from femubench.core.challenge.structures import structure_named
 from femubench.core.challenge.truth import HiddenCause, Truth
 from femubench.core.effect.places import match
@@ -34,6 +34,12 @@ class SizeError:
     true: float
     stated: float
     deviations: float | None
+
+    @classmethod
+    def of(cls, effect: str, true: float, unit: str, stated: AnswerParameter) -> SizeError:
+        """Return how far a stated parameter is from the true value."""
+        off = (stated.value - true) / stated.std if stated.std else None
+        return cls(effect, stated.name, unit, true, stated.value, off)
 
 
 @dataclass(frozen=True)
@@ -103,14 +109,24 @@ def judge_answer(truth: Truth, answer: Answer, delta_chi2: Sequence[float]) -> J
         whole = tuple(part for parts in possible if len(parts) == 1 for part in parts)
         among = tuple(part for part in whole if part[0] in every)
         named += [among] if among and visible <= _effects(among) else []
-    fits = [parts for parts in named if _places_fit(frame, parts, truth.causes)]
+    placed = [
+        parts
+        for parts in named
+        if all(
+            any(
+                effect == cause.effect and match(frame, place, cause.place)
+                for cause in truth.causes
+            )
+            for effect, place in parts
+        )
+    ]
     found = len(every & frozenset(effect for parts in possible for effect, _ in parts))
     too_small = not visible
     if answer.verdict == "none":
         reason = "too small to see" if too_small else f"it misses {truth}"
         names = None if too_small else False
         return Judgement(too_small, names, names, 0, 0, too_small, False, (), reason)
-    names, places = bool(named), bool(fits)
+    names, places = bool(named), bool(placed)
     sizes = _sizes(frame, answer, truth.causes) if places else ()
     if group > LARGEST_GROUP:
         names = places = False
@@ -149,34 +165,17 @@ def group_size(answer: Answer) -> int:
     return len({_effects(cause.parts) for cause in answer.causes if cause.side == "model"})
 
 
-def _places_fit(frame: Frame, parts: Parts, causes: Sequence[HiddenCause]) -> bool:
-    """Tell whether every effect named sits where it truly sits."""
-    return all(
-        any(effect == cause.effect and match(frame, place, cause.place) for cause in causes)
-        for effect, place in parts
-    )
-
-
 def _sizes(frame: Frame, answer: Answer, causes: Sequence[HiddenCause]) -> tuple[SizeError, ...]:
     """Return true and stated sizes wherever effect and place are right."""
     return tuple(
-        error
+        SizeError.of(cause.effect, value, unit, parameter)
         for cause in causes
         for said in answer.causes
         if said.effect == cause.effect and match(frame, said.place, cause.place)
-        for error in _size_errors(cause, said)
+        for name, value, unit in zip(cause.names, cause.values, cause.units, strict=True)
+        for parameter in said.parameters
+        if parameter.name == name
     )
-
-
-def _size_errors(cause: HiddenCause, said: AnswerCause) -> list[SizeError]:
-    stated = {parameter.name: parameter for parameter in said.parameters}
-    errors = []
-    for name, value, unit in zip(cause.names, cause.values, cause.units, strict=True):
-        if name in stated:
-            said_value, std = stated[name].value, stated[name].std
-            deviations = (said_value - value) / std if std else None
-            errors.append(SizeError(cause.effect, name, unit, value, said_value, deviations))
-    return errors
 
 
 def _said(answer: Answer) -> str:

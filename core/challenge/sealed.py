@@ -22,11 +22,10 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from femubench.core.challenge.truth import Truth
 from femubench.core.challenge.truth_file import GivenTruth
 from femubench.core.errors import InputError
-from femubench.core.files import read_bytes
+from femubench.core.files import MIB, read_text
 
 SEALED_FILE = "truth.sealed"
 _FORMAT = "femubench-sealed-1"
-_LARGEST = 2**20  # bytes
 # What was drawn here, and what was given from outside.
 _TRUTHS: dict[str, TypeAdapter[Any]] = {
     "truth": TypeAdapter(Truth),
@@ -76,7 +75,7 @@ def unseal(text: str, file: Path | None = None) -> tuple[Truth | GivenTruth, str
         if content.format != _FORMAT:
             raise InputError(f"format {content.format!r}", file=file, expected=repr(_FORMAT))
         unpacking = zlib.decompressobj()
-        raw = unpacking.decompress(base64.b64decode(content.sealed, validate=True), _LARGEST)
+        raw = unpacking.decompress(base64.b64decode(content.sealed, validate=True), MIB)
     except (ValidationError, binascii.Error, zlib.error, ValueError):
         raise InputError("not a sealed truth", file=file, expected=wanted) from None
     if hashlib.sha256(raw).hexdigest() != content.commitment:
@@ -96,20 +95,4 @@ def read_sealed(path: Path) -> tuple[Truth | GivenTruth, str]:
     Raises:
         InputError: when the file is missing, too large, no sealed truth, or was changed.
     """
-    return unseal(read_small(path, _LARGEST), path)
-
-
-def read_small(path: Path, largest: int) -> str:
-    """Return the text of a file from a stranger.
-
-    Arguments:
-        path: the file.
-        largest: the size in bytes up to which it is read.
-
-    Raises:
-        InputError: when it cannot be read, is larger, or is no text.
-    """
-    try:
-        return read_bytes(path, largest).decode("utf-8")
-    except UnicodeDecodeError:
-        raise InputError("not a text", file=path, expected="UTF-8") from None
+    return unseal(read_text(path, MIB), path)

@@ -47,12 +47,7 @@ def _spots(effect: Effect) -> Iterator[tuple[str, Model, str]]:
             yield f"{name}, place {place!r}", model, place
 
 
-@check("effect", "described", "It has a summary or a docstring.")
-def described(bench: Bench) -> Verdict:
-    """Look for a text that tells what the model lacks."""
-    return kit.inspected(bench, is_described)
-
-
+@kit.check_apart("effect", "described", "It has a summary or a docstring.", code_alone=True)
 def is_described(effect: Effect) -> Verdict:
     """Look for a text of an effect that tells what the model lacks."""
     if getattr(effect, "summary", "") or own_doc(type(effect)):

@@ -110,12 +110,25 @@ def check(
 
 
 def check_apart(
-    role: Role, name: str, sentence: str
+    role: Role, name: str, sentence: str, *, first: bool = False, code_alone: bool = False
 ) -> Callable[[Callable[..., Verdict]], Callable[..., Verdict]]:
-    """Put a function on the list of checks that a worker calls with the subject and the helpers."""
+    """Put a function on the list of checks that a worker calls with the subject and the helpers.
+
+    Arguments:
+        role, name, sentence, first: as in `Check`.
+        code_alone: whether it runs nothing of the subject, so that built-in ones need no worker.
+    """
 
     def put(function: Callable[..., Verdict]) -> Callable[..., Verdict]:
-        check(role, name, sentence)(lambda bench: bench.apart(function, *bench.helpers))
+        def judge(bench: Bench) -> Verdict:
+            subject = bench.subject
+            if code_alone and not is_foreign(
+                subject.base if isinstance(subject, Variant) else subject
+            ):
+                return function(subject)
+            return bench.apart(function, *bench.helpers)
+
+        check(role, name, sentence, first=first)(judge)
         return function
 
     return put
@@ -172,15 +185,21 @@ class Bench:
         """Return what is seen in some trials; those that have not run yet run now."""
         missing = [want for want in dict.fromkeys(wants) if want not in self._seen]
         self._seen |= {want: kept for want in missing if (kept := self._unrun(want)) is not None}
-        tasks = {want: (run_trial, self._trial(want)) for want in missing if want not in self._seen}
+        tasks = {}
+        for want in missing:
+            code = sent(self.reference) if want.reference else self.code
+            assert isinstance(code, bytes)
+            if want not in self._seen:
+                tasks[want] = run_trial, Trial(code, self._problem(want), want)
         apart = replace(self.limits, sandbox="auto")
         told = {
             want: told_by(want.problem, ending)
             for want, ending in run_apart(tasks, apart, self._jobs).items()
         }
         handed = {
-            want: (judge_handed, self._handed(want, answer))
+            want: (judge_handed, Handed(self._problem(want), answer, promises_of(strategy)))
             for want, (seen, answer) in told.items()
+            for strategy in (self._strategy(want),)
             if seen.kind == "result"
         }
         judged = run_apart(handed, self.limits, self._jobs)
@@ -197,9 +216,6 @@ class Bench:
         except Exception as error:  # whatever it says that it needs
             return Observation(want.problem, "error", one_line(error))
         return None if reason is None else Observation(want.problem, "lacking", reason)
-
-    def _handed(self, want: Want, answer: bytes) -> Handed:
-        return Handed(self._problem(want), answer, promises_of(self._strategy(want)))
 
     def _strategy(self, want: Want) -> Any:  # noqa: ANN401 - a strategy of anybody's
         return self.reference if want.reference else self.subject
@@ -227,11 +243,6 @@ class Bench:
         except (ValueError, TypeError, RecursionError):
             pass
         return failed("what its process told is no verdict")
-
-    def _trial(self, want: Want) -> Trial:
-        code = sent(self.reference) if want.reference else self.code
-        assert isinstance(code, bytes)
-        return Trial(code, self._problem(want), want)
 
 
 def run_apart(
@@ -273,17 +284,6 @@ def _judged(task: tuple[Callable[..., Verdict], bytes]) -> bytes:
     except BaseException as error:
         verdict = failed(f"{one_line(error)}, expected no exception")
     return json.dumps([verdict.status, verdict.message]).encode()
-
-
-def inspected(bench: Bench, function: Callable[..., Verdict]) -> Verdict:
-    """Return the verdict of a function that looks at the code of the subject, where that may run.
-
-    Arguments:
-        function: importable by name; its only argument is the subject.
-    """
-    subject = bench.subject
-    strange = is_foreign(subject.base if isinstance(subject, Variant) else subject)
-    return bench.apart(function) if strange else function(subject)
 
 
 def _sendable(subject: object, what: str) -> Verdict:

@@ -121,17 +121,13 @@ for _name, _sentence in _RESULTS.items():
     check("strategy", _name, _sentence, wants=_with_results)(partial(_of_results, name=_name))
 
 
-@check(
+@kit.check_apart(
     "strategy",
     "described",
     "It has a citation and a docstring, and its promises are known.",
     first=True,
+    code_alone=True,
 )
-def described(bench: Bench) -> Verdict:
-    """Look at citation, docstring and promises."""
-    return kit.inspected(bench, is_described)
-
-
 def is_described(subject: Strategy) -> Verdict:
     """Look at citation, docstring and promises of a strategy."""
     strategy = subject.base if isinstance(subject, Variant) else subject
@@ -150,14 +146,13 @@ def is_described(subject: Strategy) -> Verdict:
     return passed()
 
 
-@check(
-    "strategy", "options-documented", "The docstring of the class names every option.", first=True
+@kit.check_apart(
+    "strategy",
+    "options-documented",
+    "The docstring of the class names every option.",
+    first=True,
+    code_alone=True,
 )
-def options_documented(bench: Bench) -> Verdict:
-    """Look for the fields of the dataclass in its docstring and those of its bases."""
-    return kit.inspected(bench, names_options)
-
-
 def names_options(subject: Strategy) -> Verdict:
     """Look for the fields of a strategy in its docstring and those of its bases."""
     strategy: Any = subject.base if isinstance(subject, Variant) else subject
@@ -309,11 +304,9 @@ def _measured(bench: Bench) -> Sequence[Want]:
 )
 def returns(bench: Bench) -> Verdict:
     """Run it on a grounded frame with complete data."""
-    return (
-        kit.not_applicable(kit.UNSENT)
-        if isinstance(bench.code, str)
-        else _survives(bench, (PLAIN,))
-    )
+    if isinstance(bench.code, str):
+        return kit.not_applicable(kit.UNSENT)
+    return _survives(bench, (PLAIN,))
 
 
 for _name, (_sentence, _problems) in _SURVIVED.items():

@@ -193,7 +193,11 @@ def _called(
     seconds = time.perf_counter() - start
     peak = tracemalloc.get_traced_memory()[1] if trial.want.traced else None
     tracemalloc.stop()
-    wrong = _wrong_type(result)
+    wrong, model = "", getattr(result, "model", None)
+    if not isinstance(cast(object, result), Result):
+        wrong = f"update returned {type(result).__name__} instead of UpdateResult"
+    elif not isinstance(model, Model):
+        wrong = f"the updated model is {type(model).__name__} instead of Model"
     if wrong:
         return Observation(name, "error", wrong, seconds), None
     # Its model is the data class, as was just seen, and the rest is read by name alone.
@@ -211,12 +215,3 @@ def _refusal(name: str, kind: Kind, error: Exception) -> Observation:
     if not text:
         return Observation(name, "error", f"{type(error).__name__} without a sentence")
     return Observation(name, kind, text)
-
-
-def _wrong_type(result: object) -> str | None:
-    if not isinstance(result, Result):
-        return f"update returned {type(result).__name__} instead of UpdateResult"
-    model: object = result.model
-    if not isinstance(model, Model):
-        return f"the updated model is {type(model).__name__} instead of Model"
-    return None

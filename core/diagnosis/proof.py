@@ -10,7 +10,7 @@ from math import log
 import numpy as np
 from scipy.special import chdtrc, logsumexp
 
-from femubench.core.case.case import Case, Modification
+from femubench.core.case.case import Case
 from femubench.core.diagnosis.verdict import elsewhere, inseparable
 from femubench.core.fem.model import Model
 from femubench.core.fit.discrepancy import Discrepancy
@@ -226,7 +226,10 @@ def modified(
             ]
         )
         pairs = zip((case.model, extended), predicted, strict=False)
-        found = [_corrections(model, change, hertz) for model, hertz in pairs]
+        found = [
+            mesh_corrections(model.attach(change.masses, change.springs), hertz)
+            for model, hertz in pairs
+        ]
         # One mesh serves both where the other is not known.
         known = [row for row in found if row is not None]
         rows = [known[0] if row is None and known else row for row in found]
@@ -240,10 +243,6 @@ def modified(
         std.append(deviation[paired])
     empty = np.zeros(0)
     return Unseen(*(np.concatenate([*rows, empty]) for rows in (before, after, std)))
-
-
-def _corrections(model: Model, change: Modification, hertz: FloatArray) -> FloatArray | None:
-    return mesh_corrections(model.attach(change.masses, change.springs), hertz)
 
 
 def _relative_std(measurement: Measurement) -> FloatArray:

@@ -324,17 +324,14 @@ class _Drawn:
     def screened(self, charge: Charge) -> tuple[Charge, float]:
         """Return a fault with its parameter estimated, and what it gains at the present scales."""
         try:
-            return self._screened(charge)
+            if charge.suspect.parameter is None or charge.single:
+                return charge, float(self.likelier([charge.mended[1]])[0]) + charge.log_prior
+            found = self.estimated(charge)
+            if not _inside(found):
+                return found, -np.inf
+            return found, float(self.likelier([found.mended[1]])[0]) + self.prior(found)
         except (FemubenchError, la.LinAlgError):
             return charge, -np.inf
-
-    def _screened(self, charge: Charge) -> tuple[Charge, float]:
-        if charge.suspect.parameter is None or charge.single:
-            return charge, float(self.likelier([charge.mended[1]])[0]) + charge.log_prior
-        found = self.estimated(charge)
-        if not _inside(found):
-            return found, -np.inf
-        return found, float(self.likelier([found.mended[1]])[0]) + self.prior(found)
 
     def all_screened(self, charges: Sequence[Charge]) -> Weighed:
         """Return every fault as `screened` does; those without a parameter many at once."""

@@ -64,7 +64,9 @@ def interpolated(
         if len(h.parameters) == 1:
             alike.setdefault((len(h.grid), h.still), []).append(i)
         else:
-            found[i] = _best_of_grid(p, own[i])
+            point, least_cost = _in_cells(h.grid, own[i])
+            spread = -0.5 * least_cost - 0.5 * _spread(own[i], h.grid)
+            found[i] = Screened(p, h.grid, own[i], point, least_cost, float(spread))
     for (_, begins), members in alike.items():
         rows = np.array([own[i] for i in members])
         x = np.array([projections[i].hypothesis.grid[:, 0] for i in members])
@@ -80,13 +82,6 @@ def interpolated(
             best = np.array([place])
             found[i] = Screened(p, p.hypothesis.grid, own[i], best, float(cost), float(evidence))
     return [found[i] for i in range(len(projections))]
-
-
-def _best_of_grid(projection: Projection, residuals: FloatArray) -> Screened:
-    grid = projection.hypothesis.grid
-    point, cost = _in_cells(grid, residuals)
-    evidence = -0.5 * cost - 0.5 * _spread(residuals, grid)
-    return Screened(projection, grid, residuals, point, cost, float(evidence))
 
 
 def _in_cells(grid: FloatArray, residuals: FloatArray) -> tuple[FloatArray, float]:

@@ -185,22 +185,19 @@ class Search:
     def on(self, base: Base) -> Found:
         """Return nothing and every single cause on top of a textbook set."""
         with self.effort.piece("single"):
-            return self._on(base)
-
-    def _on(self, base: Base) -> Found:
-        problem = self.grounded(base) if base.parts else self.problem
-        start = fit(problem, (), np.zeros(0))
-        assert start is not None
-        atlas = screened(problem, start.state, problem.space.projections, self.effort)
-        fits = self.refined(problem, start, atlas)
-        explanations = [Explanation(base, item, self.names) for item in (start, *fits)]
-        ranked = by_weight(explanations[1:])
-        # What tells more may carry most of it: the best of what it refines count wherever they are.
-        refined = {getattr(effect, "refines", None) for effect in self.effects}
-        own = [e for e in ranked[settings.finer_singles :] if refined.intersection(e.searched)]
-        most = settings.finer_singles
-        explanations += [e for one in (*ranked[:most], *own[:most]) for e in self.split(one)]
-        return Found(base, problem, tuple(explanations), tuple(atlas))
+            problem = self.grounded(base) if base.parts else self.problem
+            start = fit(problem, (), np.zeros(0))
+            assert start is not None
+            atlas = screened(problem, start.state, problem.space.projections, self.effort)
+            fits = self.refined(problem, start, atlas)
+            explanations = [Explanation(base, item, self.names) for item in (start, *fits)]
+            ranked = by_weight(explanations[1:])
+            # What tells more may carry most of it: the best of what it refines count anywhere.
+            refined = {getattr(effect, "refines", None) for effect in self.effects}
+            own = [e for e in ranked[settings.finer_singles :] if refined.intersection(e.searched)]
+            most = settings.finer_singles
+            explanations += [e for one in (*ranked[:most], *own[:most]) for e in self.split(one)]
+            return Found(base, problem, tuple(explanations), tuple(atlas))
 
     def grounded(self, base: Base) -> Problem:
         """Return the data in the modal coordinates of the model with textbook effects in it.

@@ -130,7 +130,10 @@ def _expanded(
         eigenvalue: measured, in rad^2/s^2.
     """
     model = comparison.model
-    solve = _Solver(model, _off_resonance(comparison.modes, eigenvalue))
+    # As near as that to one of the model, K - lambda M is as good as singular.
+    step = settings.negligible
+    near = np.abs(comparison.modes.eigenvalues / eigenvalue - 1.0).min(initial=1.0) < 0.5 * step
+    solve = _Solver(model, eigenvalue * (1.0 + step) if near else eigenvalue)
     patterns = solve(sensors.T)
     energy = patterns.T @ model.stiffness_times(patterns)
     values, turn = la.eigh(0.5 * (energy + energy.T))
@@ -140,14 +143,6 @@ def _expanded(
     shape = solve(model.stiffness_times(gap[:, None]))[:, 0]
     scale = 1.0 / np.sqrt(float(shape @ model.mass_times(shape[:, None])[:, 0]))
     return scale * shape, scale * gap, eigenvalue
-
-
-def _off_resonance(modes: Modes, eigenvalue: float) -> float:
-    """Return the eigenvalue, moved off one of the model that it hits."""
-    near = np.abs(modes.eigenvalues / eigenvalue - 1.0).min(initial=1.0)
-    # As near as that, K - lambda M is as good as singular.
-    step = settings.negligible
-    return eigenvalue * (1.0 + step) if near < 0.5 * step else eigenvalue
 
 
 class _Solver:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from femubench.core.fem.beam import stiffness_matrices
-from femubench.core.fem.frame import Frame, Material, Member
+from femubench.core.fem.frame import Member
 from femubench.core.fem.joints import whole_members
 from femubench.core.fem.sections import Section
 from femubench.core.inference.settings import settings
@@ -75,7 +75,8 @@ def look_at_materials(seen: Seen) -> list[LookWarning]:
     frame = seen.model.frame_structure.frame
     found: list[LookWarning] = []
     for material in dict.fromkeys(m.material for m in frame.members):
-        where = _members_of(frame, material)
+        names = [m.name for m in frame.members if m.material == material]
+        where = "all" if len(names) == len(frame.members) else ", ".join(names)
         ratio = material.E / material.rho
         low, high = settings.stiffness_per_mass
         if not low <= ratio <= high:
@@ -87,11 +88,6 @@ def look_at_materials(seen: Seen) -> list[LookWarning]:
         if not 0.0 <= material.nu < 0.5:
             what = f"Poisson's ratio {material.nu:g} is not between 0 and 0.5."
             found.append(LookWarning(what, where, ""))
-    return found + _shear_coefficients(frame)
-
-
-def _shear_coefficients(frame: Frame) -> list[LookWarning]:
-    found = []
     for member in frame.members:
         values, (low, high) = _kappa(member), settings.shear_coefficient
         if values and not all(low <= k <= high for k in values):
@@ -104,8 +100,3 @@ def _shear_coefficients(frame: Frame) -> list[LookWarning]:
 def _kappa(member: Member) -> tuple[float, ...]:
     kappa = member.section.kappa
     return () if kappa is None else kappa(member.material.nu)
-
-
-def _members_of(frame: Frame, material: Material) -> str:
-    names = [m.name for m in frame.members if m.material == material]
-    return "all" if len(names) == len(frame.members) else ", ".join(names)

@@ -279,16 +279,13 @@ def _lay_out(chart: Chart, key: Literal["x", "y"], ax: Axes) -> None:
         reach = (-0.5, len(axis.names) - 0.5)
         settings |= {f"{key}lim": reach if key == "x" else reach[::-1]}
         settings |= {f"{key}ticks": range(len(axis.names))}
-        settings |= {f"{key}ticklabels": [name_of(name, _letters(ax)) for name in axis.names]}
+        # Most of the figure is left for the data.
+        letters = min(30, max(12, int(5.4 * figure_of(ax).get_figwidth())))
+        settings |= {f"{key}ticklabels": [name_of(name, letters) for name in axis.names]}
     ax.set(**settings)
     ax.set_axisbelow(True)
     if axis.log:
         _round_ticks(ax.xaxis if key == "x" else ax.yaxis, *reach)
-
-
-def _letters(ax: Axes) -> int:
-    """Return how long names at an axis may be, so that most of the figure is left for the data."""
-    return min(30, max(12, int(5.4 * figure_of(ax).get_figwidth())))
 
 
 def _round_ticks(axis: MatplotlibAxis, low: float, high: float) -> None:
@@ -415,9 +412,7 @@ def _cells(chart: Chart, ax: Axes) -> Axes:
             text, colour = f"{v:.2g}" if math.isfinite(v) else "–", "white" if dark else "black"
             ax.text(j, i, text, ha="center", va="center", fontsize=8.0, color=colour)
     beyond = grid[np.isfinite(grid)]
-    ends = (bool((beyond < low).any()), bool((beyond > high).any()))
-    extend = {(False, False): "neither", (True, False): "min", (False, True): "max"}.get(
-        ends, "both"
-    )
+    extends = ("neither", "max"), ("min", "both")
+    extend = extends[int((beyond < low).any())][int((beyond > high).any())]
     figure_of(ax).colorbar(image, ax=ax, extend=extend).set_label(chart.value.title)
     return ax

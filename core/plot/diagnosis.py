@@ -327,14 +327,17 @@ def draw_spots(
     Raises:
         InputError: when the structure has no extent.
     """
+    from matplotlib.lines import Line2D
+
     view = view_of(structure)
     places = [structure.place(spot.place) for spot in spots]
-    shades: dict[str, tuple[str, float]] = {}
+    shades: list[Any] = []
     if any(place.kind != "all" for place in places):
-        shades["evidence by place, of all explanations"] = COLOURS["e3"], 6.0
+        label = "evidence by place, of all explanations"
+        shades.append(Line2D([], [], label=label, color=COLOURS["e3"], linewidth=6.0))
     if any(place.kind == "all" for place in places):
         halo = "evidence for something everywhere"
-        shades[halo] = COLOURS["halo"], 9.0
+        shades.append(Line2D([], [], label=halo, color=COLOURS["halo"], linewidth=9.0))
         lines = view.flat(structure.lines)
         draw_lines(ax, lines, colors=COLOURS["halo"], linewidths=11.0, gid="everywhere-1",
                    label=f"_{halo}")  # fmt: skip
@@ -347,18 +350,8 @@ def draw_spots(
     if names:
         draw_sensors(ax, structure, view)
         names_at = draw_names(ax, structure, view)
-        draw_findings(ax, structure, view, findings, names_at, _handles(shades))
+        draw_findings(ax, structure, view, findings, names_at, shades)
     return ax
-
-
-def _handles(shades: Mapping[str, tuple[str, float]]) -> list[Any]:
-    """Return what a list of shades, with colour and width by their names, needs."""
-    from matplotlib.lines import Line2D
-
-    return [
-        Line2D([], [], label=name, color=colour, linewidth=width)
-        for name, (colour, width) in shades.items()
-    ]
 
 
 def _draw_spot(

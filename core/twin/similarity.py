@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.core.case.case import Case, Modification
+from femubench.core.case.case import Case
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.frame import (
@@ -25,7 +25,6 @@ from femubench.core.fem.frame import (
     Joint,
     JointSpring,
     Material,
-    Oscillator,
     PointMass,
     Preload,
     RigidEnd,
@@ -102,7 +101,15 @@ def similar_case(case: Case, by: Similarity) -> Case:
         NotApplicable: for a model that is neither a frame nor matrices with their nodes.
     """
     measured, reference, low_high = case.measurement, case.reference, case.band
-    changes = tuple(_modification(change, by) for change in case.modifications)
+    changes = tuple(
+        replace(
+            change,
+            masses=tuple(_point_mass(mass, by) for mass in change.masses),
+            springs=tuple(_ground_spring(spring, by) for spring in change.springs),
+            measurement=_measurement(change.measurement, by),
+        )
+        for change in case.modifications
+    )
     return replace(
         case,
         model=_model(case.model, by),
@@ -132,15 +139,6 @@ def _measurement(measured: Measurement, by: Similarity) -> Measurement:
         shapes=readings * measured.shapes,
         shape_std=readings * measured.shape_std,
         total_mass=None if weight is None else (by.mass * weight[0], by.mass * weight[1]),
-    )
-
-
-def _modification(change: Modification, by: Similarity) -> Modification:
-    return replace(
-        change,
-        masses=tuple(_point_mass(mass, by) for mass in change.masses),
-        springs=tuple(_ground_spring(spring, by) for spring in change.springs),
-        measurement=_measurement(change.measurement, by),
     )
 
 
@@ -197,7 +195,10 @@ def similar_frame(frame: Frame, by: Similarity) -> Frame:
         "masses": [_point_mass(mass, by) for mass in frame.masses],
         "springs": [_ground_spring(spring, by) for spring in frame.springs],
         "joint_springs": [_joint_spring(spring, by) for spring in frame.joint_springs],
-        "rigid_ends": [_rigid_end(end, by.length) for end in frame.rigid_ends],
+        "rigid_ends": [
+            RigidEnd(e.joint, e.member, by.length * e.stiffness_length, by.length * e.mass_length)
+            for e in frame.rigid_ends
+        ],
         "preloads": [Preload(p.member, by.force * p.force) for p in frame.preloads],
         "eccentricities": [
             Eccentricity(e.member, by.length * e.y, by.length * e.z) for e in frame.eccentricities
@@ -205,7 +206,10 @@ def similar_frame(frame: Frame, by: Similarity) -> Frame:
         "braces": [
             Brace(b.ends, by.stiffness("x") * b.stiffness, b.direction) for b in frame.braces
         ],
-        "oscillators": [_oscillator(item, by) for item in frame.oscillators],
+        "oscillators": [
+            replace(o, mass=by.mass * o.mass, frequency=by.frequency * o.frequency)
+            for o in frame.oscillators
+        ],
     }
     own: dict[str, Any] = {name: tuple(items) for name, items in changed.items()}
     gravity = frame.gravity * by.modulus / (by.density * by.length)
@@ -239,12 +243,3 @@ def _ground_spring(spring: GroundSpring, by: Similarity) -> GroundSpring:
 def _joint_spring(spring: JointSpring, by: Similarity) -> JointSpring:
     stiffness = {name: by.stiffness(name) * value for name, value in spring.stiffness.items()}
     return replace(spring, stiffness=stiffness, arm=by.length * spring.arm)
-
-
-def _rigid_end(end: RigidEnd, length: float) -> RigidEnd:
-    lengths = length * end.stiffness_length, length * end.mass_length
-    return RigidEnd(end.joint, end.member, *lengths)
-
-
-def _oscillator(item: Oscillator, by: Similarity) -> Oscillator:
-    return replace(item, mass=by.mass * item.mass, frequency=by.frequency * item.frequency)

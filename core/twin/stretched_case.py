@@ -11,7 +11,7 @@ import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.errors import NotApplicable
-from femubench.core.fem.frame import Frame, GroundSpring, Joint, Place, PointMass, Vector
+from femubench.core.fem.frame import Frame, GroundSpring, Joint, Place, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.fem.sections import Section, rectangular_tube, solid_rectangle
 from femubench.core.fem.sensors import Sensors
@@ -131,10 +131,10 @@ def stretched_case(
         )
         for number, change in enumerate(case.modifications, start=1)
     )
-    corners = solid.moved(factors, frame.corners)
+    corners = solid.moved(factors, frame.corners).tolist()
     joints = [
-        Joint(joint.name, _vector(xyz), joint.type)
-        for joint, xyz in zip(frame.joints, corners, strict=True)
+        Joint(joint.name, (x, y, z), joint.type)
+        for joint, (x, y, z) in zip(frame.joints, corners, strict=True)
     ]
     sections = {id(m.section): _section(m.section, solid, factors) for m in frame.members}
     return replace(
@@ -155,11 +155,6 @@ def stretched_case(
         matches=(),
         lines=None,
     )
-
-
-def _vector(xyz: FloatArray) -> Vector:
-    x, y, z = (float(value) for value in xyz)
-    return x, y, z
 
 
 def _section(section: Section, solid: ReducedSolid, factors: FloatArray) -> Section:

@@ -8,13 +8,14 @@ from dataclasses import asdict, astuple, dataclass
 from functools import partial
 from typing import Any
 
+from stated_probabilities import Statement, percent, statements
+from true_fit import CataloguedCause, fits_of, fits_worse, is_search_fault
+
 from femubench.core.case.case import Case
 from femubench.core.challenge.answer import Answer
-from femubench.core.challenge.calibration import Statement, percent, statements
 from femubench.core.challenge.draw import BlindCase, draw_case, registered_effects
 from femubench.core.challenge.score import Judgement, judge_answer
 from femubench.core.challenge.structures import STRUCTURES, structure_named
-from femubench.core.challenge.true_fit import CataloguedCause, fits_of, fits_worse, is_search_fault
 from femubench.core.challenge.truth import DataKind, Hidden, Truth
 from femubench.core.challenge.visibility import delta_chi2
 from femubench.core.diagnosis.result import Diagnosis
