@@ -154,6 +154,7 @@ if TYPE_CHECKING:
     from femubench.core.modal.measurement import Measurement
     from femubench.core.plugin.markers import hookimpl
     from femubench.core.roles import Reader, Scenario
+    from femubench.core.schema.run_options import RunOptions, Where
     from femubench.core.update.strategy import ParameterEstimate, Strategy, UpdateResult
 
 

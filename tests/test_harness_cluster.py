@@ -244,10 +244,8 @@ def test_workers_that_a_user_started(tmp_path: Path, monkeypatch: pytest.MonkeyP
             time.sleep(0.1)
         address = re.findall(r'"(tcp://[^"]*)"', file.read_text())[0]
         monkeypatch.setattr(cluster, "_ANSWER", 1.0)
-        with (
-            open_executor(Where(scheduler=address)) as place,
-            pytest.raises(InputError, match="no worker"),
-        ):
+        there = Where(scheduler=address)
+        with open_executor(there) as place, pytest.raises(InputError, match="no worker"):
             run_jobs([toys.tiny_case()], [toys.Unchanged()], executor=place)
         monkeypatch.setattr(cluster, "_ANSWER", 60.0)
         dask = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "2"]

@@ -118,9 +118,8 @@ class TestExpansion:
 
     def test_seeds_are_draws_or_a_list_or_the_data_as_recorded(self) -> None:
         plain = STUDY.replace("noise = [0.5, 1.0, 2.0]\n", "")
-        assert plan_of(STUDY.replace('title = "A spy"', "seed = 7")).options.all_seeds == range(
-            8, 10
-        )
+        first = plan_of(STUDY.replace('title = "A spy"', "seed = 7"))
+        assert first.options.all_seeds == range(8, 10)
         assert plan_of(plain.replace("seeds = 2", "seeds = [0, 5]")).options.all_seeds == (0, 5)
         assert plan_of(plain.replace("seeds = 2\n", "")).options.all_seeds == range(1)
 
