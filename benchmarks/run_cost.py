@@ -26,15 +26,15 @@ import psutil
 from threadpoolctl import threadpool_limits
 
 from femubench.core.library.cases import usable_plugins
-from femubench.core.library.rank import Plan, plan_of
+from femubench.core.library.rank import plan_run
 from femubench.core.modal import eigen
 from femubench.core.run.answers import packed, unpacked
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.jobs import Job, performed
 from femubench.core.run.judging import judged
+from femubench.core.run.runner import Plan, Receivers
 from femubench.core.run.sandbox import Sandbox
 from femubench.core.run.slots import Slots
-from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
 from femubench.core.score.scoring import reference_of
 
@@ -71,7 +71,7 @@ def run_cost(plan: Plan, workers: int = 1, sandbox: Sandbox = "auto") -> Cost:
     place = LocalProcesses(workers, sandbox)
     with tempfile.TemporaryDirectory() as folder:
         before, clock = _times(), time.perf_counter()
-        run = plan.run(None, Store(folder), place)
+        run = plan.run(place, Receivers(Store(folder)))
         wall, after = time.perf_counter() - clock, _times()
     parent, server, below = (b - a for a, b in zip(before, after, strict=True))
     return Cost(len(run.results), parent, server, below, wall)
@@ -86,7 +86,8 @@ def _times() -> tuple[float, float, float]:
 
 def start_server() -> None:
     """Start the process from which workers fork: it is started once a session."""
-    plan_of("frame", "unchanged", usable_plugins(), nominal="drawn").run(1)
+    plan = plan_run("frame", "unchanged", usable_plugins(), {"nominal": "drawn"})
+    plan.run(LocalProcesses(1))
 
 
 @dataclass
@@ -115,15 +116,15 @@ def solutions(plan: Plan) -> Solutions:
 
     A solution in a reduced basis counts for nothing.
     """
-    starts, found = Starts(plan.textbook, plan.request.nominal, plan.classes), Solutions()
-    references = {case.name: reference_of(starts.yardstick(case)) for case in plan.cases}
-    pairs = (one for case in plan.cases for one in starts.of(case))
+    found = Solutions()
+    references = {case.name: reference_of(plan.starts.yardstick(case)) for case in plan.cases}
+    pairs = (one for case in plan.cases for one in plan.starts.of(case))
     with ExitStack() as stack:
         stack.enter_context(threadpool_limits(1))
         for name in ("solve_dense", "lowest_eigenpairs"):
             timed = found.timed(getattr(eigen, name))
             stack.enter_context(patch.object(eigen, name, timed))
-        for slot in Slots(pairs, plan.strategies, tuple(plan.request.all_seeds)):
+        for slot in Slots(pairs, plan.strategies, plan.options.all_seeds):
             if isinstance(slot.job, Job):
                 # By way of its bytes: the strategy's model has modes that the judge's has not.
                 outcome, given = performed(slot.job)
@@ -135,7 +136,7 @@ def solutions(plan: Plan) -> Solutions:
 
 def null_job(jobs: int = NULL_JOBS, workers: int = 1, sandbox: Sandbox = "auto") -> Cost:
     """Return what a run costs whose strategy does nothing, without pictures: seeds on `frame`."""
-    plan = plan_of("frame", "unchanged", usable_plugins(), seeds=jobs, nominal="drawn")
+    plan = plan_run("frame", "unchanged", usable_plugins(), {"seeds": jobs, "nominal": "drawn"})
     return run_cost(plan, workers, sandbox)
 
 
@@ -155,7 +156,7 @@ def main(words: Sequence[str] | None = None) -> None:
         print(f"null job, {name:8}{1000.0 * least:8.1f} ms")
     spread = statistics.pstdev(1000.0 * cost.whole / cost.jobs for cost in costs)
     print(f"asked for {THIRTY:g} ms; repetitions differ by {spread:.1f} ms")
-    plan = plan_of(asked.cases, chosen, plugins)
+    plan = plan_run(asked.cases, chosen, plugins, {})
     cost = run_cost(plan, sandbox=asked.sandbox)
     found = solutions(plan)
     print(f"{cost.jobs} jobs, {found.count} eigenvalue solutions of {found.seconds:.1f} s together")

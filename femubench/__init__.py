@@ -53,11 +53,13 @@ __all__ = [
     "PluginError",
     "Reader",
     "Run",
+    "RunOptions",
     "Scenario",
     "Sensors",
     "Strategy",
     "StrategyFailure",
     "UpdateResult",
+    "Where",
     "__version__",
     "cases",
     "challenge",
@@ -117,6 +119,7 @@ _NAMES = {
     "femubench.core.fem.model": "Model",
     "femubench.core.plugin.markers": "hookimpl",
     "femubench.core.roles": "Reader Scenario",
+    "femubench.core.schema.run_options": "RunOptions Where",
     "femubench.core.update.strategy": "ParameterEstimate Strategy UpdateResult",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
@@ -151,6 +154,7 @@ if TYPE_CHECKING:
     from femubench.core.modal.measurement import Measurement
     from femubench.core.plugin.markers import hookimpl
     from femubench.core.roles import Reader, Scenario
+    from femubench.core.schema.run_options import RunOptions, Where
     from femubench.core.update.strategy import ParameterEstimate, Strategy, UpdateResult
 
 

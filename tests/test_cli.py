@@ -20,11 +20,11 @@ from click.testing import CliRunner, Result
 import femubench
 from femubench.core.cli import progress
 from femubench.core.cli.main import VERBS, bench
-from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of
 from femubench.core.errors import OutputError
 from femubench.core.files import write_atomically
 from femubench.core.pace import Advance
 from femubench.core.run.store import Store
+from femubench.core.schema.quantities import parse_size, parse_timeouts, say_duration
 
 MODULE = "femubench.core.cli.{}"  # of a verb
 CASE = """\
@@ -635,8 +635,8 @@ class TestPluginsAndScenarios:
         assert "mode 1 at 9 Hz" in shown
 
 
-def parsed(text: str) -> float:
-    return timeouts_of(click.Context(bench), click.Option(["--timeout"]), (text,))[""]
+def parse_duration(text: str) -> float:
+    return parse_timeouts([text])[""]
 
 
 @pytest.mark.parametrize(
@@ -644,25 +644,22 @@ def parsed(text: str) -> float:
     [("90", 90.0), ("90s", 90.0), ("10m", 600.0), ("1h", 3600.0), ("1.5h", 5400.0), (".5", 0.5)],
 )
 def test_durations(text: str, seconds: float) -> None:
-    assert parsed(text) == seconds
-    assert parsed(spoken(seconds)) == seconds
+    assert parse_duration(text) == seconds
+    assert parse_duration(say_duration(seconds)) == seconds
 
 
 @pytest.mark.parametrize("text", ["", "0", "-1", "1d", "m", "1m30s", "inf", "nan", "٣", "1e3"])
 def test_no_durations(text: str) -> None:
-    with pytest.raises(click.BadParameter, match="no duration > 0"):
-        parsed(text)
+    with pytest.raises(ValueError, match="no duration > 0"):
+        parse_duration(text)
 
 
 def test_durations_of_single_strategies() -> None:
-    def several(*words: str) -> dict[str, float]:
-        return timeouts_of(click.Context(bench), click.Option(["--timeout"]), words)
-
     wanted = {"": 600.0, "kabe": 90.0, "spring:arm=0.02": 3600.0}
-    assert several("10m", "kabe=90", "spring:arm=0.02=1h") == wanted
+    assert parse_timeouts(["10m", "kabe=90", "spring:arm=0.02=1h"]) == wanted
     for words in (("1m", "2m"), ("kabe=1m", "kabe=2m"), ("kabe=soon",)):
-        with pytest.raises(click.BadParameter):
-            several(*words)
+        with pytest.raises(ValueError, match=r"given twice|no duration"):
+            parse_timeouts(words)
 
 
 @pytest.mark.parametrize(
@@ -670,13 +667,13 @@ def test_durations_of_single_strategies() -> None:
     [("512M", 2**29), ("4G", 2**32), ("4GiB", 2**32), ("1.5gb", 3 * 2**29), ("33554432", 2**25)],
 )
 def test_sizes(text: str, size: int) -> None:
-    assert bytes_of(click.Context(bench), click.Option(["--memory"]), text) == size
+    assert parse_size(text) == size
 
 
 @pytest.mark.parametrize("text", ["", "0", "1k", "-4G", "4P", "much", "inf"])
 def test_no_sizes(text: str) -> None:
-    with pytest.raises(click.BadParameter, match="no size >= 16M"):
-        bytes_of(click.Context(bench), click.Option(["--memory"]), text)
+    with pytest.raises(ValueError, match="no size >= 16M"):
+        parse_size(text)
 
 
 def test_progress_only_where_someone_watches(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ import femubench.scenarios
 from femubench import InputError, PluginError, Scenario, hookimpl
 from femubench.core.cli.main import bench
 from femubench.core.library.cases import case_folders, read_cases
-from femubench.core.library.rank import plan_of
+from femubench.core.library.rank import plan_run
 from femubench.core.plugin.loader import Plugins, load_plugins
 from femubench.core.plugin.validation import check_scenario
 
@@ -84,8 +84,8 @@ class TestSuite:
         default = [name for name, scenario in plugins.scenarios.items() if scenario.default]
         assert {"frame", "hframe", "suite/portal"} <= set(default)
         assert not {"suite/tower", "suite/wing", "footbridge"} & set(default)
-        plan = plan_of((), ["unchanged"], plugins)
-        assert plan.request.cases == tuple(default)
+        plan = plan_run((), ["unchanged"], plugins, {})
+        assert plan.request["cases"] == default
         assert [case.name for case in plan.cases] == names(default)
 
     def test_a_run_of_the_group_can_be_continued(self, call: Callable[..., Result]) -> None:

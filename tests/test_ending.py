@@ -47,15 +47,15 @@ def run_until(
     happens: Callable[[], object], after: int, monkeypatch: pytest.MonkeyPatch, *words: str
 ) -> Result:
     """Run in this process; something happens once some results are in the store."""
-    plain = LocalProcesses.computed
+    plain = LocalProcesses.compute
 
-    def computed(self: LocalProcesses, *given: Any) -> Iterator[tuple[int, JobResult]]:
+    def compute(self: LocalProcesses, *given: Any) -> Iterator[tuple[int, JobResult]]:
         for number, one in enumerate(plain(self, *given), start=1):
             yield one
             if number == after:
                 happens()
 
-    monkeypatch.setattr(LocalProcesses, "computed", computed)
+    monkeypatch.setattr(LocalProcesses, "compute", compute)
     result = CliRunner().invoke(bench, [*(words or RUN)])
     monkeypatch.undo()
     return result

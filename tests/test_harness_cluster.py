@@ -22,10 +22,11 @@ from femubench.core import errors
 from femubench.core.errors import FemubenchError, InputError
 from femubench.core.run import cluster
 from femubench.core.run.cluster import DaskWorkers, slurm_cluster
-from femubench.core.run.executor import LocalProcesses, executor_of
+from femubench.core.run.executor import LocalProcesses, open_executor
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult
+from femubench.core.schema.run_options import Where
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
@@ -42,7 +43,7 @@ def stable(results: Any) -> list[JobResult]:
 
 @pytest.fixture(scope="module")
 def two() -> Iterator[DaskWorkers]:
-    with executor_of(cluster="local:2") as executor:
+    with open_executor(Where(cluster="local:2")) as executor:
         assert isinstance(executor, DaskWorkers)
         yield executor
 
@@ -181,11 +182,12 @@ SCRIPT = """
 import sys
 sys.path.insert(0, {toys!r})
 import harness_toys as toys
-from femubench.core.run.executor import executor_of
+from femubench.core.run.executor import open_executor
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
+from femubench.core.schema.run_options import Where
 
-with executor_of(cluster="local:2") as executor:
+with open_executor(Where(cluster="local:2")) as executor:
     strategies = [toys.Unchanged(), toys.Looping()]
     store, cases = Store({store!r}), [toys.tiny_case()]
     run_jobs(cases, strategies, store=store, executor=executor)
@@ -242,7 +244,8 @@ def test_workers_that_a_user_started(tmp_path: Path, monkeypatch: pytest.MonkeyP
             time.sleep(0.1)
         address = re.findall(r'"(tcp://[^"]*)"', file.read_text())[0]
         monkeypatch.setattr(cluster, "_ANSWER", 1.0)
-        with executor_of(scheduler=address) as place, pytest.raises(InputError, match="no worker"):
+        there = Where(scheduler=address)
+        with open_executor(there) as place, pytest.raises(InputError, match="no worker"):
             run_jobs([toys.tiny_case()], [toys.Unchanged()], executor=place)
         monkeypatch.setattr(cluster, "_ANSWER", 60.0)
         dask = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "2"]
@@ -252,7 +255,7 @@ def test_workers_that_a_user_started(tmp_path: Path, monkeypatch: pytest.MonkeyP
             if done == 4:
                 scheduler.kill()
 
-        with executor_of(scheduler=address) as place:
+        with open_executor(there) as place:
             top = psutil.Process(worker.pid)
             strategies = [toys.Unchanged(), toys.Looping()]
             first = run_jobs([toys.tiny_case()], strategies[:1], seeds=range(3), executor=place)
@@ -314,7 +317,7 @@ def test_jobs_of_a_stand_in_for_slurm(tmp_path: Path, monkeypatch: pytest.Monkey
             killed.append(next(iter(place._client.run(os.getppid).values())))
             os.killpg(os.getpgid(killed[0]), signal.SIGKILL)
 
-    with executor_of(2, cluster="slurm:short") as place:
+    with open_executor(Where(2, cluster="slurm:short")) as place:
         assert isinstance(place, DaskWorkers)
         run = run_jobs([toys.tiny_case()], strategies, **options, executor=place, progress=kill)
     assert killed
@@ -340,7 +343,7 @@ def test_words_that_mean_no_cluster(
 ) -> None:
     monkeypatch.setattr(cluster, "_ANSWER", 0.5)
     monkeypatch.setenv("PATH", "")
-    with pytest.raises(InputError, match=told) as error, executor_of(**words):
+    with pytest.raises(InputError, match=told) as error, open_executor(Where(**words)):
         pass
     assert "\n" not in str(error.value)
 
@@ -350,7 +353,7 @@ def test_without_the_extra_one_line_tells_how_to_install_it(
 ) -> None:
     monkeypatch.setattr(errors, "find_spec", lambda name: None)
     told = r"--cluster needs distributed \(expected pip install 'femubench\[cluster\]'\)"
-    with pytest.raises(InputError, match=told), executor_of(cluster="local:2"):
+    with pytest.raises(InputError, match=told), open_executor(Where(cluster="local:2")):
         pass
 
 

@@ -21,9 +21,10 @@ from femubench.core.run import workers
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.judging import judged
-from femubench.core.run.runner import run_jobs
+from femubench.core.run.runner import Plan, Receivers, run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult
+from femubench.core.schema.run_options import RunOptions
 from femubench.core.score.scoring import leaderboard, reference_of, score_model
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
@@ -144,7 +145,8 @@ def test_a_run_that_goes_on_tells_of_what_is_to_be_done_alone(
     options: dict[str, Any] = {"jobs": 1, "store": store, "overwrite": "missing"}
     run_jobs([everything["case"]], [toys.Unchanged()], **options)
     both = [toys.Unchanged(), toys.Softer()]
-    run = run_jobs([everything["case"]], both, told=told.append, **options)
+    plan = Plan([everything["case"]], both, RunOptions(overwrite="missing"))
+    run = plan.run(LocalProcesses(1), Receivers(store, advance=told.append))
     assert len(run.results) == 2
     assert [(advance.done, advance.total) for advance in told] == [(0, 1), (1, 1)]
     assert [advance.left for advance in told] == [None, 0.0]
@@ -242,8 +244,8 @@ def test_an_interrupt_stops_the_workers_and_keeps_what_is_done(
         run_jobs(
             [case],
             [toys.Unchanged(), toys.Looping()],
+            RunOptions(timeout=None),
             jobs=2,
-            timeout=None,
             store=store,
             progress=interrupt,
         )

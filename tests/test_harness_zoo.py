@@ -19,7 +19,7 @@ from femubench.core.run import runner, sandbox, workers
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.limits import MIB, Limits
 from femubench.core.run.runner import run_jobs
-from femubench.core.run.schedule import _Bench
+from femubench.core.run.schedule import Workload, _Bench
 from femubench.core.run.slots import Slot, Start
 from femubench.core.run.workers import Ending
 from femubench.core.schema.records import result_from_json, result_to_json
@@ -120,7 +120,7 @@ def test_a_judgement_out_of_bounds_ends_its_job_alone() -> None:
     record = {"case": "c", "strategy": "s", "seed": 0, "status": "ok", "parameter_count": -1}
     slot = Slot(Start("drawn", toys.tiny_case()), "s", 0, b"")
     answer = json.dumps({"result": record, "exhibit": None}).encode()
-    outcome = _Bench([slot], {}, {}, None)._judgement(slot, Ending("answer", answer))
+    outcome = _Bench(Workload([slot], {}, {}), iter(()))._judgement(slot, Ending("answer", answer))
     assert isinstance(outcome, JobOutcome)
     assert outcome.status == "failed"
     assert outcome.reason.startswith("its result is out of bounds: parameter_count")

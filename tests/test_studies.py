@@ -15,12 +15,15 @@ from numpy.testing import assert_allclose
 import femubench
 from femubench import InputError, plot
 from femubench.core.cli.main import bench
+from femubench.core.library.rank import Run
 from femubench.core.library.report import rendered, reporter
 from femubench.core.library.study import StudyPlan, study_plan
 from femubench.core.plugin.loader import Plugins, load_plugins
 from femubench.core.run.executor import LocalProcesses
+from femubench.core.run.recording import Progress
+from femubench.core.run.runner import Receivers
 from femubench.core.run.store import Store
-from femubench.core.schema.results import JobResult, Run
+from femubench.core.schema.results import JobResult
 from femubench.core.study.conditions import varied
 from femubench.core.study.study_file import read_study
 from femubench.results import leaderboard, results_frame, skill_by
@@ -64,6 +67,13 @@ def plan_of(text: str = STUDY, plugins: Plugins = PLUGINS) -> StudyPlan:
     return study_plan(read_study("study.toml"), plugins)
 
 
+def run_plan(
+    plan: StudyPlan, workers: int, store: Store | None = None, progress: Progress | None = None
+) -> Run:
+    """Run a study on this machine."""
+    return Run.of(plan.run(LocalProcesses(workers), Receivers(store, progress)))
+
+
 def values(run: Run, *names: str) -> dict[tuple[str, str, int], tuple[Any, ...]]:
     """Return fields of all results by job."""
     return {
@@ -78,7 +88,7 @@ def spied(tmp_path_factory: pytest.TempPathFactory) -> Run:
     put_case(at / "rod", sensors_csv=SENSORS, modes_csv=MODES)
     text = STUDY.replace("[1.0, 1.2], loud = [false, true]", f"[1.0, 1.2, {BROKEN}]")
     (at / "study.toml").write_text(text.replace("[0.5, 1.0, 2.0]", "[1.0, 2.0]"), encoding="utf-8")
-    return study_plan(read_study(at / "study.toml"), PLUGINS).run(LocalProcesses(2))
+    return run_plan(study_plan(read_study(at / "study.toml"), PLUGINS), 2)
 
 
 class TestExpansion:
@@ -97,7 +107,7 @@ class TestExpansion:
         text = STUDY.replace("[0.5, 1.0, 2.0]", "[1.0]").replace("[0, 3]", "[0]")
         text = text.replace("[1.0, 1.2], loud = [false, true]", "1.2")
         store = Store("results")
-        plan_of(text).run(LocalProcesses(1), store)
+        run_plan(plan_of(text), 1, store)
         keys = {result.key for result in store.load().results}
         femubench.rank(
             "rod", Spy(1.2), seeds=2, nominal="textbook", jobs=1, store=store, overwrite="missing"
@@ -108,9 +118,10 @@ class TestExpansion:
 
     def test_seeds_are_draws_or_a_list_or_the_data_as_recorded(self) -> None:
         plain = STUDY.replace("noise = [0.5, 1.0, 2.0]\n", "")
-        assert plan_of(STUDY.replace('title = "A spy"', "seed = 7")).seeds == (8, 9)
-        assert plan_of(plain.replace("seeds = 2", "seeds = [0, 5]")).seeds == (0, 5)
-        assert plan_of(plain.replace("seeds = 2\n", "")).seeds == (0,)
+        first = plan_of(STUDY.replace('title = "A spy"', "seed = 7"))
+        assert first.options.all_seeds == range(8, 10)
+        assert plan_of(plain.replace("seeds = 2", "seeds = [0, 5]")).options.all_seeds == (0, 5)
+        assert plan_of(plain.replace("seeds = 2\n", "")).options.all_seeds == range(1)
 
 
 class TestConditions:
@@ -242,37 +253,35 @@ class TestResume:
                 raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            plan.run(LocalProcesses(1), store, progress=stop)
+            run_plan(plan, 1, store, stop)
         early = store.load()
         assert len(early.results) == 3
         # Seed after seed: the first jobs are of different cells.
         assert {result.seed for result in early.results} == {1}
         seen: list[int] = []
-        resumed = plan.run(
-            LocalProcesses(2), store, progress=lambda result, done, total: seen.append(done)
-        )
+        resumed = run_plan(plan, 2, store, lambda result, done, total: seen.append(done))
         assert seen == list(range(1, 9))
         assert store.runs() == (early.meta["run"],)
-        whole = plan.run(LocalProcesses(2), Store("calm"))
+        whole = run_plan(plan, 2, Store("calm"))
         fields = ("status", "score", "key", "blocks", "diagnostics")
         assert values(resumed, *fields) == values(whole, *fields)
         assert resumed.skill_by().equals(
             whole.skill_by().assign(seconds=resumed.skill_by()["seconds"])
         )
-        again = plan.run(LocalProcesses(2), store)
+        again = run_plan(plan, 2, store)
         assert [r.seconds for r in again.results] == [r.seconds for r in resumed.results]
 
     def test_a_level_that_is_added_takes_the_others_from_the_store(self) -> None:
         store = Store("results")
         text = STUDY.replace(", loud = [false, true]", "").replace("[0, 3]", "[0]")
-        plan_of(text.replace("[0.5, 1.0, 2.0]", "[1.0]")).run(LocalProcesses(1), store)
+        run_plan(plan_of(text.replace("[0.5, 1.0, 2.0]", "[1.0]")), 1, store)
         plan = plan_of(text.replace("[0.5, 1.0, 2.0]", "[1.0, 4.0]"))
         found = plan.forecast(store)
         assert (found.jobs, found.done) == (8, 4)
         assert not found.unknown
         assert found.seconds > 0.0
         before = {r.key: r.seconds for r in store.load().results}
-        after = {r.key: r.seconds for r in plan.run(LocalProcesses(1), store).results}
+        after = {r.key: r.seconds for r in run_plan(plan, 1, store).results}
         assert before.items() < after.items()
 
 
@@ -285,7 +294,7 @@ class TestDryRun:
         def refuse(*given: object, **options: object) -> None:
             raise AssertionError("a job was run")
 
-        monkeypatch.setattr("femubench.core.library.study.run_jobs", refuse)
+        monkeypatch.setattr("femubench.core.run.runner.Plan.run", refuse)
         Path("study.toml").write_text(self.TEXT, encoding="utf-8")
         done = CliRunner().invoke(bench, ["study", "study.toml", "--dry-run", "--store", "kept"])
         assert done.exit_code == 0, done.output
@@ -306,7 +315,7 @@ def test_a_study_goes_on_by_its_own_command() -> None:
     store = Store("results")
     text = STUDY.replace("[0.5, 1.0, 2.0]", "[2.0]").replace("[0, 3]", "[0]")
     text = text.replace("[1.0, 1.2], loud = [false, true]", "1.0").replace("seeds = 2", "seeds = 1")
-    plan_of(text).run(LocalProcesses(1), store)
+    run_plan(plan_of(text), 1, store)
     with pytest.raises(InputError, match=r"is a study \(expected `bench study FILE`"):
         femubench.rank(resume=True, store=store)
 

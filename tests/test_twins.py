@@ -39,7 +39,7 @@ from femubench.core.fem.frame import (
 )
 from femubench.core.fem.model import Model
 from femubench.core.fem.sections import rectangular_tube, round_tube
-from femubench.core.library.rank import plan_of, rank, repeated, request_of, textbook_of
+from femubench.core.library.rank import plan_again, plan_run, rank, request_of, textbook_of
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.run.beside import beside
@@ -427,24 +427,25 @@ def test_runs_with_twins_are_kept_read_and_resumed(run: Run, tmp_path: Path) -> 
     assert [r.case for r in kept.beside] == ["suite/bracket~1", "suite/bracket~again"]
     assert kept.meta["request"]["twin_seed"] == kept.meta["twins"]["seed"]
     plugins = load_plugins()
-    repeats = repeated(request_of(kept), plugins)
-    assert [t.digest for t in repeats.beside.twins] == [
+    repeats = plan_again(request_of(kept), plugins)
+    assert [t.digest for t in repeats.starts.beside.twins] == [
         kept.meta["twins"]["cases"]["suite/bracket~1"]["digest"]
     ]
     # The seed of the last run is taken, so that the same words go on with it.
-    given = {"twins": 1, "nominal": "textbook", "resumed": store}
-    plan = plan_of("suite/bracket", "unchanged", plugins, **given)  # type: ignore[arg-type]
-    assert plan.request.twin_seed == first.meta["twins"]["seed"]
+    given = {"twins": 1, "nominal": "textbook", "resume": True}
+    plan = plan_run("suite/bracket", "unchanged", plugins, given, store)
+    assert plan.options.twin_seed == first.meta["twins"]["seed"]
     assert plan.jobs == 3
-    other = plan_of("suite/bracket", "unchanged", plugins, twins=1)
-    assert other.request.twin_seed != plan.request.twin_seed
+    other = plan_run("suite/bracket", "unchanged", plugins, {"twins": 1})
+    assert other.options.twin_seed != plan.options.twin_seed
 
 
 def test_what_was_measured_has_no_twins(tmp_path: Path) -> None:
-    plan = plan_of(["frame", "frame-solid"], "unchanged", load_plugins(), twins=(2, 1))
-    assert [t.name for t in plan.beside.twins] == ["frame-solid~1", "frame-solid~2"]
+    given = {"twins": 2, "twin_seed": 1}
+    plan = plan_run(["frame", "frame-solid"], "unchanged", load_plugins(), given)
+    assert [t.name for t in plan.starts.beside.twins] == ["frame-solid~1", "frame-solid~2"]
     with pytest.raises(InputError, match="twins"):
-        plan_of("frame", "unchanged", load_plugins(), twins=101)
+        plan_run("frame", "unchanged", load_plugins(), {"twins": 101})
 
 
 @pytest.mark.parametrize("word", ["x", "1:", "101", "-1", "1:2:3"])

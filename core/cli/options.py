@@ -5,12 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeAlias
+from types import UnionType
+from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_origin, get_type_hints
 
 import click
+from annotated_types import Ge, Le
+from click.core import ParameterSource
 
-from femubench.core.cli.quantities import bytes_of, timeouts_of
 from femubench.core.files import check_writable
+from femubench.core.schema.run_options import RunOptions, Where, split_keywords
 
 Option: TypeAlias = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -66,38 +69,63 @@ def store(what: str) -> Option:
     return click.option("--store", type=FOLDER, metavar="DIR", help=text)
 
 
-jobs = click.option(
-    "-j", "--jobs", type=click.IntRange(1), metavar="N",
-    help="Number of worker processes. Default: one per core. With --cluster slurm:QUEUE the number "
-    "of Slurm jobs.",
-)  # fmt: skip
+def of_fields(kind: type[RunOptions | Where], *names: str, **words: Any) -> Option:  # noqa: ANN401 - as click has it
+    """Return the options for fields of `RunOptions` or of `Where`, as these say.
 
-scheduler = click.option(
-    "--scheduler", metavar="ADDRESS",
-    help="Run the jobs on the workers of the Dask scheduler there, e.g. tcp://host:8786.",
-)  # fmt: skip
+    Arguments:
+        words: that a verb has otherwise.
+    """
+    hints = get_type_hints(kind, include_extras=True)
 
-sandbox = click.option(
-    "--sandbox", type=click.Choice(["auto", "require", "off"]), default="auto", show_default=True,
-    help="Run strategies where they see no case, no file of yours, no other process and no network "
-    "(Linux): where that is possible, or not at all, or without.",
-)  # fmt: skip
+    def with_all(command: Callable[..., Any]) -> Callable[..., Any]:
+        for name in reversed(names):
+            *_, text = hints[name].__metadata__
+            own: dict[str, Any] = {} if text.parse else _read_type(hints[name])
+            own |= {"help": text.help, "metavar": text.metavar, "multiple": text.multiple}
+            if text.show_default:
+                own |= {"default": getattr(kind(), name), "show_default": True}
+            if text.parse:
+                own["callback"] = _callback_of(text.parse)
+            command = click.option(*text.flags.split(), name, **{**own, **words})(command)
+        return command
 
-cluster = click.option(
-    "--cluster", metavar="CLUSTER",
-    help="Start a Dask cluster for the run: local:N workers here, or slurm:QUEUE.",
-)  # fmt: skip
+    return with_all
 
-timeouts = click.option(
-    "--timeout", "timeouts", multiple=True, callback=timeouts_of, metavar="DURATION",
-    help="Give up on a job after this time, e.g. 90s, 10m, 1h. STRATEGY=DURATION is for one "
-    "strategy; may be repeated. Default: 10m.",
-)  # fmt: skip
 
-_memory = click.option(
-    "--memory", callback=bytes_of, metavar="SIZE",
-    help="Stop a job that takes more, e.g. 512M, 4G. Default: an even share of the machine's.",
-)  # fmt: skip
+def _read_type(hint: Any) -> dict[str, Any]:  # noqa: ANN401 - of any field
+    """Return the type of an option as click has it, the first of a union."""
+    bounds: dict[type, Any] = {}
+    while get_origin(hint) in (Annotated, Union, UnionType):
+        bounds |= {type(one): one for one in getattr(hint, "__metadata__", ())}
+        hint = get_args(hint)[0]
+    if get_origin(hint) is Literal:
+        return {"type": click.Choice(get_args(hint))}
+    if Ge in bounds:
+        most = bounds[Le].le if Le in bounds else None
+        return {"type": click.IntRange(bounds[Ge].ge, most)}
+    return {"is_flag": True} if hint is bool else {"type": hint}
+
+
+def _callback_of(parse: Callable[[Any], Any]) -> Callable[..., Any]:
+    def read(ctx: click.Context, parameter: click.Parameter, value: object) -> Any:  # noqa: ANN401
+        try:
+            return None if value is None else parse(value)
+        except ValueError as fault:
+            raise click.BadParameter(str(fault), ctx, parameter) from fault
+
+    return read
+
+
+def read_given(ctx: click.Context) -> tuple[dict[str, Any], Where]:
+    """Return the options of a run that the user gave, and where it is computed."""
+    names = {*RunOptions.__dataclass_fields__, *Where.__dataclass_fields__} & ctx.params.keys()
+    return split_keywords({name: ctx.params[name] for name in names if is_given(ctx, name)})
+
+
+def is_given(ctx: click.Context, name: str) -> bool:
+    """Tell whether the user gave an option."""
+    return ctx.get_parameter_source(name) is not ParameterSource.DEFAULT
+
 
 _csv_file = click.option(
     "--csv", "csv_file", type=OUTPUT, metavar="FILE", help="Write one line per job as CSV."
@@ -116,11 +144,12 @@ def of_jobs(json: str) -> Option:
     Arguments:
         json: what is in the file of JSON.
     """
-    where, limits = (jobs, scheduler, cluster), (sandbox, timeouts, _memory)
+    where = of_fields(Where, "jobs", "scheduler", "cluster", "sandbox")
+    limits = of_fields(RunOptions, "timeouts", "memory")
     files = (json_file(json), _csv_file, store("Keep results there."), _report_file, quiet)
 
     def with_all(command: Callable[..., Any]) -> Callable[..., Any]:
-        for option in reversed((*where, *limits, *files)):
+        for option in reversed((where, limits, *files)):
             command = option(command)
         return command
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from femubench.core.cli import options
+from femubench.core.cli.ending import telling
+from femubench.core.cli.progress import progress
 from femubench.core.cli.registry import wrapped
 from femubench.core.errors import InputError, OutputError, PluginError
 from femubench.core.files import write_atomically
@@ -14,19 +18,18 @@ from femubench.core.files import write_atomically
 if TYPE_CHECKING:
     from femubench.core.plugin.loader import Plugins
     from femubench.core.roles import Reporter
-    from femubench.core.run.executor import Executor
+    from femubench.core.run.runner import Plan
     from femubench.core.run.store import Store
     from femubench.core.schema.results import Run
 
 
-def outputs_of(
-    plugins: Plugins, json_file: Path | None, csv_file: Path | None, report_file: Path | None
-) -> dict[Path, Reporter]:
-    """Return who writes which file."""
+def outputs_of(ctx: click.Context, plugins: Plugins) -> dict[Path, Reporter]:
+    """Return the reporter that writes each file which the user named."""
     from femubench.core.library.report import reporter, reporter_for
 
     outputs: dict[Path, Reporter] = {}
-    for path, name in ((json_file, "json"), (csv_file, "csv"), (report_file, None)):
+    for key, name in (("json_file", "json"), ("csv_file", "csv"), ("report_file", None)):
+        path = ctx.params[key]
         if path is None:
             continue
         if path in outputs:
@@ -35,12 +38,43 @@ def outputs_of(
     return outputs
 
 
-def announce(line: str, executor: Executor) -> None:
-    """Show what begins, and say on standard error where a sandbox is not possible."""
-    found = executor.enclosure()
-    if found.sandbox == "none" and executor.sandbox != "off":
-        click.echo(f"strategies run without a sandbox: {found.reason}", err=True)
-    click.echo(wrapped(line, hanging=2))
+def run_and_report(
+    ctx: click.Context,
+    plan: Plan,
+    header: Callable[[str], str],
+    store: Store,
+    plugins: Plugins,
+    outputs: dict[Path, Reporter],
+    *,
+    exhibits: object = None,
+    resumed_with: tuple[Sequence[str], Sequence[str]] = ((), ()),
+) -> tuple[Run, int]:
+    """Run what is planned where the user wants it, and report; return the run and the exit code.
+
+    Arguments:
+        header: returns what is shown first, from a clause on where the jobs run.
+        outputs: from `outputs_of`.
+        exhibits: what reports show of single jobs.
+        resumed_with: words that make the same command go on with the run, and those that do not.
+    """
+    from femubench.core.library.report import reporter
+    from femubench.core.run.executor import open_executor
+    from femubench.core.run.runner import Receivers
+
+    quiet = ctx.params["quiet"]
+    screen = None if quiet else reporter(plugins, "terminal")
+    with (
+        telling(store, plan.jobs, screen, *resumed_with),
+        open_executor(options.read_given(ctx)[1]) as executor,
+    ):
+        if not quiet:
+            found = executor.enclosure()
+            if found.sandbox == "none" and executor.sandbox != "off":
+                click.echo(f"strategies run without a sandbox: {found.reason}", err=True)
+            click.echo(wrapped(header(executor.spoken), hanging=2))
+        with progress(quiet=quiet) as advance:
+            run = plan.run(executor, Receivers(store, advance=advance))
+    return run, finish(ctx, run, outputs, plugins, store, screen, exhibits)
 
 
 def finish(

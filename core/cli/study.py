@@ -9,16 +9,13 @@ from typing import TYPE_CHECKING
 import click
 
 from femubench.core.cli import options
-from femubench.core.cli.ending import telling
-from femubench.core.cli.outputs import announce, finish, outputs_of
-from femubench.core.cli.progress import progress
+from femubench.core.cli.outputs import outputs_of, run_and_report
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
+from femubench.core.schema.run_options import RunOptions
 
 if TYPE_CHECKING:
     from femubench.core.library.study import StudyPlan
-    from femubench.core.run.recording import Overwrite
-    from femubench.core.run.sandbox import Sandbox
     from femubench.core.run.store import Store
 
 
@@ -28,29 +25,14 @@ if TYPE_CHECKING:
     "--dry-run", is_flag=True,
     help="Check the file, say how many jobs there are and how long they take; run none.",
 )  # fmt: skip
-@click.option(
-    "--overwrite", type=click.Choice(["always", "missing", "failed"]), default="failed",
-    show_default=True,
+@options.of_fields(
+    *(RunOptions, "overwrite"), default="failed", show_default=True,
     help="Which stored results of the same jobs are computed again: all, none, or the failures.",
 )  # fmt: skip
 @options.of_jobs("Write the results and the skill of every cell as JSON.")
 @click.pass_context
 def study(
-    ctx: click.Context,
-    file: Path,
-    dry_run: bool,
-    jobs: int | None,
-    scheduler: str | None,
-    cluster: str | None,
-    sandbox: Sandbox,
-    timeouts: dict[str, float],
-    memory: int | None,
-    overwrite: Overwrite,
-    json_file: Path | None,
-    csv_file: Path | None,
-    store: Path | None,
-    report_file: Path | None,
-    quiet: bool,
+    ctx: click.Context, /, file: Path, dry_run: bool, store: Path | None, **asked: object
 ) -> int:
     """Run strategies under conditions that vary: noise, sensors, options.
 
@@ -58,43 +40,32 @@ def study(
     out (docs/studies.md). A study goes on where it stopped, and takes from the store what is
     there already.
     """
+    del asked  # taken from the context
     plugins = plugins_for(ctx)
     from femubench.core.library.rank import store_in
-    from femubench.core.library.report import reporter
     from femubench.core.library.study import study_plan
-    from femubench.core.run.executor import executor_of, worker_count
+    from femubench.core.run.executor import count_workers
     from femubench.core.study.study_file import read_study
 
-    outputs = outputs_of(plugins, json_file, csv_file, report_file)
+    outputs = outputs_of(ctx, plugins)
     kept, plan = store_in(store), study_plan(read_study(file), plugins)
+    given, where = options.read_given(ctx)
     if dry_run:
-        click.echo("\n".join(_forecast(plan, kept, worker_count(jobs))))
+        click.echo("\n".join(_forecast(plan, kept, count_workers(where.jobs))))
         return 0
-    limits = dict(timeouts)
-    screen = None if quiet else reporter(plugins, "terminal")
-    with (
-        telling(kept, plan.jobs, screen),
-        executor_of(jobs, scheduler, cluster, sandbox) as executor,
-    ):
-        if not quiet:
-            announce(f"{_title(plan)}, {executor.spoken}", executor)
-        with progress(quiet=quiet) as told:
-            found = plan.run(
-                executor,
-                kept,
-                timeout=limits.pop("", None),
-                timeouts=limits,
-                memory=memory,
-                overwrite=overwrite,
-                told=told,
-            )
-    return finish(ctx, found, outputs, plugins, kept, screen)
+    plan = plan.limited(given)
+    _, code = run_and_report(
+        ctx, plan, lambda place: f"{_title(plan)}, {place}", kept, plugins, outputs
+    )
+    return code
 
 
 def _title(plan: StudyPlan) -> str:
     named = plan.axes.title or "study"
     cases = counted(len(plan.axes.values("case")), "case")
-    over = f"{counted(plan.cells, 'cell')} on {cases}, {counted(len(plan.seeds), 'seed')}"
+    over = (
+        f"{counted(plan.cells, 'cell')} on {cases}, {counted(len(plan.options.all_seeds), 'seed')}"
+    )
     return f"{named}: {over}, {counted(plan.jobs, 'job')}"
 
 

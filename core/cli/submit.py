@@ -11,13 +11,11 @@ import click
 from femubench.core.cli import options
 from femubench.core.cli.compare import thresholds_of
 from femubench.core.cli.progress import progress
-from femubench.core.cli.quantities import twins_of
 from femubench.core.cli.registry import plugins_for
 from femubench.core.plugin.validation import chosen
+from femubench.core.schema.run_options import RunOptions, Where
 
 if TYPE_CHECKING:
-    from femubench.core.library.rank import Twins
-    from femubench.core.run.sandbox import Sandbox
     from femubench.core.score.comparison import Threshold
 
 
@@ -43,43 +41,41 @@ if TYPE_CHECKING:
     "--summary", type=options.OUTPUT, metavar="FILE", envvar="GITHUB_STEP_SUMMARY",
     help="Append what came out as Markdown. Default: $GITHUB_STEP_SUMMARY.",
 )  # fmt: skip
-@click.option(
-    "--twins", callback=twins_of, metavar="N[:SEED]", default="2", show_default=True,
+@options.of_fields(
+    *(RunOptions, "twins"), default="2", show_default=True,
     help="Twins of every case, as in bench run; a leaderboard asks for two.",
 )  # fmt: skip
-@options.timeouts
-@options.sandbox
-@options.jobs
+@options.of_fields(RunOptions, "timeouts")
+@options.of_fields(Where, "sandbox", "jobs")
 @options.quiet
 @click.pass_context
 def submit(
     ctx: click.Context,
+    /,
     cases: tuple[str, ...],
     strategies: tuple[str, ...],
     output: Path,
     baseline: Path | None,
     thresholds: tuple[Threshold, ...],
     summary: Path | None,
-    twins: Twins,
-    timeouts: dict[str, float],
-    sandbox: Sandbox,
-    jobs: int | None,
     quiet: bool,
+    **asked: object,
 ) -> int:
     """Check, run and compare a strategy for a leaderboard.
 
     Its rules are checked as by plugins check, it runs on the cases and their twins, and the result
     file is compared with a baseline. Exit with 1 if it breaks a rule, crashes, or is worse.
     """
+    del asked  # taken from the context
     plugins = plugins_for(ctx)
     chosen("strategy", (word.partition(":")[0] for word in strategies), plugins.strategies)
     from femubench.core.library.submit import submit as prepared, summary_of
 
-    with progress(quiet=quiet) as told:
+    given, where = options.read_given(ctx)
+    with progress(quiet=quiet) as advance:
         found = prepared(
-            strategies, cases, output=output, baseline=baseline, fail=thresholds, twins=twins,
-            sandbox=sandbox, jobs=jobs, timeouts=timeouts, told=told,
-            tell=(lambda line: None) if quiet else click.echo,
+            strategies, cases, {"twins": 2, **given}, where, output=output, baseline=baseline,
+            fail=thresholds, tell=(lambda line: None) if quiet else click.echo, told=advance,
         )  # fmt: skip
     if summary is not None:
         with summary.open("a", encoding="utf-8") as file:

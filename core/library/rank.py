@@ -7,32 +7,38 @@ import os
 import secrets
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError, NotApplicable
 from femubench.core.fem.model import differ
-from femubench.core.files import make_folder
 from femubench.core.library.cases import CaseLike, case_words, listed, read_cases, usable_plugins
-from femubench.core.pace import Told
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import check_strategy, chosen
 from femubench.core.plugin.variants import Variant, labelled, strategy_of
 from femubench.core.roles import Strategy
 from femubench.core.run.beside import Beside, beside
-from femubench.core.run.executor import Executor, executor_of
+from femubench.core.run.executor import open_executor
 from femubench.core.run.frames import modes_frame, results_frame
-from femubench.core.run.recording import Overwrite, Progress
-from femubench.core.run.runner import run_jobs
-from femubench.core.run.sandbox import Sandbox
-from femubench.core.run.starts import Start, Starts
+from femubench.core.run.recording import Progress
+from femubench.core.run.runner import Plan, Receivers
+from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
 from femubench.core.schema import records as serial, results
+from femubench.core.schema.run_options import (
+    DEFAULT_TIMEOUT,
+    MOST_TWINS,
+    RunKeywords,
+    RunOptions,
+    Where,
+    check_keywords,
+    split_keywords,
+)
 from femubench.core.score.leaderboard import is_test, leaderboard
 from femubench.core.study.skill import skill_by
 from femubench.core.twin.twins import Twin, twins_of
@@ -42,49 +48,24 @@ if TYPE_CHECKING:
 
 StrategyLike = str | Strategy | type[Strategy]
 DEFAULT_STORE = "femubench-results"
-DEFAULT_TIMEOUT = 600.0  # s
-MOST_TWINS = 100
-Twins = int | tuple[int, int | None]  # how many, and from which seed; None draws one
-_Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
-@dataclass(frozen=True)
-class Request:
+@dataclass(frozen=True, kw_only=True)
+class Request(RunOptions):
     """What decides on the results of a run, in words that can be kept with it and asked for again.
 
     Arguments:
         cases: names of scenarios or of their cases, and absolute folders.
         strategies: names, with options.
-        seeds: number of draws of noise; None for the data as recorded.
-        seed: the first one.
-        nominal: the model that all start from, as drawn, with its textbook values, or both.
-        timeout: seconds that a job may take.
-        timeouts: the same for single strategies.
-        memory: bytes that a job may take; None for an even share.
-        twins: of every case whose truth was computed.
-        twin_seed: from which they are drawn.
     """
 
     cases: tuple[str, ...]
     strategies: tuple[str, ...]
-    seeds: Annotated[int, Field(ge=1)] | None = None
-    seed: Annotated[int, Field(ge=0)] = 0
-    nominal: Start = "both"
-    timeout: _Seconds = DEFAULT_TIMEOUT
-    timeouts: Mapping[str, _Seconds] = field(default_factory=dict)
-    memory: Annotated[int, Field(ge=1)] | None = None
-    twins: Annotated[int, Field(ge=0, le=MOST_TWINS)] = 0
-    twin_seed: Annotated[int, Field(ge=0)] = 0
-
-    @property
-    def all_seeds(self) -> range:
-        """Return the seeds: 0 is the data as recorded, several are draws of noise and no other."""
-        first = self.seed if self.seeds is None else self.seed + 1
-        return range(first, first + (self.seeds or 1))
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
-        plain: dict[str, Any] = TypeAdapter(Request).dump_python(self, mode="json")
+        how = {"resume", "overwrite"}
+        plain: dict[str, Any] = TypeAdapter(Request).dump_python(self, mode="json", exclude=how)
         return plain
 
 
@@ -147,98 +128,15 @@ class Run(results.Run):
         ]
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What a run is asked for, with all that it stands for.
-
-    Arguments:
-        request: in words.
-        cases, strategies: that they stand for.
-        textbook: the cases with their textbook models by name, where those differ.
-        classes: kinds of structure and truth by case.
-        beside: twins of the cases, and what runs twice.
-        repeatable: whether the words say it all.
-    """
-
-    request: Request
-    cases: Sequence[Case]
-    strategies: Sequence[Strategy]
-    textbook: Mapping[str, Case]
-    classes: Mapping[str, Sequence[str]]
-    beside: Beside
-    repeatable: bool = True
-
-    @property
-    def jobs(self) -> int:
-        """Return the number of jobs."""
-        models = sum(1 for _ in self.starts.of_all(self.cases))
-        return models * len(self.strategies) * len(self.request.all_seeds)
-
-    @property
-    def starts(self) -> Starts:
-        """Return the nominal models of the cases."""
-        return Starts(self.textbook, self.request.nominal, self.classes, self.beside)
-
-    def run(
-        self,
-        jobs: int | None = None,
-        store: Store | None = None,
-        executor: Executor | None = None,
-        *,
-        overwrite: Overwrite | None = None,
-        resume: bool = False,
-        progress: Progress | None = None,
-        told: Told | None = None,
-    ) -> Run:
-        """Run every strategy on every case with every seed; see `rank`.
-
-        Arguments:
-            executor: what runs the jobs, from `executor_of`; None for `jobs` workers here.
-        """
-        if store is not None:
-            make_folder(store.folder)
-        asked = self.request
-        return Run.of(
-            run_jobs(
-                self.cases,
-                self.strategies,
-                seeds=tuple(asked.all_seeds),
-                jobs=jobs,
-                timeout=asked.timeout,
-                timeouts=asked.timeouts,
-                memory=asked.memory,
-                store=store,
-                overwrite=overwrite,
-                resume=resume,
-                progress=progress,
-                told=told,
-                run_seed=asked.seed,
-                request=asked.to_json() if self.repeatable else {"nominal": asked.nominal},
-                starts=self.starts,
-                executor=executor,
-            )
-        )
-
-
 def rank(
     cases: CaseLike | Iterable[CaseLike] = (),
     strategies: StrategyLike | Iterable[StrategyLike] = (),
+    options: RunOptions | None = None,
+    where: Where | None = None,
     *,
-    seeds: int | None = None,
-    seed: int | None = None,
-    nominal: Start | None = None,
-    jobs: int | None = None,
-    timeout: float | None = None,
-    timeouts: Mapping[str, float] | None = None,
-    memory: int | None = None,
     store: Store | str | PathLike[str] | None = None,
-    overwrite: Overwrite | None = None,
-    resume: bool = False,
     progress: Progress | None = None,
-    scheduler: str | None = None,
-    cluster: str | None = None,
-    twins: Twins = 0,
-    sandbox: Sandbox = "auto",
+    **keywords: Unpack[RunKeywords],
 ) -> Run:
     """Run strategies on cases, each job in a process of its own, and rank them.
 
@@ -246,17 +144,12 @@ def rank(
         cases: names, folders or `Case`s; the default set where there is none.
         strategies: names (``"NAME:OPTION=VALUE"`` with options), ``strategies[NAME](...)``,
             classes or instances, also of a notebook; all that are installed where there is none.
-        seeds, seed: number of draws of noise, None for the data as recorded; the first seed.
-        nominal: the model to start from, ``drawn``, ``textbook`` (handbook values) or ``both``.
-        timeout, timeouts: seconds that a job may take, 600 by default; of single strategies.
-        memory, store: bytes that a job may take; folder that keeps the results.
-        overwrite: computes anew ``always`` (default), ``missing`` nothing, ``failed`` (resumed).
-        resume: go on with the last run of these jobs in the store; of any without words for them.
+        options, where: what is computed, and where; a keyword overrules them.
+        store: folder that keeps the results.
         progress: called with (result, jobs done, jobs in all).
-        jobs: number of worker processes, or of Slurm jobs; None for one a processor.
-        scheduler, cluster: ``tcp://HOST:PORT`` of Dask; ``local:N`` or ``slurm:QUEUE`` to start.
-        twins: number of each case whose truth was computed, or that and a seed.
-        sandbox: of strategies: ``auto``, where that is possible; ``require``; ``off``.
+        keywords: what `RunOptions` and `Where` have: ``seeds``, ``seed``, ``nominal``, ``twins``
+            (a number, or that and a seed), ``resume``, ``overwrite``, ``timeout``, ``timeouts``,
+            ``memory``; ``jobs``, ``scheduler``, ``cluster``, ``sandbox``.
 
     Raises:
         InputError: for an unknown name, an option that does not exist, or a faulty case.
@@ -264,96 +157,96 @@ def rank(
     Examples:
         >>> femubench.rank(case, [nominal, scaled]).leaderboard["skill"].round(2).tolist()
         [0.0, -0.15]
+        >>> quick = femubench.RunOptions(nominal="drawn", timeout=60.0)
+        >>> len(femubench.rank(case, nominal, quick, jobs=1).results)
+        1
     """
+    check_keywords(keywords, RunKeywords)
+    given, place = split_keywords(keywords, options, where)
     kept = None if store is None else store_in(store)
-    plan = plan_of(
-        *(cases, strategies, usable_plugins()),
-        seeds=seeds,
-        seed=seed,
-        nominal=nominal,
-        timeout=timeout,
-        timeouts=timeouts,
-        memory=memory,
-        resumed=kept if resume else None,
-        twins=twins,
-    )
-    with executor_of(jobs, scheduler, cluster, sandbox) as where:
-        return plan.run(None, kept, where, overwrite=overwrite, resume=resume, progress=progress)
+    plan = plan_run(cases, strategies, usable_plugins(), given, kept)
+    with open_executor(place) as executor:
+        return Run.of(plan.run(executor, Receivers(kept, progress)))
 
 
-def plan_of(
+def plan_run(
     cases: CaseLike | Iterable[CaseLike],
     strategies: StrategyLike | Iterable[StrategyLike],
     plugins: Plugins,
-    *,
-    seeds: int | None = None,
-    seed: int | None = None,
-    nominal: Start | None = None,
-    timeout: float | None = None,
-    timeouts: Mapping[str, float] | None = None,
-    memory: int | None = None,
-    resumed: Store | None = None,
-    twins: Twins = 0,
+    given: Mapping[str, Any],
+    store: Store | None = None,
 ) -> Plan:
     """Return what is to be run; nothing has been run when something is wrong with it.
 
     Arguments:
         plugins: where cases and strategies come from.
-        resumed: the store whose last run is meant where neither cases nor strategies are given.
-        twins: of every case whose truth was computed.
+        given: options by field of `RunOptions`, as `split_keywords` has them.
+        store: whose last run is meant where the run resumes, and has neither cases nor strategies.
     """
     words, wanted = listed(cases), listed(strategies)
-    number, twin_seed = (twins, None) if isinstance(twins, int) else twins
-    if resumed is not None and not words and not wanted and resumed.runs():
-        own = ("seeds", seeds), ("seed", seed), ("nominal", nominal), ("twins", number or None)
-        for name, value in own:
-            if value is not None:
-                what = f"--resume alone goes on as before; {name} needs CASE or -s beside it"
-                raise InputError(what)
-        request = request_of(results.Run(resumed.begun(), ()))
-        if timeout is not None or timeouts:
-            request = replace(request, timeout=timeout or DEFAULT_TIMEOUT, timeouts=timeouts or {})
-        request = request if memory is None else replace(request, memory=memory)
-        return repeated(request, plugins)
+    resumed = store if store is not None and given.get("resume") and store.runs() else None
+    if resumed is not None and not words and not wanted:
+        return plan_again(_changed(request_of(results.Run(resumed.begun(), ())), given), plugins)
     found = _strategies(wanted, plugins)
     read = read_cases(cases, plugins)
     plain = all(isinstance(item, (str, PathLike)) for item in words)
-    return _planned(
-        Request(
-            cases=case_words(map(str, words), plugins) if plain else tuple(c.name for c in read),
-            strategies=tuple(strategy.name for strategy in found),
-            seeds=seeds,
-            seed=seed or 0,
-            nominal=nominal or "both",
-            timeout=DEFAULT_TIMEOUT if timeout is None else timeout,
-            timeouts=_known(timeouts or {}, found),
-            memory=memory,
-            twins=number,
-            twin_seed=_twin_seed(number, twin_seed, resumed),
-        ),
-        read,
-        found,
-        classes_of(plugins),
-        repeatable=plain and all(isinstance(item, str) for item in wanted),
+    request = Request(
+        cases=case_words(map(str, words), plugins) if plain else tuple(c.name for c in read),
+        strategies=tuple(strategy.name for strategy in found),
+        **given,
     )
+    request = replace(request, twin_seed=_twin_seed(request, resumed))
+    names_only = plain and all(isinstance(item, str) for item in wanted)
+    return _plan(request, read, found, plugins, repeatable=names_only)
 
 
-def _planned(
+def _changed(request: Request, given: Mapping[str, Any]) -> Request:
+    """Return the request of a run that goes on, under other limits where some are given.
+
+    Raises:
+        InputError: for an option that would make it another run.
+    """
+    for name in ("seeds", "seed", "nominal", "twins"):
+        if name in given and (name, given[name]) != ("twins", 0):
+            raise InputError(f"--resume alone goes on as before; {name} needs CASE or -s beside it")
+    if {"timeout", "timeouts"} & given.keys():
+        request = replace(request, timeout=DEFAULT_TIMEOUT, timeouts={})
+    how = ("timeout", "timeouts", "memory", "resume", "overwrite")
+    return replace(request, **{name: given[name] for name in how if name in given})
+
+
+def plan_again(request: Request, plugins: Plugins) -> Plan:
+    """Return the plan of what was asked for before."""
+    cases, strategies = read_cases(request.cases, plugins), _strategies(request.strategies, plugins)
+    return _plan(request, cases, strategies, plugins)
+
+
+def _plan(
     request: Request,
     cases: Sequence[Case],
     strategies: Sequence[Strategy],
-    classes: Mapping[str, Sequence[str]],
+    plugins: Plugins,
     *,
     repeatable: bool = True,
 ) -> Plan:
-    """Return a plan with textbook models and twins; arguments as those of `Plan`."""
+    """Return a plan with textbook models and twins.
+
+    Arguments:
+        repeatable: whether the words of the request say it all.
+
+    Raises:
+        InputError: for a time limit of a strategy that does not run.
+    """
+    chosen("strategy to limit", request.timeouts, [strategy.name for strategy in strategies])
+    classes = classes_of(plugins)
     drawn: Sequence[Twin] = ()
     others = Beside()
     if request.twins:
-        drawn = drawn_twins(cases, classes, request.twins, request.twin_seed)
-        others = beside(cases, drawn, request.twins, request.twin_seed)
-    textbook = textbook_of([*cases, *drawn])
-    return Plan(request, cases, strategies, textbook, classes, others, repeatable)
+        drawn = drawn_twins(cases, classes, request.twins, request.twin_seed or 0)
+        others = beside(cases, drawn, request.twins, request.twin_seed or 0)
+    starts = Starts(textbook_of([*cases, *drawn]), request.nominal, classes, others)
+    kept = request.to_json() if repeatable else {"nominal": request.nominal}
+    return Plan(cases, strategies, request, starts, kept)
 
 
 def drawn_twins(
@@ -371,24 +264,18 @@ def drawn_twins(
     return list(twins_of(computed, number, seed))
 
 
-def _twin_seed(number: int, seed: int | None, resumed: Store | None) -> int:
+def _twin_seed(request: Request, resumed: Store | None) -> int:
     """Return what twins are drawn from: a seed given, that of the last run, or one by chance."""
+    number, seed = request.twins, request.twin_seed
     if not 0 <= number <= MOST_TWINS:
         raise InputError(f"{number} twins", expected=f"0 to {MOST_TWINS}")
     if not number or seed is not None:
         return seed or 0
-    if resumed is not None and resumed.runs():
+    if resumed is not None:
         kept = resumed.begun().get("request") or {}
         if kept.get("twins") == number:
             return int(kept["twin_seed"])
     return secrets.randbelow(2**31)
-
-
-def repeated(request: Request, plugins: Plugins) -> Plan:
-    """Return the plan of what was asked for before."""
-    found = _strategies(request.strategies, plugins)
-    _known(request.timeouts, found)
-    return _planned(request, read_cases(request.cases, plugins), found, classes_of(plugins))
 
 
 def textbook_of(cases: Sequence[Case]) -> dict[str, Case]:
@@ -443,16 +330,6 @@ def named(given: object, plugins: Plugins) -> Strategy:
     if variant is None:
         variant = labelled(strategy, usual if type(usual) is type(strategy) else None)
     return strategy if variant.name == strategy.name else variant
-
-
-def _known(timeouts: Mapping[str, float], strategies: Iterable[Strategy]) -> dict[str, float]:
-    """Make sure that every time limit is for a strategy that runs.
-
-    Raises:
-        InputError: for another name.
-    """
-    chosen("strategy to limit", timeouts, [strategy.name for strategy in strategies])
-    return dict(timeouts)
 
 
 def store_in(folder: Store | str | PathLike[str] | None = None) -> Store:

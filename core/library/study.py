@@ -3,37 +3,34 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from os import PathLike
 from pathlib import Path
+from typing import Any, Unpack
 
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
-from femubench.core.files import make_folder
 from femubench.core.library.cases import case_names, read_cases, usable_plugins
-from femubench.core.library.rank import (
-    DEFAULT_TIMEOUT,
-    Run,
-    classes_of,
-    store_in,
-    textbook_of,
-)
-from femubench.core.pace import Told
+from femubench.core.library.rank import Run, classes_of, store_in, textbook_of
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import chosen, unknown
 from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Strategy
-from femubench.core.run.executor import Executor, executor_of
-from femubench.core.run.recording import Overwrite, Progress
-from femubench.core.run.runner import run_jobs
-from femubench.core.run.sandbox import Sandbox
-from femubench.core.run.slots import Slots
-from femubench.core.run.starts import Start, Starts
+from femubench.core.run.executor import open_executor
+from femubench.core.run.recording import Progress
+from femubench.core.run.runner import Plan, Receivers
+from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
 from femubench.core.schema.records import MOST_RESULTS
-from femubench.core.schema.results import DONE, NOMINALS, Nominal
+from femubench.core.schema.results import DONE, NOMINALS
+from femubench.core.schema.run_options import (
+    StudyKeywords,
+    Where,
+    check_keywords,
+    split_keywords,
+)
 from femubench.core.score.scoring import reference_of
 from femubench.core.study.axes import CaseConditions, OptionSet, StudyAxes
 from femubench.core.study.conditions import varied
@@ -41,30 +38,15 @@ from femubench.core.study.estimate import Forecast, forecast
 from femubench.core.study.study_file import StudyFile, grid, read_study
 
 
-@dataclass(frozen=True)
-class StudyPlan:
-    """A study with all that its words stand for.
+@dataclass(frozen=True, kw_only=True)
+class StudyPlan(Plan):
+    """A study with all that its words stand for: cases under every condition, all strategies.
 
     Arguments:
         axes: where its jobs stand.
-        cases: under every condition.
-        strategies: with every combination of options.
-        seeds: of the noise.
-        starts: the models that strategies start from.
-        seed: of the statistics.
     """
 
     axes: StudyAxes
-    cases: Sequence[Case]
-    strategies: Sequence[Strategy]
-    seeds: Sequence[int]
-    starts: Starts
-    seed: int
-
-    @property
-    def models(self) -> Iterator[tuple[Nominal, Case]]:
-        """Yield every case under every condition with every nominal model."""
-        return (start for case in self.cases for start in self.starts.of(case))
 
     @property
     def cells(self) -> int:
@@ -72,21 +54,16 @@ class StudyPlan:
         conditions = len(self.axes.values("noise")) * len(self.axes.values("sensors_left_out"))
         return conditions * len(self.axes.nominals) * len(self.strategies)
 
-    @property
-    def jobs(self) -> int:
-        """Return the number of jobs."""
-        return sum(1 for _ in self.models) * len(self.strategies) * len(self.seeds)
-
-    def forecast(self, store: Store | None = None) -> Forecast:
+    def forecast(self, store: Store) -> Forecast:
         """Return how many jobs are left and what they take; runs none of them.
 
         Arguments:
-            store: whose results are done, and tell how long such jobs take.
+            store: whose results are done, and say how long such jobs take.
         """
-        known = {} if store is None else store.by_key()
+        known = store.by_key()
         left = [
             (slot.case.name, slot.strategy)
-            for slot in Slots(self.models, self.strategies, self.seeds)
+            for slot in self.slots
             if slot.key not in known or known[slot.key].status not in DONE
         ]
         judging = {}
@@ -99,63 +76,27 @@ class StudyPlan:
         seconds, longest, strange = forecast(left, self.axes, known.values(), judging)
         return Forecast(self.jobs, self.jobs - len(left), seconds, longest, strange)
 
-    def run(
-        self,
-        executor: Executor,
-        store: Store | None = None,
-        *,
-        timeout: float | None = None,
-        timeouts: Mapping[str, float] | None = None,
-        memory: int | None = None,
-        overwrite: Overwrite | None = None,
-        progress: Progress | None = None,
-        told: Told | None = None,
-    ) -> Run:
-        """Run what the store does not have, seed after seed; see `study`.
+    def limited(self, given: Mapping[str, Any]) -> StudyPlan:
+        """Return the plan with limits and what the store has of it, as `split_keywords` gives them.
 
-        Arguments:
-            executor: what runs the jobs, from `executor_of`.
+        Raises:
+            InputError: for a limit of a strategy that does not run.
         """
-        if store is not None:
-            make_folder(store.folder)
         bases = {name: choice.strategy for name, choice in self.axes.strategies.items()}
-        limits = dict(timeouts or {})
+        limits = given.get("timeouts", {})
         chosen("strategy to limit", limits, [*bases, *bases.values()])
         own = {name: limits.get(name, limits.get(base)) for name, base in bases.items()}
-        return Run.of(
-            run_jobs(
-                self.cases,
-                self.strategies,
-                seeds=self.seeds,
-                timeout=DEFAULT_TIMEOUT if timeout is None else timeout,
-                timeouts={name: limit for name, limit in own.items() if limit is not None},
-                memory=memory,
-                store=store,
-                overwrite=overwrite,
-                resume=store is not None,
-                progress=progress,
-                told=told,
-                run_seed=self.seed,
-                request={"study": self.axes.to_json()},
-                starts=self.starts,
-                executor=executor,
-            )
-        )
+        timeouts = {name: limit for name, limit in own.items() if limit is not None}
+        return replace(self, options=replace(self.options, **{**given, "timeouts": timeouts}))
 
 
 def study(
     file: str | PathLike[str],
+    where: Where | None = None,
     *,
-    jobs: int | None = None,
-    scheduler: str | None = None,
-    cluster: str | None = None,
-    sandbox: Sandbox = "auto",
-    timeout: float | None = None,
-    timeouts: Mapping[str, float] | None = None,
-    memory: int | None = None,
     store: Store | str | PathLike[str] | None = None,
-    overwrite: Overwrite | None = None,
     progress: Progress | None = None,
+    **keywords: Unpack[StudyKeywords],
 ) -> Run:
     """Run a study: strategies with grids of options under conditions that vary.
 
@@ -163,16 +104,12 @@ def study(
 
     Arguments:
         file: a study file; see docs/studies.md.
-        jobs: number of worker processes; None for one a processor.
-        scheduler, cluster: where the jobs run instead, as in `femubench.rank`.
-        sandbox: ``auto``, ``require`` or ``off``, as there.
-        timeout: seconds that a job may take; 600 by default.
-        timeouts: the same for single strategies, by name, with or without options.
-        memory: bytes that a job may take; None for an even share of the machine's.
+        where: its jobs run; a keyword overrules it.
         store: folder that keeps the results; a study goes on where it stopped. None for none.
-        overwrite: which stored results of the same jobs are computed anew: ``always`` all,
-            ``missing`` none, ``failed`` (the default) the failures.
         progress: called with (result, jobs done, jobs in all).
+        keywords: ``jobs``, ``scheduler``, ``cluster``, ``sandbox``, ``timeout``, ``timeouts``,
+            ``memory`` and ``overwrite`` (``failed`` by default), as in `femubench.rank`; a timeout
+            may be that of a strategy with or without options.
 
     Raises:
         InputError: for a wrong key, an unknown name or a faulty case, before anything is run.
@@ -185,17 +122,12 @@ def study(
         >>> femubench.study(file).skill_by("noise")["jobs"].tolist()
         [1, 1]
     """
-    plan = study_plan(read_study(file), usable_plugins())
-    with executor_of(jobs, scheduler, cluster, sandbox) as executor:
-        return plan.run(
-            executor,
-            None if store is None else store_in(store),
-            timeout=timeout,
-            timeouts=timeouts,
-            memory=memory,
-            overwrite=overwrite,
-            progress=progress,
-        )
+    check_keywords(keywords, StudyKeywords)
+    given, place = split_keywords(keywords, where=where)
+    plan = study_plan(read_study(file), usable_plugins()).limited(given)
+    with open_executor(place) as executor:
+        kept = None if store is None else store_in(store)
+        return Run.of(plan.run(executor, Receivers(kept, progress)))
 
 
 def study_plan(read: StudyFile, plugins: Plugins) -> StudyPlan:
@@ -218,21 +150,21 @@ def study_plan(read: StudyFile, plugins: Plugins) -> StudyPlan:
             cases.append(case if first else replace(case, notes=()))
             if original.name in textbook:
                 known[case.name] = varied(textbook[original.name], noise, left_out)
-    both = len(axes.nominal) > 1
-    nominal: Start = "both" if both else axes.nominal[0]
+    options = read.options
     shown = read.tables.heat_map
     found = StudyAxes(
         settings,
         choices,
         read.title,
         None if shown is None else (shown.x, shown.y),
-        tuple(reversed(NOMINALS)) if both else axes.nominal,
+        tuple(reversed(NOMINALS)) if options.nominal == "both" else axes.nominal,
     )
     _check_heat_map(read, found)
     kinds = classes_of(plugins)
     classes = {name: kinds[s.case] for name, s in settings.items() if s.case in kinds}
-    starts = Starts(known, nominal, classes)
-    plan = StudyPlan(found, cases, strategies, read.seeds, starts, read.seed)
+    starts = Starts(known, options.nominal, classes)
+    kept = {"study": found.to_json()}
+    plan = StudyPlan(cases, strategies, options, starts, kept, axes=found)
     if plan.jobs > MOST_RESULTS:
         raise InputError(f"{plan.jobs} jobs", file=read.file, expected=f"at most {MOST_RESULTS}")
     return plan

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from femubench.core.display import counted
 from femubench.core.errors import InputError
@@ -15,11 +15,12 @@ from femubench.core.library.cases import listed, usable_plugins, way_of
 from femubench.core.library.compare import compare
 from femubench.core.library.plugins import check
 from femubench.core.library.publish import refusal_of
-from femubench.core.library.rank import Run, Twins, plan_of, read_run
+from femubench.core.library.rank import Run, plan_run, read_run
 from femubench.core.library.report import rendered, rendering, report, reporter
 from femubench.core.pace import Told
-from femubench.core.run.executor import executor_of
-from femubench.core.run.sandbox import Sandbox
+from femubench.core.run.executor import open_executor
+from femubench.core.run.runner import Receivers
+from femubench.core.schema.run_options import Where
 
 if TYPE_CHECKING:
     from femubench.core.score.comparison import Comparison, Threshold
@@ -47,15 +48,13 @@ class SubmissionReview:
 
 def submit(
     strategies: str | Iterable[str],
-    cases: Iterable[str | PathLike[str]] = (),
+    cases: Iterable[str | PathLike[str]],
+    given: Mapping[str, Any],
+    where: Where,
     *,
     output: str | PathLike[str],
     baseline: str | PathLike[str] | None = None,
     fail: Iterable[str | Threshold] = (),
-    twins: Twins = 2,
-    sandbox: Sandbox = "auto",
-    jobs: int | None = None,
-    timeouts: Mapping[str, float] | None = None,
     tell: Callable[[str], None] = lambda line: None,
     told: Told | None = None,
 ) -> SubmissionReview:
@@ -64,11 +63,10 @@ def submit(
     Arguments:
         strategies: names.
         cases: names or folders; the default set where there is none.
+        given, where: options of the run, and where it is computed, from `split_keywords`.
         output: the file that `publish` takes.
         baseline: the result file of an earlier run; without one nothing is compared.
         fail: what counts as worse, as in `compare`.
-        twins, sandbox, jobs: as in `rank`.
-        timeouts: seconds that a job may take, by strategy; without a name for all others.
         tell: is given a line at the start of every step.
         told: how far the run is, and how long the rest takes.
 
@@ -88,15 +86,9 @@ def submit(
         rules = [item for item in check(name) if item.verdict.status == "fail"]
         faults += [f"{name} breaks the rule {r.check.name}: {r.verdict.message}" for r in rules]
     tell(f"run {', '.join(names)}")
-    limits = dict(timeouts or {})
-    plan = plan_of(
-        *(list(cases), names, usable_plugins()),
-        timeout=limits.pop("", None),
-        timeouts=limits,
-        twins=twins,
-    )
-    with executor_of(jobs, sandbox=sandbox) as where:
-        run = plan.run(None, None, where, told=told)
+    plan = plan_run(list(cases), names, usable_plugins(), given)
+    with open_executor(where) as executor:
+        run = Run.of(plan.run(executor, Receivers(advance=told)))
     report(run, file, style="json")
     faults += _unanswered(run, names)
     found = None

@@ -29,15 +29,14 @@ from femubench.core.run.cluster_worker import (
     unfit,
 )
 from femubench.core.run.jobs import JobOutcome, one_line
-from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import home_of
-from femubench.core.run.sandbox import OFF, Enclosure, Sandbox, enclosure
-from femubench.core.run.schedule import Show, unjudged
-from femubench.core.run.slots import Slot, Start, first_seed
+from femubench.core.run.sandbox import OFF, Enclosure, enclosure
+from femubench.core.run.schedule import Workload
+from femubench.core.run.slots import Start
 from femubench.core.run.stopping import interrupts_kept
 from femubench.core.run.workers import no_script, repeating
 from femubench.core.schema.results import JobResult
-from femubench.core.score.scoring import Reference
+from femubench.core.schema.run_options import Sandbox, Where
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -115,21 +114,14 @@ class DaskWorkers:
             return Enclosure("none", "no worker is there yet; every result says how it ran")
         return Enclosure("namespaces")
 
-    def computed(
-        self,
-        slots: Sequence[Slot],
-        wanted: Iterable[int],
-        references: Mapping[str, Reference],
-        limits: Mapping[str, Limits],
-        show: Show | None = None,
-    ) -> Iterator[tuple[int, JobResult]]:
-        """Yield the result of every wanted slot as it comes.
+    def compute(self, workload: Workload, wanted: Iterable[int]) -> Iterator[tuple[int, JobResult]]:
+        """Yield the result of every wanted job as it comes.
 
         Raises:
             InputError: where the scheduler is lost, or a worker joined that is not like this
                 machine; results that came before stay.
         """
-        flight = _Flight(self._client, self._demand, slots, references, limits, show)
+        flight = _Flight(self._client, self._demand, workload)
         counted, threads = -_COUNTED, 0
 
         def capacity() -> int:
@@ -151,21 +143,11 @@ def _unlike(what: str) -> InputError:
 class _Flight:
     """Jobs on their way to workers and back."""
 
-    def __init__(
-        self,
-        client: Client,
-        demand: Demand,
-        slots: Sequence[Slot],
-        references: Mapping[str, Reference],
-        limits: Mapping[str, Limits],
-        show: Show | None,
-    ) -> None:
+    def __init__(self, client: Client, demand: Demand, workload: Workload) -> None:
         from distributed import as_completed
 
-        self._client, self._demand, self._slots = client, demand, slots
-        self._references, self._limits, self._show = references, limits, show
+        self._client, self._demand, self._load = client, demand, workload
         self._name = f"femubench-{secrets.token_hex(4)}"
-        self._shown = first_seed(slots)
         self._number = 0
         self._places: dict[str, int] = {}
         # What did not come back is tried once more, last and one at a time.
@@ -193,12 +175,11 @@ class _Flight:
 
     def _sent(self, index: int) -> Iterator[tuple[int, JobResult]]:
         """Send a job to the cluster, unless it could not be made."""
-        slot = self._slots[index]
+        slot = self._load.slots[index]
         if isinstance(slot.code, JobOutcome):
-            yield index, self._unjudged(index, slot.code)
+            yield index, self._load.unjudged(index, slot.code)
             return
-        shown = self._show is not None and slot.seed == self._shown and not slot.varied
-        limits = self._limits[slot.strategy]
+        limits, shown = self._load.limits[slot.strategy], self._load.is_shown(slot)
         errand = Errand(slot.strategy, slot.seed, slot.code, limits, shown)
         self._number += 1
         key = f"{self._name}-{self._number}"
@@ -217,7 +198,7 @@ class _Flight:
         known = self._yardsticks.pop(start, None)
         if known is None or known.status in gone:
             self._number += 1
-            pair = start, self._references[start.case.name]
+            pair = start, self._load.references[start.case.name]
             data = pickle.dumps(pair, protocol=pickle.HIGHEST_PROTOCOL)
             key = f"{self._name}-case-{self._number}"
             known = self._client.submit(pickle.loads, data, key=key, pure=False)
@@ -234,8 +215,8 @@ class _Flight:
         future.release()
         if status == "finished":
             result, exhibit = found
-            if self._show is not None and exhibit is not None:
-                self._show(self._slots[index], exhibit)
+            if self._load.show is not None and exhibit is not None:
+                self._load.show(self._load.slots[index], exhibit)
             yield index, result
             return
         fault = found[1] if status == "error" else found
@@ -250,11 +231,7 @@ class _Flight:
             return
         killed = isinstance(fault, KilledWorker)
         reason = "every worker that ran it died" if killed else one_line(fault)
-        yield index, self._unjudged(index, JobOutcome("crashed", reason))
-
-    def _unjudged(self, index: int, outcome: JobOutcome) -> JobResult:
-        slot = self._slots[index]
-        return unjudged(slot, self._references[slot.case.name], outcome)
+        yield index, self._load.unjudged(index, JobOutcome("crashed", reason))
 
     def call_off(self) -> None:
         """End what is still on its way."""
@@ -267,49 +244,41 @@ class _Flight:
 
 
 @contextmanager
-def connected(
-    address: str, jobs: int | None = None, sandbox: Sandbox = "auto"
-) -> Iterator[DaskWorkers]:
+def connect(where: Where) -> Iterator[DaskWorkers]:
     """Give the workers of a scheduler that runs somewhere.
 
-    Arguments:
-        address: ``tcp://HOST:PORT``, or ``tls://`` with certificates in Dask's configuration.
-        jobs: must be None.
-        sandbox: whether strategies run in one.
+    Its address is ``tcp://HOST:PORT``, or ``tls://`` with certificates in Dask's configuration.
 
     Raises:
-        InputError: where nobody answers there.
+        InputError: where nobody answers there, or for a number of jobs.
     """
-    if jobs is not None:
+    address = str(where.scheduler)
+    if where.jobs is not None:
         what = "the number of jobs at a time is that of the threads of its workers"
-        raise InputError(what, key="scheduler", expected="no --jobs beside it")
+        raise InputError(what, key="scheduler", expected="no --jobs with it")
     if not re.fullmatch(r"[a-z]+://[^\s/]+:\d{1,5}", address):
         expected = "tcp://HOST:PORT"
         raise InputError(f"{address!r} is no address", key="scheduler", expected=expected)
     with _quiet(), _client(address) as client:
-        yield DaskWorkers(client, address, waits=False, sandbox=sandbox)
+        yield DaskWorkers(client, address, waits=False, sandbox=where.sandbox)
 
 
 @contextmanager
-def started(
-    words: str, jobs: int | None = None, sandbox: Sandbox = "auto"
-) -> Iterator[DaskWorkers]:
+def start_cluster(where: Where) -> Iterator[DaskWorkers]:
     """Give the workers of a cluster that is started here and ended with the block.
 
-    Arguments:
-        words: ``local:N`` or ``slurm:QUEUE``.
-        jobs: number of Slurm jobs; must be None with ``local:N``.
-        sandbox: whether strategies run in one.
+    It is ``local:N``, which says the number of workers, or ``slurm:QUEUE``.
 
     Raises:
         InputError: for other words, or where it cannot be started.
     """
+    words, jobs = str(where.cluster), where.jobs
     rest = words.partition(":")[2]
     queued = words.startswith("slurm:")
     if re.fullmatch(r"local:[1-9]\d{0,3}", words):
         if jobs is not None:
             what = f"{words} tells the number of workers"
-            raise InputError(what, key="cluster", expected="no --jobs beside it")
+            raise InputError(what, key="cluster", expected="no --jobs with it")
         make, jobs = partial(_local, int(rest)), int(rest)
     elif queued and re.fullmatch(r"[\w.,-]+", rest):
         require("dask_jobqueue", "cluster", "--cluster slurm")
@@ -332,7 +301,7 @@ def started(
         # A nanny gives up a worker that dies as it starts.
         stack.enter_context(repeating(scale, _COUNTED))
         client = stack.enter_context(_client(cluster))
-        yield DaskWorkers(client, words, waits=queued, sandbox=sandbox)
+        yield DaskWorkers(client, words, waits=queued, sandbox=where.sandbox)
 
 
 def _local(count: int) -> Cluster:

@@ -17,12 +17,13 @@ from femubench.core.errors import FemubenchError
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.limits import LEAST, Limits, memory_share, spoken_bytes
 from femubench.core.run.provenance import blas_name, cpu_name, package_version, versions
-from femubench.core.run.sandbox import Sandbox, enclosure, missing
-from femubench.core.run.schedule import computed
+from femubench.core.run.sandbox import enclosure, missing
+from femubench.core.run.schedule import Workload, compute_jobs
 from femubench.core.run.slots import Slot, Start
 from femubench.core.run.standing_judge import Judges
 from femubench.core.run.workers import adopting
 from femubench.core.schema.results import JobResult
+from femubench.core.schema.run_options import Sandbox
 from femubench.core.score.scoring import Reference
 
 
@@ -138,8 +139,8 @@ def run_errand(yardstick: Yardstick, errand: Errand, demand: Demand) -> Arrived:
     if not hasattr(_OF_THREAD, "judges"):
         _OF_THREAD.judges = Judges[Any]()
     judges: Judges[Any] = _OF_THREAD.judges
-    found = computed(slots, [0], references, {name: limits}, 1, show, wanted, judges)
-    ((_, result),) = found
+    workload = Workload(slots, references, {name: limits}, show)
+    ((_, result),) = compute_jobs(workload, [0], 1, wanted, judges)
     how = {"cpu": cpu_name(), "blas": _blas(), "sandbox": enclosure(limits.sandbox).sandbox}
     result = replace(result, provenance=how)
     return result, exhibits[0] if exhibits else None

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Protocol
 
 from femubench.core.display import counted
 from femubench.core.errors import InputError, require
 from femubench.core.roles import Strategy
-from femubench.core.run.limits import Limits, memory_share
-from femubench.core.run.sandbox import Enclosure, Sandbox, enclosure
-from femubench.core.run.schedule import Show, computed
-from femubench.core.run.slots import Slot
+from femubench.core.run.limits import memory_share
+from femubench.core.run.sandbox import Enclosure, enclosure
+from femubench.core.run.schedule import Workload, compute_jobs
 from femubench.core.schema.results import JobResult
-from femubench.core.score.scoring import Reference
+from femubench.core.schema.run_options import Sandbox, Where
 
 
 class Executor(Protocol):
@@ -49,23 +48,14 @@ class Executor(Protocol):
         """Make sure that jobs of these strategies with so much memory each can run.
 
         Raises:
-            InputError: telling where they cannot, and why.
+            InputError: saying where they cannot, and why.
         """
 
-    def computed(
-        self,
-        slots: Sequence[Slot],
-        wanted: Iterable[int],
-        references: Mapping[str, Reference],
-        limits: Mapping[str, Limits],
-        show: Show | None = None,
-    ) -> Iterator[tuple[int, JobResult]]:
-        """Yield the result of every wanted slot as it comes.
+    def compute(self, workload: Workload, wanted: Iterable[int]) -> Iterator[tuple[int, JobResult]]:
+        """Yield the result of every wanted job as it comes.
 
         Arguments:
-            wanted: places of slots; the next is asked for when there is room for it.
-            limits: by strategy.
-            show: takes the exhibit of a job of the first seed, before its result comes.
+            wanted: places of jobs; the next is asked for when there is room for it.
         """
 
 
@@ -98,55 +88,30 @@ class LocalProcesses:
     def admit(self, strategies: Sequence[Strategy], memory: int | None) -> None:
         """Find nothing to object to: the workers are copies of this process."""
 
-    def computed(
-        self,
-        slots: Sequence[Slot],
-        wanted: Iterable[int],
-        references: Mapping[str, Reference],
-        limits: Mapping[str, Limits],
-        show: Show | None = None,
-    ) -> Iterator[tuple[int, JobResult]]:
-        """Yield the result of every wanted slot as it comes."""
-        yield from computed(slots, wanted, references, limits, self.workers, show)
+    def compute(self, workload: Workload, wanted: Iterable[int]) -> Iterator[tuple[int, JobResult]]:
+        """Yield the result of every wanted job as it comes."""
+        yield from compute_jobs(workload, wanted, self.workers)
 
 
-@contextmanager
-def executor_of(
-    jobs: int | None = None,
-    scheduler: str | None = None,
-    cluster: str | None = None,
-    sandbox: Sandbox = "auto",
-) -> Iterator[Executor]:
+def open_executor(where: Where) -> AbstractContextManager[Executor]:
     """Give what runs jobs: worker processes here, unless a scheduler or a cluster is named.
-
-    Arguments:
-        jobs: number of worker processes, None for that of the processors; with ``slurm:QUEUE``
-            that of the Slurm jobs.
-        scheduler: address of a Dask scheduler, ``tcp://HOST:PORT``.
-        cluster: one to start, ``local:N`` or ``slurm:QUEUE``.
-        sandbox: strategies run in one where that is possible, ``auto``; or ``require``, ``off``.
 
     Raises:
         InputError: for both, for words that mean neither, or where nobody answers.
     """
-    if scheduler is None and cluster is None:
-        yield LocalProcesses(worker_count(jobs), sandbox)
-        return
-    if scheduler is not None and cluster is not None:
+    if where.scheduler is None and where.cluster is None:
+        return nullcontext(LocalProcesses(count_workers(where.jobs), where.sandbox))
+    if where.scheduler is not None and where.cluster is not None:
         what = "--scheduler and --cluster are two places for the same jobs"
         raise InputError(what, expected="one of them")
-    require("distributed", "cluster", f"--{'cluster' if scheduler is None else 'scheduler'}")
-    from femubench.core.run.cluster import connected, started
+    flag = "--cluster" if where.scheduler is None else "--scheduler"
+    require("distributed", "cluster", flag)
+    from femubench.core.run.cluster import connect, start_cluster
 
-    if scheduler is not None:
-        opened = connected(scheduler, jobs, sandbox)
-    else:
-        opened = started(str(cluster), jobs, sandbox)
-    with opened as executor:
-        yield executor
+    return start_cluster(where) if where.scheduler is None else connect(where)
 
 
-def worker_count(jobs: int | None) -> int:
+def count_workers(jobs: int | None) -> int:
     """Return the number of worker processes: that of the processors where none is given.
 
     Raises:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Any, Literal
+from typing import Any
 
 from femubench.core.drawing.prediction import keep_drawings
 from femubench.core.errors import InputError
@@ -18,10 +18,9 @@ from femubench.core.run.slots import Slot, starts_of
 from femubench.core.run.store import Store
 from femubench.core.run.stored import AnyRecord
 from femubench.core.schema.results import DONE, JobResult
+from femubench.core.schema.run_options import Overwrite
 
 Progress = Callable[[JobResult, int, int], None]
-Overwrite = Literal["always", "missing", "failed"]
-OVERWRITE: tuple[Overwrite, ...] = ("always", "missing", "failed")
 
 
 @dataclass(frozen=True)

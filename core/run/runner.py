@@ -5,63 +5,167 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
-from dataclasses import replace
-from functools import partial
-from typing import Any
+from contextlib import ExitStack, nullcontext
+from dataclasses import dataclass, field, replace
+from typing import Any, Unpack
 
 from threadpoolctl import threadpool_limits
 
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
+from femubench.core.files import make_folder
 from femubench.core.pace import Told
 from femubench.core.roles import Strategy
-from femubench.core.run.executor import Executor, LocalProcesses, worker_count
+from femubench.core.run.executor import Executor, open_executor
 from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import home_of, plan_digest, run_meta
-from femubench.core.run.recording import Overwrite, Progress, Results, ended, recorded
+from femubench.core.run.recording import Progress, Results, ended, recorded
+from femubench.core.run.schedule import Workload
 from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Starts
 from femubench.core.run.stopping import stopping
 from femubench.core.run.store import Store
 from femubench.core.schema.results import Run, origins_of
+from femubench.core.schema.run_options import (
+    RunKeywords,
+    RunOptions,
+    check_keywords,
+    split_keywords,
+)
 from femubench.core.score.repeatability import unsteady
 from femubench.core.score.scoring import Reference, rank_results, reference_of
 
-_AS_GIVEN = Starts()
+
+@dataclass(frozen=True)
+class Receivers:
+    """What takes the results of a run as they come.
+
+    Arguments:
+        store: keeps them.
+        progress: called with (result, jobs done, jobs in all).
+        advance: called with how far that is which is not in the store, and how long the rest takes.
+    """
+
+    store: Store | None = None
+    progress: Progress | None = None
+    advance: Told | None = None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A run before it is run: every strategy on every case with every seed.
+
+    Arguments:
+        cases, strategies: each under a name of its own.
+        options: its seeds and limits, and which stored results it takes.
+        starts: the nominal models, the cases as given where left out; and the twins.
+        request: what was asked for, in plain data that is kept with the results.
+    """
+
+    cases: Sequence[Case]
+    strategies: Sequence[Strategy]
+    options: RunOptions = field(default_factory=RunOptions)
+    starts: Starts = field(default_factory=Starts)
+    request: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def jobs(self) -> int:
+        """Return the number of jobs."""
+        models = sum(1 for _ in self.starts.of_all(self.cases))
+        return models * len(self.strategies) * len(self.options.all_seeds)
+
+    @property
+    def slots(self) -> Slots:
+        """Return the jobs."""
+        return Slots(self.starts.of_all(self.cases), self.strategies, self.options.all_seeds)
+
+    def run(self, executor: Executor, receivers: Receivers = Receivers()) -> Run:
+        """Run the jobs, each in a process of its own; see `run_jobs`."""
+        cases, strategies, options = self.cases, self.strategies, self.options
+        starts, store = self.starts, receivers.store
+        _check_names(case=[*cases, *starts.beside.twins], strategy=strategies)
+        if store is not None:
+            make_folder(store.folder)
+        executor.admit(strategies, options.memory)
+        share = executor.share if options.memory is None else options.memory
+        enclosure = executor.enclosure()
+        asked: dict[str, Any] = {
+            **{"seed": options.seed, "timeout": options.timeout, "memory": share},
+            **{"jobs": executor.workers, "sandbox": enclosure.sandbox},
+            **({"sandbox_reason": enclosure.reason} if enclosure.reason else {}),
+        }
+        limits = self._limits(Limits(options.timeout, share, sandbox=executor.sandbox), store)
+        with threadpool_limits(1), ExitStack() as stack:
+            references = starts.beside.repeated(self._solve_yardsticks())
+            slots = self.slots
+            asked |= {"request": dict(self.request), "plan": plan_digest(slots.keys)}
+            about = {**starts.about(cases), **starts.beside.about(references)}
+            yardsticks = {case.name: references[case.name] for case in cases}
+            slots.meta = run_meta(cases, strategies, yardsticks, slots.seeds, asked, about)
+            meta, known = recorded(stack, store, slots.meta, options.overwrite, options.resume)
+            ending = stack.enter_context(ended(store, meta["run"]))
+            results = Results(slots, store, meta["run"], receivers.progress, receivers.advance)
+            missing = results.keep(known, executor.workers)
+            workload = Workload(slots, references, limits, results.shelf)
+            for one in executor.compute(workload, stack.enter_context(stopping()).until(missing)):
+                results.add(*one)
+            others, done = origins_of(meta), results.in_order()
+            ranked = rank_results([r for r in done if r.case not in others], meta["reference"])
+            found = Run(meta, ranked, tuple(result for result in done if result.case in others))
+            if origins_of(meta, "again"):
+                ending["unsteady"] = unsteady(found)
+        return replace(found, meta={**meta, **ending})
+
+    def _limits(self, usual: Limits, store: Store | None) -> dict[str, Limits]:
+        """Return the limits on the jobs of every strategy, and what they see."""
+        # The module of a strategy may be in no folder of code.
+        names = {home_of(strategy)[1] for strategy in self.strategies} - {"__main__"}
+        files = {getattr(sys.modules.get(name), "__file__", None) for name in names}
+        code = tuple(sorted(os.path.abspath(file) for file in files if file))
+        # No strategy is to see the folders of the cases and of the results.
+        folders = {c.folder.absolute() for c in self.cases if (c.folder / "case.toml").is_file()}
+        folders |= {store.folder.absolute()} if store else set()
+        usual = replace(usual, hidden=tuple(sorted(map(str, folders))), shown=code)
+        own = self.options.timeouts
+        return {
+            strategy.name: replace(usual, seconds=own.get(strategy.name, usual.seconds))
+            for strategy in self.strategies
+        }
+
+    def _solve_yardsticks(self) -> dict[str, Reference]:
+        """Return what the yardstick of every case gives, solved once for those that share it."""
+        solved: dict[tuple[int, int, int], Reference] = {}
+        found = {}
+        for case in map(self.starts.yardstick, (*self.cases, *self.starts.beside.twins)):
+            same = id(case.model), id(case.measurement), id(case.modifications)
+            if same not in solved:
+                solved[same] = reference_of(case)
+            found[case.name] = solved[same]
+        return found
 
 
 def run_jobs(
     cases: Sequence[Case],
     strategies: Sequence[Strategy],
-    *,
-    seeds: Sequence[int] = (0,),
-    jobs: int | None = None,
-    timeout: float | None = 600.0,
-    timeouts: Mapping[str, float] | None = None,
-    memory: int | None = None,
-    store: Store | None = None,
-    overwrite: Overwrite | None = None,
-    resume: bool = False,
-    progress: Progress | None = None,
-    told: Told | None = None,
-    run_seed: int = 0,
-    request: Mapping[str, Any] | None = None,
-    starts: Starts = _AS_GIVEN,
+    options: RunOptions | None = None,
     executor: Executor | None = None,
+    *,
+    store: Store | None = None,
+    progress: Progress | None = None,
+    starts: Starts | None = None,
+    **keywords: Unpack[RunKeywords],
 ) -> Run:
     """Run every strategy on every case with every seed, each job in a process of its own.
 
     Ctrl-C lets the jobs that run come to their end, once more stops them; what is done is kept.
 
     Arguments:
-        seeds: 0 is the data as recorded, every other one a draw of measurement noise.
-        jobs, executor: number of workers, None for that of processors; or what runs the jobs.
-        timeout, timeouts, memory: seconds of a job, None for no limit; of single strategies; bytes.
-        store, overwrite, resume, progress: as for `femubench.rank`.
-        told: how far that is which is not in the store, and how long the rest takes.
-        run_seed, request: seed of the run's own statistics, and what was asked for in plain data.
-        starts: the nominal models, the cases as given where left out; what runs beside them.
+        options, keywords: as for `femubench.rank`; seeds may be listed, and `options` may say that
+            there is no timeout.
+        executor: what runs the jobs, from `open_executor`; None for what the keywords say.
+        store: keeps the results.
+        progress: called with (result, jobs done, jobs in all).
+        starts: the nominal models, the cases as given where left out; what runs with them.
 
     Raises:
         InputError: for two of one name, no worker, or a run that another process works on.
@@ -71,52 +175,12 @@ def run_jobs(
         >>> results.run_jobs([case], [nominal]).results[0].status
         'ok'
     """
-    _check_names(case=[*cases, *starts.beside.twins], strategy=strategies)
-    place = executor or LocalProcesses(worker_count(jobs))
-    place.admit(strategies, memory)
-    share = place.share if memory is None else memory
-    how = place.enclosure()
-    why = {"sandbox_reason": how.reason} if how.reason else {}
-    where = {"jobs": place.workers, "sandbox": how.sandbox, **why}
-    asked: dict[str, Any] = {"seed": run_seed, "timeout": timeout, "memory": share, **where}
-    own = {s.name: (timeouts or {}).get(s.name, timeout) for s in strategies}
-    # The module of a strategy may be in no folder of code.
-    names = {home_of(strategy)[1] for strategy in strategies} - {"__main__"}
-    files = {getattr(sys.modules.get(name), "__file__", None) for name in names}
-    code = tuple(sorted(os.path.abspath(file) for file in files if file))
-    # No strategy is to see the folders of the cases and of the results.
-    folders = {case.folder.absolute() for case in cases if (case.folder / "case.toml").is_file()}
-    folders |= {store.folder.absolute()} if store else set()
-    hidden = tuple(sorted(map(str, folders)))
-    sight = partial(replace, sandbox=place.sandbox, hidden=hidden, shown=code)
-    limits = {name: sight(Limits(seconds, share)) for name, seconds in own.items()}
-    with threadpool_limits(1), ExitStack() as stack:
-        # What the yardstick of every case gives, solved once for those that share it.
-        solved: dict[tuple[int, int, int], Reference] = {}
-        given = {}
-        for case in map(starts.yardstick, (*cases, *starts.beside.twins)):
-            same = id(case.model), id(case.measurement), id(case.modifications)
-            if same not in solved:
-                solved[same] = reference_of(case)
-            given[case.name] = solved[same]
-        references = starts.beside.repeated(given)
-        slots = Slots(starts.of_all(cases), strategies, seeds)
-        asked |= {"request": dict(request or {}), "plan": plan_digest(slots.keys)}
-        who, about = slots.strategies, {**starts.about(cases), **starts.beside.about(references)}
-        yardsticks = {case.name: references[case.name] for case in cases}
-        slots.meta = run_meta(cases, who, yardsticks, seeds, asked, about)
-        meta, known = recorded(stack, store, slots.meta, overwrite, resume)
-        ending = stack.enter_context(ended(store, meta["run"]))
-        results = Results(slots, store, meta["run"], progress, told)
-        wanted = stack.enter_context(stopping()).until(results.keep(known, place.workers))
-        for one in place.computed(slots, wanted, references, limits, results.shelf):
-            results.add(*one)
-        others, done = origins_of(meta), results.in_order()
-        ranked = rank_results([r for r in done if r.case not in others], meta["reference"])
-        found = Run(meta, ranked, tuple(result for result in done if result.case in others))
-        if origins_of(meta, "again"):
-            ending["unsteady"] = unsteady(found)
-    return replace(found, meta={**meta, **ending})
+    check_keywords(keywords, RunKeywords)
+    given, where = split_keywords(keywords)
+    asked = replace(options or RunOptions(), **given)
+    plan = Plan(cases, strategies, asked, starts or Starts())
+    with open_executor(where) if executor is None else nullcontext(executor) as place:
+        return plan.run(place, Receivers(store, progress))
 
 
 def _check_names(**given: Sequence[Case] | Sequence[Strategy]) -> None:

@@ -25,8 +25,8 @@ from femubench.core.errors import InputError
 from femubench.core.run import namespaces
 from femubench.core.run.namespaces import FOLDER, Walls, go_apart
 from femubench.core.run.syscall_filter import known_processor, refuse_system_calls
+from femubench.core.schema.run_options import Sandbox as Sandbox
 
-Sandbox = Literal["auto", "require", "off"]
 OFF = "it is switched off"
 _OLDEST = (5, 14)  # Linux: counts the processes of a user in each namespace of users apart
 _SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store")

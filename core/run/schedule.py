@@ -7,8 +7,8 @@ import json
 import pickle
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from itertools import islice
 from typing import Any
 
@@ -31,31 +31,58 @@ _MOST_CASES = 100  # that are kept as the judge reads them
 _ATTEMPTS = 3  # to start a process
 
 
-def computed(
-    slots: Sequence[Slot],
+@dataclass(frozen=True)
+class Workload:
+    """The jobs of a run with all that it takes to compute and to judge them.
+
+    Arguments:
+        slots: the jobs.
+        references: what the results of a case are measured against, by its name.
+        limits: on a job, by strategy.
+        show: takes the exhibit of a job of the first seed, before its result comes.
+    """
+
+    slots: Sequence[Slot]
+    references: Mapping[str, Reference]
+    limits: Mapping[str, Limits]
+    show: Show | None = None
+
+    @cached_property
+    def _first_seed(self) -> int:
+        return first_seed(self.slots)
+
+    def is_shown(self, slot: Slot) -> bool:
+        """Tell whether the exhibit of a job is wanted."""
+        return self.show is not None and slot.seed == self._first_seed and not slot.varied
+
+    def unjudged(self, index: int, outcome: JobOutcome) -> JobResult:
+        """Return the result of a job that has no model to be judged."""
+        slot = self.slots[index]
+        names = slot.strategy, slot.seed, slot.nominal
+        return judged(slot.case, self.references[slot.case.name], names, outcome)
+
+
+def compute_jobs(
+    workload: Workload,
     wanted: Iterable[int],
-    references: Mapping[str, Reference],
-    limits: Mapping[str, Limits],
     count: int,
-    show: Show | None = None,
     pulse: Callable[[], None] = lambda: None,
     judges: Judges[_Task] | None = None,
 ) -> Iterator[tuple[int, JobResult]]:
-    """Yield the result of every wanted slot as it comes, from processes of this machine.
+    """Yield the result of every wanted job as it comes, from processes of this machine.
 
     Arguments:
-        wanted: places of slots; the next is asked for when there is a process for it.
+        wanted: places of jobs; the next is asked for when there is a process for it.
         count: number of processes.
-        show: takes the exhibit of a job of the first seed, before its result comes.
         pulse: called twice a second and more; what it raises ends the jobs that run.
         judges: that are there already, and stay; else there are some for this time.
     """
     if judges is None:
         with Judges[_Task]() as judges:
-            yield from computed(slots, wanted, references, limits, count, show, pulse, judges)
+            yield from compute_jobs(workload, wanted, count, pulse, judges)
         return
 
-    bench = _Bench(slots, references, limits, show, iter(wanted))
+    bench = _Bench(workload, iter(wanted))
     if not bench.has_work(0):
         return
     with Workers[_Task](count).open() as workers, judges.at_hand():
@@ -72,17 +99,8 @@ def computed(
 class _Bench:
     """What happens to a job: run in one process, judged in another."""
 
-    def __init__(
-        self,
-        slots: Sequence[Slot],
-        references: Mapping[str, Reference],
-        limits: Mapping[str, Limits],
-        show: Show | None,
-        wanted: Iterator[int] = iter(()),  # noqa: B008 - nothing is taken from it
-    ) -> None:
-        self._wanted = wanted
-        self._slots, self._references, self._limits = slots, references, limits
-        self._show, self._shown = show, first_seed(slots)
+    def __init__(self, workload: Workload, wanted: Iterator[int]) -> None:
+        self._load, self._wanted = workload, wanted
         self._case = lru_cache(_MOST_CASES)(self._pickled)
         self._attempts = Counter[int]()
         self._alone: set[int] = set()
@@ -103,25 +121,24 @@ class _Bench:
         """Start judging an answer or running a job; yield the result of one that cannot start."""
         task = (self.answers or self.waiting or self.lonely).popleft()
         index, answer = task
-        slot = self._slots[index]
+        slot = self._load.slots[index]
         job = None if answer else slot.job
         if isinstance(job, JobOutcome):
-            yield index, self.unjudged(index, job)
+            yield index, self._load.unjudged(index, job)
             return
         if answer:
-            shown = self._show is not None and slot.seed == self._shown and not slot.varied
             names = slot.strategy, slot.seed, slot.nominal
             digest, case = self._case(slot.start)
-            verdict = Dossier(case, answer, *names, exhibited=shown)
-            limits = self._limits[slot.strategy]
+            verdict = Dossier(case, answer, *names, exhibited=self._load.is_shown(slot))
+            limits = self._load.limits[slot.strategy]
             seconds = None if limits.seconds is None else max(_LEAST_JUDGING, limits.seconds)
             ending = judges.start(
                 task, digest, verdict, replace(limits, seconds=seconds, sandbox="off")
             )
         else:
-            ending = workers.start(task, run_strategy, job, self._limits[slot.strategy])
+            ending = workers.start(task, run_strategy, job, self._load.limits[slot.strategy])
         if ending is not None and not self._again(task):
-            yield index, self.unjudged(index, JobOutcome("crashed", ending.reason))
+            yield index, self._load.unjudged(index, JobOutcome("crashed", ending.reason))
 
     def _again(self, task: _Task) -> bool:
         """Try a task once more for which there was no process; tell whether it may be tried."""
@@ -143,8 +160,11 @@ class _Bench:
         elif answer and ending.how == "died" and self._again(task):
             return  # whoever ended the judge has only delayed its judgement
         elif answer:
-            found = self._judgement(self._slots[index], ending)
-            yield index, self.unjudged(index, found) if isinstance(found, JobOutcome) else found
+            found = self._judgement(self._load.slots[index], ending)
+            yield (
+                index,
+                self._load.unjudged(index, found) if isinstance(found, JobOutcome) else found,
+            )
         else:
             if ending.how != "answer":
                 status: Status = "timeout" if ending.how == "timeout" else "crashed"
@@ -157,12 +177,7 @@ class _Bench:
             if outcome.status == "ok":
                 self.answers.append((index, ending.answer))
             else:
-                yield index, self.unjudged(index, outcome)
-
-    def unjudged(self, index: int, outcome: JobOutcome) -> JobResult:
-        """Return the result of a job that has no model to be judged."""
-        slot = self._slots[index]
-        return unjudged(slot, self._references[slot.case.name], outcome)
+                yield index, self._load.unjudged(index, outcome)
 
     def _judgement(self, slot: Slot, ending: Ending) -> JobResult | JobOutcome:
         if ending.how != "answer":
@@ -172,17 +187,12 @@ class _Bench:
             result = result_from_json(data["result"])
         except InputError as error:
             return JobOutcome("failed", f"its result is out of bounds: {error}")
-        if self._show is not None and data["exhibit"] is not None:
-            self._show(slot, data["exhibit"])
+        if self._load.show is not None and data["exhibit"] is not None:
+            self._load.show(slot, data["exhibit"])
         return result
 
     def _pickled(self, start: Start) -> tuple[bytes, bytes]:
         """Return a case and its reference as the judge reads them, after their digest."""
-        pair = start.case, self._references[start.case.name]
+        pair = start.case, self._load.references[start.case.name]
         data = pickle.dumps(pair, protocol=pickle.HIGHEST_PROTOCOL)
         return hashlib.blake2b(data, digest_size=16).digest(), data
-
-
-def unjudged(slot: Slot, reference: Reference, outcome: JobOutcome) -> JobResult:
-    """Return the result of a job that has no model to be judged."""
-    return judged(slot.case, reference, (slot.strategy, slot.seed, slot.nominal), outcome)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 from femubench.core.case.case import Case
 from femubench.core.run.beside import NOTHING, Beside
 from femubench.core.schema.results import NOMINALS, Nominal
+from femubench.core.schema.run_options import StartModels
 from femubench.core.twin.twins import again
-
-Start = Literal["drawn", "textbook", "both"]
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,7 @@ class Starts:
     """
 
     textbook: Mapping[str, Case] | None = None
-    nominal: Start = "both"
+    nominal: StartModels = "both"
     classes: Mapping[str, Sequence[str]] = field(default_factory=dict)
     beside: Beside = NOTHING
 

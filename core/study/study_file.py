@@ -17,11 +17,12 @@ from femubench.core.case.toml_text import key_line, located, spec_of
 from femubench.core.errors import InputError
 from femubench.core.files import MIB, read_text
 from femubench.core.schema.results import NOMINALS, Nominal
+from femubench.core.schema.run_options import LARGEST_SEED, RunOptions, Seed
 
 Value = bool | int | float | str
 _T = TypeVar("_T")
 _LARGEST = MIB
-_MOST_SEEDS, _LARGEST_SEED = 100_000, 2**62
+_MOST_SEEDS = 100_000
 _SEEDS = "a number of draws of noise >= 1, or a list of seeds >= 0, each once"
 _VALUES = "a number, a text, true or false, or a list of these, each once"
 _AXIS = '"noise", "sensors_left_out", "strategy", "STRATEGY.OPTION", "case" or "nominal"'
@@ -38,7 +39,7 @@ def _each_once(values: tuple[_T, ...]) -> tuple[_T, ...]:
 def _seeds(given: object) -> int | tuple[int, ...]:
     if type(given) is int and 1 <= given <= _MOST_SEEDS:
         return given
-    if isinstance(given, list) and all(type(s) is int and 0 <= s < _LARGEST_SEED for s in given):
+    if isinstance(given, list) and all(type(s) is int and 0 <= s <= LARGEST_SEED for s in given):
         return _each_once(tuple(given))
     raise misfit("neither a number of draws nor a list of seeds", _SEEDS)
 
@@ -67,9 +68,7 @@ class StudyKeys(TomlTable):
     """`[study]`."""
 
     title: Text = Field("", description="a text on one line")
-    seed: Annotated[int, Field(strict=True, ge=0, lt=_LARGEST_SEED)] = Field(
-        0, description="a whole number >= 0"
-    )
+    seed: Annotated[Seed, Field(strict=True)] = Field(0, description="a whole number >= 0")
 
 
 class AxesKeys(TomlTable):
@@ -131,19 +130,11 @@ class StudyFile:
         return self.tables.study.title if self.tables.study is not None else ""
 
     @property
-    def seed(self) -> int:
-        """Return the first seed, which is that of the statistics too."""
-        return self.tables.study.seed if self.tables.study is not None else 0
-
-    @property
-    def seeds(self) -> tuple[int, ...]:
-        """Return the seeds: 0 is the data as recorded, every other one a draw of noise."""
-        given, first = self.tables.axes.seeds, self.seed
-        if isinstance(given, tuple):
-            return given
-        if given is None:
-            return (first,)
-        return tuple(range(first + 1, first + 1 + given))
+    def options(self) -> RunOptions:
+        """Return the options of the run that the file has; a study goes on where it stopped."""
+        axes, seed = self.tables.axes, self.tables.study.seed if self.tables.study else 0
+        nominal = axes.nominal[0] if len(axes.nominal) == 1 else "both"
+        return RunOptions(seeds=axes.seeds, seed=seed, nominal=nominal, resume=True)
 
     @contextmanager
     def at(self, *path: str | int) -> Iterator[None]:
@@ -177,7 +168,7 @@ def read_study(file: str | PathLike[str]) -> StudyFile:
     try:
         found = StudyFile(path, text, spec_of(text, path, StudyTables))
         axes = found.tables.axes
-        if axes.noise != (1.0,) and 0 in found.seeds:
+        if axes.noise != (1.0,) and 0 in found.options.all_seeds:
             where = ("axes", "noise") if axes.seeds is None else ("axes", "seeds")
             what = "noise is a factor on what is drawn, and seed 0 draws none"
             raise BadKey(where, what, "seeds = N, or a list of seeds >= 1")

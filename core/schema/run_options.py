@@ -1,0 +1,248 @@
+"""What a run may be asked for, every option once: for Python, the command line and study files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Annotated, Any, Literal, TypedDict
+
+from annotated_types import Ge, Gt, Le, Lt
+
+from femubench.core.schema.quantities import parse_size, parse_timeouts, parse_twins
+
+DEFAULT_TIMEOUT = 600.0  # s
+MOST_TWINS = 100
+LARGEST_SEED = 2**62
+Sandbox = Literal["auto", "require", "off"]
+Overwrite = Literal["always", "missing", "failed"]
+StartModels = Literal["drawn", "textbook", "both"]
+Twins = int | tuple[int, int | None]  # how many, and from which seed; None draws one
+Seed = Annotated[int, Ge(0), Le(LARGEST_SEED)]
+Seconds = Annotated[float, Gt(0.0), Lt(float("inf"))]
+Count = Annotated[int, Ge(1)]
+
+
+@dataclass(frozen=True)
+class OptionText:
+    """What the command line says of a field.
+
+    Arguments:
+        flags: separated by blanks.
+        help, metavar: of the option.
+        parse: returns the value of its text, or raises a ValueError; None where the type says it.
+        multiple: whether the option may be repeated; `parse` has all texts.
+        show_default: whether the help names the default.
+    """
+
+    flags: str
+    help: str
+    metavar: str | None = None
+    parse: Callable[[Any], Any] | None = None
+    multiple: bool = False
+    show_default: bool = False
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where the jobs of a run are computed: in processes of this machine, or on a cluster.
+
+    Arguments:
+        jobs: number of worker processes, or of Slurm jobs; None for one a processor.
+        scheduler: address of a Dask scheduler that runs, ``tcp://HOST:PORT``.
+        cluster: one to start, ``local:N`` or ``slurm:QUEUE``.
+        sandbox: of strategies: ``auto``, where that is possible; ``require``; ``off``.
+    """
+
+    jobs: Annotated[
+        Count | None,
+        OptionText(
+            "-j --jobs",
+            "Number of worker processes. Default: one per core. With --cluster slurm:QUEUE the "
+            "number of Slurm jobs.",
+            "N",
+        ),
+    ] = None
+    scheduler: Annotated[
+        str | None,
+        OptionText(
+            "--scheduler",
+            "Run the jobs on the workers of the Dask scheduler there, e.g. tcp://host:8786.",
+            "ADDRESS",
+        ),
+    ] = None
+    cluster: Annotated[
+        str | None,
+        OptionText(
+            "--cluster",
+            "Start a Dask cluster for the run: local:N workers here, or slurm:QUEUE.",
+            "CLUSTER",
+        ),
+    ] = None
+    sandbox: Annotated[
+        Sandbox,
+        OptionText(
+            "--sandbox",
+            "Run strategies where they see no case, no file of yours, no other process and no "
+            "network (Linux): where that is possible, or not at all, or without.",
+            show_default=True,
+        ),
+    ] = "auto"
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """What a run computes, within which limits, and which stored results it takes.
+
+    Arguments:
+        seeds: number of draws of noise, or the seeds themselves; None for the data as recorded.
+        seed: the first one, and that of the statistics.
+        nominal: the models that strategies start from: as drawn, with the values of handbooks
+            (``textbook``), or both.
+        twins, twin_seed: number of twins of every case whose truth was computed; what they are
+            drawn from, None for a seed by chance.
+        resume: goes on with the last run of these jobs in the store.
+        overwrite: computes stored results anew: ``always`` all, ``missing`` none, ``failed`` the
+            failures, which is usual with `resume`; without it all are.
+        timeout, timeouts: seconds that a job may take, None for no limit; of single strategies.
+        memory: bytes that a job may take; None for an even share of the machine's.
+    """
+
+    seeds: Annotated[
+        Count | tuple[Seed, ...] | None,
+        OptionText(
+            "--seeds",
+            "Run N draws of measurement noise, seeds S+1 .. S+N, instead of the data as recorded.",
+            "N",
+        ),
+    ] = None
+    seed: Annotated[Seed, OptionText("--seed", "The first seed.", "S", show_default=True)] = 0
+    nominal: Annotated[
+        StartModels,
+        OptionText(
+            "--nominal",
+            "The model that all strategies start from: as drawn, or with what handbooks give for "
+            "torsion, shear and rotary inertia, from which the ranks are.",
+            show_default=True,
+        ),
+    ] = "both"
+    twins: Annotated[
+        Annotated[int, Ge(0), Le(MOST_TWINS)],
+        OptionText(
+            "--twins",
+            "Draw N twins of every case whose truth was computed, other structures under other "
+            "names, and say who is good on the cases but not on them; run one job of each strategy "
+            "twice.",
+            "N[:SEED]",
+            parse_twins,
+        ),
+    ] = 0
+    twin_seed: Annotated[int, Ge(0)] | None = None
+    resume: Annotated[
+        bool,
+        OptionText(
+            "--resume",
+            "Continue the last run of these jobs: run what is missing, and failed jobs again. "
+            "Without CASE and -s, continue the last run in the store.",
+        ),
+    ] = False
+    overwrite: Annotated[
+        Overwrite | None,
+        OptionText(
+            "--overwrite",
+            "Which stored results of the same jobs are computed again: all, none, or the "
+            "failures. Default: always; with --resume: failed.",
+        ),
+    ] = None
+    timeout: Seconds | None = DEFAULT_TIMEOUT
+    timeouts: Annotated[
+        Mapping[str, Seconds],
+        OptionText(
+            "--timeout",
+            "Give up on a job after this time, e.g. 90s, 10m, 1h. STRATEGY=DURATION is for one "
+            "strategy; may be repeated. Default: 10m.",
+            "DURATION",
+            parse_timeouts,
+            multiple=True,
+        ),
+    ] = field(default_factory=dict)
+    memory: Annotated[
+        Count | None,
+        OptionText(
+            "--memory",
+            "Stop a job that takes more, e.g. 512M, 4G. Default: an even share of the machine's.",
+            "SIZE",
+            parse_size,
+        ),
+    ] = None
+
+    @property
+    def all_seeds(self) -> Sequence[int]:
+        """Return the seeds: 0 is the data as recorded, several are draws of noise and no other."""
+        if isinstance(self.seeds, Sequence):
+            return self.seeds
+        first = self.seed if self.seeds is None else self.seed + 1
+        return range(first, first + (self.seeds or 1))
+
+
+class StudyKeywords(TypedDict, total=False):
+    """Keywords for options of a run, except those that stand in a study file."""
+
+    jobs: int | None
+    scheduler: str | None
+    cluster: str | None
+    sandbox: Sandbox
+    timeout: float | None
+    timeouts: Mapping[str, float] | None
+    memory: int | None
+    overwrite: Overwrite | None
+
+
+class RunKeywords(StudyKeywords, total=False):
+    """Keywords for every field of `RunOptions` and `Where`, for editors and type checkers."""
+
+    seeds: int | Sequence[int] | None
+    seed: int | None
+    nominal: StartModels | None
+    twins: Twins
+    resume: bool
+
+
+def check_keywords(given: Mapping[str, Any], kind: Any) -> None:  # noqa: ANN401 - a TypedDict
+    """Make sure that keywords exist.
+
+    Raises:
+        TypeError: naming one that does not.
+    """
+    for name in sorted(given.keys() - kind.__optional_keys__):
+        raise TypeError(f"unexpected keyword argument {name!r}")
+
+
+def split_keywords(
+    given: Mapping[str, Any], options: RunOptions | None = None, where: Where | None = None
+) -> tuple[dict[str, Any], Where]:
+    """Return the options of a run that were given, by field, and where it is computed.
+
+    Arguments:
+        given: as in `RunKeywords`; None stands for what is usual.
+        options, where: what holds for the others; of options, where it is not what is usual.
+    """
+    usual = RunOptions()
+    own = {f.name: getattr(options or usual, f.name) for f in fields(RunOptions)}
+    own = {name: value for name, value in own.items() if value != getattr(usual, name)}
+    there = {}
+    for name, value in given.items():
+        if value is None:
+            continue
+        if name in Where.__dataclass_fields__:
+            there[name] = value
+        elif name == "twins" and not isinstance(value, int):
+            own |= zip(("twins", "twin_seed"), value, strict=True)
+        elif name == "timeouts":
+            limits = dict(value)  # those of all others may stand under an empty name
+            own |= {"timeout": limits.pop("")} if "" in limits else {}
+            own[name] = limits
+        else:
+            own[name] = (
+                value if isinstance(value, str) or not isinstance(value, Sequence) else tuple(value)
+            )
+    return own, replace(where or Where(), **there)
