@@ -17,11 +17,11 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from msgspec import structs
 
 from femubench.core.run.recording import Results, recorded
 from femubench.core.run.store import Store
@@ -99,7 +99,7 @@ def _block(percent: float, errors: list[float], first: int, strategy: str) -> Bl
         PairedMode(first + n, 100.0 * (first + n), 100.0 * (first + n) + e, 1.0 / (1.0 + e))
         for n, e in enumerate(errors)
     )
-    return Block(percent, 0.99, tuple(replace(m, predicted_std_hz=std) for m in modes))
+    return Block(percent, 0.99, tuple(structs.replace(m, predicted_std_hz=std) for m in modes))
 
 
 def make(folder: Path, results: int) -> Store:

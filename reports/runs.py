@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
+
+from msgspec import structs
 
 from femubench.reports import study
 from femubench.reports.blocks import Block, Cell, Column, Items, Passage, Table
@@ -324,7 +325,7 @@ def _case(run: Run, case: str, others: Iterable[tuple[str, _Printed]]) -> Iterat
         for said, by_strategy in others:
             if told := by_strategy.get(result.strategy):
                 cells = (
-                    _predicted(replace(mode, predicted_hz=told[number]))
+                    _predicted(structs.replace(mode, predicted_hz=told[number]))
                     if number in told
                     else NOTHING
                     for (_, number), mode in columns.items()

@@ -320,7 +320,7 @@ def test_over_many_structures_the_signs_decide(run: Run) -> None:
             for listed, called, f in ((results, name, 1.0), (others, f"{name}~1", factor)):
                 error = {"higher": replace(block, rms_percent=(2.0 + 0.01 * i) * f)}
                 own = {"case": called, "strategy": strategy, "seed": 0, "blocks": error}
-                listed.append(run.results[0].changed(**own))
+                listed.append(replace(run.results[0], **own))
     found = twin_skills(Run(meta, tuple(results), tuple(others)))
     assert [found[n].suspicious for n in ("knows", "none", "slightly")] == [True, False, False]
     assert found["knows"].p is not None
@@ -334,7 +334,8 @@ def test_one_twin_may_be_chance_and_who_is_never_good_knows_nothing(run: Run) ->
         told = {"of": names, "again": {}, "reference": {name: {"higher": 3.0} for name in names}}
         meta = {"reference": {"one": {"higher": 3.0}}, "twins": told}
         jobs = [
-            run.results[0].changed(
+            replace(
+                run.results[0],
                 case=case,
                 seed=0,
                 strategy="s",
@@ -358,7 +359,8 @@ def test_a_job_that_was_stopped_says_nothing_of_what_a_strategy_knows(run: Run) 
         "reference": {"one": {"higher": 3.0}},
         "twins": {"of": told, "again": {}, "reference": reference},
     }
-    answer = run.results[0].changed(
+    answer = replace(
+        run.results[0],
         case="one",
         seed=0,
         strategy="s",

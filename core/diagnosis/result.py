@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from femubench.core.case.case import Case
@@ -14,83 +14,33 @@ from femubench.core.inference.settings import settings
 from femubench.core.schema.diagnosis import (
     Advice,
     Cause,
+    DiagnosisReport,
     ErrorScale,
     Evidence,
-    Gain,
     LocationRow,
     LookWarning,
     ResidualRow,
     Rival,
     Scatter,
     SmallestVisible,
-    Verdict,
 )
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True, repr=False)
-class Diagnosis(Shown):
+@dataclass(frozen=True, repr=False, kw_only=True)
+class Diagnosis(DiagnosisReport, Shown):
     """What is missing in a model, where, how sure, and what it gains.
 
     Arguments:
-        case: name of the case.
-        verdict: see the case for each in docs/diagnosis.md.
-        sentence: the verdict in one sentence.
-        causes: named effects; with ``ambiguous`` the members of the inseparable group, with
-            ``unknown`` and ``not-confirmed`` a best guess, with ``none`` nothing.
-        rivals: every other explanation worth a look, most probable first.
-        reason: why the members of a group cannot be told apart; empty without a group.
-        advice: measurements that would separate them, best first.
-        smallest_visible: one row an effect.
-        residuals: every datum.
-        gain: medians before and after.
-        gain_rms: the same as root mean squares, as `bench run` has them; None in older files.
-        chi2: before and after, in the metric of the noise model.
-        data_count: number of data behind chi2.
-        adequacy_p: probability of a chi-square as large as the one after.
-        nothing: probability that the model lacks nothing.
-        looks: what the plain look found.
-        locations: where the error sits.
-        base: textbook effects that the names rest on, as ``effect`` slugs.
         extended: the model with the causes in it; the nominal one where none was named.
-        notes: further remarks, one sentence each.
-        seconds: spent.
-        evidence: what the data say for the first explanation, and what the prior adds.
-        model_error: what the drawing gets wrong, beside the first explanation; empty where the
-            structure is taken for a beam model.
-        like_a_beam: probability that it is one, but for ordinary scatter.
         subject: the case itself, for drawings of its structure.
-        scatter: whether what is left is as much as the stated deviations let expect.
         examination: every explanation that was tried; None where it was read from a file.
+        case, verdict and all others: as in `DiagnosisReport`.
     """
 
-    case: str
-    verdict: Verdict
-    sentence: str
-    causes: tuple[Cause, ...]
-    rivals: tuple[Rival, ...]
-    reason: str
-    advice: tuple[Advice, ...]
-    smallest_visible: tuple[SmallestVisible, ...]
-    residuals: tuple[ResidualRow, ...]
-    gain: Gain
-    chi2: tuple[float, float]
-    data_count: int
-    adequacy_p: float
-    nothing: float
-    looks: tuple[LookWarning, ...]
-    locations: tuple[LocationRow, ...]
-    base: tuple[str, ...]
     extended: Model = field(repr=False)
-    notes: tuple[str, ...] = ()
-    seconds: float = 0.0
-    evidence: tuple[Evidence, ...] = ()
-    model_error: tuple[ErrorScale, ...] = ()
-    like_a_beam: float = 1.0
-    gain_rms: Gain | None = None
-    scatter: tuple[Scatter, ...] = ()
     subject: Case | None = field(default=None, repr=False)
     examination: Examination | None = field(default=None, repr=False, compare=False)
 
@@ -126,8 +76,8 @@ class Diagnosis(Shown):
 
         if table not in _TABLES:
             raise KeyError(f"no table {table!r}; there are {', '.join(_TABLES)}")
-        columns = [f.name for f in fields(_TABLES[table])]
-        rows = _flat(getattr(self, table))
+        columns = list(_TABLES[table].__annotations__)
+        rows = _flat(getattr(self, table), columns)
         return pd.DataFrame(rows, columns=columns if table != "causes" else _CAUSE_COLUMNS)
 
 
@@ -146,7 +96,7 @@ _TABLES: dict[str, Any] = {
 _CAUSE_COLUMNS = ["effect", "place", "probability", "parameter", "value", "std", "unit", "textbook"]
 
 
-def _flat(rows: Sequence[Any]) -> list[dict[str, Any]]:
+def _flat(rows: Sequence[Any], columns: Sequence[str]) -> list[dict[str, Any]]:
     """Return one mapping a row; a cause has one row a parameter."""
     result = []
     for row in rows:
@@ -156,5 +106,5 @@ def _flat(rows: Sequence[Any]) -> list[dict[str, Any]]:
                 own = {key: value for key, value in asdict(p).items() if key != "name"}
                 result.append({**head, "parameter": p.name, **own})
         else:
-            result.append({f.name: getattr(row, f.name) for f in fields(row)})
+            result.append({name: getattr(row, name) for name in columns})
     return result

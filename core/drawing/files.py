@@ -10,16 +10,18 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from msgspec import Meta, Struct
 
 from femubench.core.drawing.findings import Finding
-from femubench.core.drawing.wireframe import Wireframe, adapter, check_same
+from femubench.core.drawing.wireframe import Point, Wireframe, check_same
 from femubench.core.errors import InputError, OutputError
 from femubench.core.files import read_bytes, write_atomically
-from femubench.core.schema.records import parse_json
+from femubench.core.schema.bounds import Real
+from femubench.core.schema.records import parse_json, to_plain
 from femubench.core.schema.sealing import TAIL, is_whole, sealed, sum_of
+from femubench.core.schema.validation import read_plain
 
 FOLDER = "exhibits"
 MOST_BYTES = 4 * 2**20
@@ -30,76 +32,68 @@ _KEY = re.compile(r"[0-9a-f]{8,64}")
 _MOST = 20_000
 _STALE = 60.0  # s; a file is written in a fraction of one
 
-Number = float | None
-Row = list[Number]
-_Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+_Row = Annotated[list[Real | None], Meta(max_length=_MOST)]
+_Hertz = Annotated[list[Real], Meta(max_length=_MOST)]
+_Label = Annotated[str, Meta(max_length=500)]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
-
-
-class _Measured(_Part):
+class _Measured(Struct, kw_only=True):
     mode: int
     block: Literal["used", "higher", "modified"]
-    modification: str | None = Field(default=None, max_length=500)
-    hz: float
-    shape: Row = Field(max_length=_MOST)
+    modification: _Label | None = None
+    hz: Real
+    shape: _Row
 
 
-class _Receptance(_Part):
-    hz: list[float] = Field(default=[], max_length=_MOST)
-    damping: float | None = None
-    measured: dict[str, list[Number]] = {}
-    note: str = Field(default="", max_length=1000)
+class _Receptance(Struct):
+    hz: _Hertz = []
+    damping: Real | None = None
+    measured: dict[str, list[Real | None]] = {}
+    note: Annotated[str, Meta(max_length=1000)] = ""
 
 
-class _DrawnMode(_Part):
-    hz: float
+class _DrawnMode(Struct, kw_only=True):
+    hz: Real
     paired: int | None = None
-    modification: str | None = Field(default=None, max_length=500)
-    shape: list[_Point] = Field(max_length=_MOST)
+    modification: _Label | None = None
+    shape: Annotated[list[Point], Meta(max_length=_MOST)]
 
 
-class _Mac(_Part):
-    rows: list[int] = Field(max_length=1000)
-    columns: list[float] = Field(max_length=100)
-    values: list[Row] = Field(max_length=1000)
+class _Mac(Struct):
+    rows: Annotated[list[int], Meta(max_length=1000)]
+    columns: Annotated[list[Real], Meta(max_length=100)]
+    values: Annotated[list[_Row], Meta(max_length=1000)]
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def __post_init__(self) -> None:
         check_same(self.values, self.rows)
         for row in self.values:
             check_same(row, self.columns)
-        return self
 
 
-class _Difference(_Part):
-    size: int = Field(ge=1, le=64)
-    nodes: int = Field(ge=1)
-    labels: list[Annotated[str, Field(max_length=500)]] = Field(max_length=64)
-    values: str = Field(max_length=8192)
-    lowest: float
-    highest: float
-    unit: str = Field(max_length=10)
+class _Difference(Struct):
+    size: Annotated[int, Meta(ge=1, le=64)]
+    nodes: Annotated[int, Meta(ge=1)]
+    labels: Annotated[list[_Label], Meta(max_length=64)]
+    values: Annotated[str, Meta(max_length=8192)]
+    lowest: Real
+    highest: Real
+    unit: Annotated[str, Meta(max_length=10)]
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def __post_init__(self) -> None:
         check_same(self.labels, range(self.size))
         check_same(base64.b64decode(self.values, validate=True), range(self.size**2))
-        return self
 
 
-class _Exhibit(_Part):
-    modes: list[_DrawnMode] = Field(max_length=2000)
+class _Exhibit(Struct):
+    modes: Annotated[list[_DrawnMode], Meta(max_length=2000)]
     mac: _Mac
-    receptance: dict[str, list[Number]] = {}
-    findings: list[Finding] = Field(default=[], max_length=_MOST)
-    elements: Row | None = Field(default=None, max_length=_MOST)
+    receptance: dict[str, list[Real | None]] = {}
+    findings: Annotated[list[Finding], Meta(max_length=_MOST)] = []
+    elements: _Row | None = None
     difference: _Difference | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class _CaseDrawing(Wireframe):
     measured: tuple[_Measured, ...] = ()
     drive: str | None = None
@@ -108,7 +102,7 @@ class _CaseDrawing(Wireframe):
     nominal: _Exhibit | None = None
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        Wireframe.__post_init__(self)
         for mode in self.measured:
             check_same(mode.shape, self.sensors)
 
@@ -168,11 +162,9 @@ class Exhibits:
             return None
         try:
             data = parse_json(_whole(path), file=path, expected="an exhibit")
-            found = adapter(kind)
-            plain: dict[str, Any] = found.dump_python(found.validate_python(data), mode="json")
-        except (InputError, ValidationError) as error:
-            first = str(error).splitlines()[0] if isinstance(error, InputError) else "not whole"
-            self.notes.append(f"{path.name}: a picture was left out: {first}")
+            plain: dict[str, Any] = to_plain(read_plain(kind, data, file=path))
+        except InputError as error:
+            self.notes.append(f"{path.name}: a picture was left out: {error}")
             return None
         return plain
 

@@ -32,7 +32,7 @@ _SYMBOLS: tuple[tuple[str, Symbol], ...] = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Finding(DrawnPlace):
     """Something at a place of a structure.
 
@@ -66,7 +66,7 @@ def causes_found(data: Data, structure: PlacedWireframe) -> list[Finding]:
         symbol = "fault" if fault else symbol_of(p["unit"] for p in cause["parameters"])
         value = changes[0] if len(changes) == 1 and not fault else None
         label = str(cause.get("summary") or cause["effect"]) if fault else _cause_label(cause)
-        finding = Finding(**vars(place), symbol=symbol, label=label, value=value)
+        finding = Finding(place.place, place.kind, place.spans, place.points, symbol, label, value)
         found.append(replace(finding, probability=cause["probability"], number=number))
     return found
 

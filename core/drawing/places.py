@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import Field
+from msgspec import Meta
 
 from femubench.core.case.case import Case
 from femubench.core.drawing.wireframe import Point, Wireframe, check_within, to_point, wireframe_of
@@ -28,13 +28,13 @@ from femubench.core.fem.mesh import place_xyz
 from femubench.core.fem.model import Model
 
 PlaceKind = Literal["all", "joint", "member", "element", "end", "point", "pair", "elsewhere"]
-_Station = Annotated[float, Field(ge=0.0, le=1.0)]
+_Station = Annotated[float, Meta(ge=0.0, le=1.0)]
 
 _SENSOR = "sensor:"  # or several with + between
 _END = 0.125  # how much of its member an end takes in a drawing
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Span:
     """A part of a member, by its position in the list of members, between two stations 0..1."""
 
@@ -43,7 +43,7 @@ class Span:
     end: _Station
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class DrawnPlace:
     """What the word of a place covers; nothing for ``all`` and for what is nowhere in space."""
 
@@ -53,7 +53,7 @@ class DrawnPlace:
     points: tuple[Point, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class PlacedWireframe(Wireframe):
     """A structure with the places that something is said of.
 
@@ -65,7 +65,7 @@ class PlacedWireframe(Wireframe):
     places: tuple[DrawnPlace, ...] = ()
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        Wireframe.__post_init__(self)
         check_within((s.member for p in self.places for s in p.spans), self.members, "member")
 
     def place(self, word: str) -> DrawnPlace:
@@ -87,7 +87,7 @@ def placed_wireframe(source: Case | Model, words: Iterable[str]) -> PlacedWirefr
     structure = (source.model if isinstance(source, Case) else source).structure
     frame = None if structure is None else structure.frame
     places = tuple(_place(wireframe, frame, word) for word in dict.fromkeys(words))
-    return PlacedWireframe(**vars(wireframe), places=places)
+    return PlacedWireframe(**{n: getattr(wireframe, n) for n in Wireframe.__slots__}, places=places)
 
 
 def _plain_place(wireframe: Wireframe, word: str, head: str) -> DrawnPlace:

@@ -15,7 +15,7 @@ from femubench.core.drawing.element_change import difference_picture, relative_c
 from femubench.core.drawing.files import Exhibits
 from femubench.core.drawing.findings import changes_found
 from femubench.core.drawing.thinning import thinned
-from femubench.core.drawing.wireframe import MOST_NODES, node_positions, to_plain, wireframe_of
+from femubench.core.drawing.wireframe import MOST_NODES, node_positions, wireframe_of
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.correlation import mac, modal_scale_factor
@@ -23,6 +23,7 @@ from femubench.core.modal.eigen import Modes, modes_of, once_for
 from femubench.core.modal.frf import modal_sum, receptance
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import Pairing, pair_measured
+from femubench.core.schema.records import to_plain
 from femubench.core.typing import AnyArray, FloatArray, IntArray
 
 DIGITS = 4

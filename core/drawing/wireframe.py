@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sized
 from dataclasses import dataclass
-from functools import cache
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import ConfigDict, Field, TypeAdapter
+from msgspec import Meta
 from scipy.spatial import cKDTree
 
 from femubench.core.case.case import Case
@@ -16,9 +15,10 @@ from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.fem.mesh import ON_MEMBER, place_xyz
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
+from femubench.core.schema.bounds import Real
 from femubench.core.typing import FloatArray
 
-Point = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
+Point = Annotated[tuple[Real, ...], Meta(min_length=3, max_length=3)]
 Pair = tuple[int, int]
 Plane = Literal["in-plane", "out-of-plane", "3d", "matrices"]
 
@@ -26,7 +26,7 @@ MOST_NODES = 3000  # more are no picture, and too much to keep for every job
 _DECIMALS = 9  # of a metre
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class DrawnJoint:
     """A joint, or a named node of a model that came as matrices; xyz in m, `node` in the mesh."""
 
@@ -36,16 +36,16 @@ class DrawnJoint:
     node: int = -1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class DrawnMember:
     """A straight member between two joints, by their positions in the list of joints."""
 
     name: str
     ends: Pair
-    elements: Annotated[int, Field(ge=1)]
+    elements: Annotated[int, Meta(ge=1)]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class DrawnSensor:
     """A measured point with its signed direction, and that as a vector; xyz in m."""
 
@@ -56,25 +56,25 @@ class DrawnSensor:
     rotation: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class DrawnMass:
     """A known lump; xyz in m."""
 
     xyz: Point
-    kg: float
+    kg: Real
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class DrawnSpring:
     """A spring to ground along or about an axis; in N/m or N m/rad."""
 
     xyz: Point
     axis: Point
-    stiffness: float
+    stiffness: Real
     rotation: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class DrawnSupport:
     """A point that is held in some directions; xyz in m."""
 
@@ -82,7 +82,7 @@ class DrawnSupport:
     fixed: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Wireframe:
     """A structure as every drawing shows it, checked to be whole.
 
@@ -94,8 +94,6 @@ class Wireframe:
         elements: pairs of nodes; `element_labels` (``member/k``) and `member_of` go with them.
             Without members they are the lines of a test, which belong to none.
     """
-
-    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(allow_inf_nan=False)
 
     plane: Plane
     joints: tuple[DrawnJoint, ...]
@@ -153,17 +151,6 @@ def check_same(one: Sized, other: Sized) -> None:
     """
     if len(one) != len(other):
         raise ValueError(f"{len(one)} entries instead of {len(other)}")
-
-
-def to_plain(drawn: Any) -> Any:  # noqa: ANN401 - JSON data of any form
-    """Return a data class of this room as plain data for JSON."""
-    return adapter(drawn.__class__).dump_python(drawn, mode="json")
-
-
-@cache
-def adapter(kind: Any) -> TypeAdapter[Any]:  # noqa: ANN401 - any data class
-    """Return what reads a data class from plain data and writes it back."""
-    return TypeAdapter(kind)
 
 
 def wireframe_of(source: Case | Model) -> Wireframe:

@@ -25,7 +25,7 @@ from femubench.core.plugin.validation import chosen, unknown
 from femubench.core.reproduction.study import Study, cells_to_json
 from femubench.core.roles import Reporter
 from femubench.core.run.store import Store
-from femubench.core.schema.records import finite, parse_json, run_from_json
+from femubench.core.schema.records import parse_json, run_from_json, to_plain
 from femubench.core.schema.results import Run
 from femubench.core.score.comparison import Comparison
 
@@ -119,7 +119,7 @@ def rendering(what: object, style: str) -> str:
     if isinstance(data, Mapping):
         way = "render_diagnosis"
     elif isinstance(data, Comparison):
-        way, data = "render_comparison", finite(data.to_json())
+        way, data = "render_comparison", to_plain(data.to_json())
     else:
         way, data = "render_studies", [data] if isinstance(data, Study) else data
         further = [dict(drawings(data)) if style == "html" else {}]

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from pydantic import ValidationError
 
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_to_json
 from femubench.core.drawing.findings import Finding, causes_found
 from femubench.core.drawing.places import DrawnPlace, PlacedWireframe
-from femubench.core.drawing.wireframe import adapter
 from femubench.core.errors import InputError
 from femubench.core.plot.findings import draw_findings, lines_of
 from femubench.core.plot.structure import (
@@ -36,6 +34,7 @@ from femubench.core.plot.style import (
     name_of,
     own_axes,
 )
+from femubench.core.schema.validation import read_plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -302,11 +301,7 @@ def evidence(
 def _structure(data: Data | None) -> PlacedWireframe:
     if data is None:
         raise InputError("the diagnosis holds no structure to draw")
-    try:
-        found: PlacedWireframe = adapter(PlacedWireframe).validate_python(data)
-    except ValidationError as error:
-        raise InputError(error.errors(include_url=False)[0]["msg"], key="structure") from error
-    return found
+    return read_plain(PlacedWireframe, data, key="structure")
 
 
 def draw_spots(

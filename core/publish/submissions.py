@@ -10,20 +10,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn
 
-from pydantic import BaseModel, Field, ValidationError
+from msgspec import Meta, Struct, field
 
 from femubench.core.errors import InputError
 from femubench.core.files import read_text
 from femubench.core.plugin.distribution import DOI, HOMEPAGE, LONGEST_LINE
-from femubench.core.schema.bounds import Name
+from femubench.core.schema.bounds import Name, Percent
 from femubench.core.schema.records import (
     LARGEST_RUN,
-    BaseRecord,
     parse_json,
     result_to_json,
     run_from_json,
+    to_plain,
 )
 from femubench.core.schema.results import Block, JobResult, Nominal, Run
+from femubench.core.schema.validation import read_plain
 from femubench.core.score.ranking import rank_results
 from femubench.core.score.scoring import frequency_error
 
@@ -31,53 +32,51 @@ SCHEMA = 1
 _MOMENT = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,9})?(\+00:00|Z)$"
 _LONGEST = 1e9  # s
 _ROUNDING = 1e-6  # relative, of an rms that is computed again from its modes
-_Word = Annotated[str, Field(max_length=200)]
-_Moment = Annotated[str, Field(pattern=_MOMENT)]
-_Digest = Annotated[_Word, Field(min_length=1)]
+_Word = Annotated[str, Meta(max_length=200)]
+_Moment = Annotated[str, Meta(pattern=_MOMENT)]
+_BlockName = Literal["used", "higher", "modified"]
+_Digest = Annotated[str, Meta(min_length=1, max_length=200)]
+_Line = Annotated[str, Meta(max_length=LONGEST_LINE)]
 # Raises InputError for a run, given with the content of its file, that cannot be verified.
 Verify = Callable[[Run, Mapping[str, Any], Path], None]
 _OF_VERIFIED = ("plan", "sandbox", "twins")  # meta data of those alone
 
 
-class _Record(BaseModel):
-    model_config = BaseRecord.model_config
-
-
-class _Machine(_Record):
+class _Machine(Struct):
     platform: _Word | None = None
     cpu: _Word | None = None
-    cpu_count: Annotated[int, Field(ge=0, lt=2**31)] | None = None
+    cpu_count: Annotated[int, Meta(ge=0, lt=2**31)] | None = None
     blas: _Word | None = None
 
 
-class _Case(_Record):
-    title: Annotated[str, Field(max_length=1_000)] | None = None
+class _Case(Struct, kw_only=True):
+    title: Annotated[str, Meta(max_length=1_000)] | None = None
     digest: _Digest
 
 
-class _Twins(_Record):
-    seed: Annotated[int, Field(ge=0)]
-    number: Annotated[int, Field(ge=0, le=1_000)]
+class _Twins(Struct, kw_only=True):
+    seed: Annotated[int, Meta(ge=0)]
+    number: Annotated[int, Meta(ge=0, le=1_000)]
     of: dict[Name, Name]
     kinds: dict[Name, list[_Word]] = {}
     again: dict[Name, Name]
     cases: dict[Name, _Case]
-    reference: dict[Name, dict[Literal["used", "higher", "modified"], float]]
+    reference: dict[Name, dict[_BlockName, Percent]]
 
 
-class _About(_Record):
+class _About(Struct):
     """What the package of a strategy says of it."""
 
-    homepage: Annotated[str, Field(max_length=LONGEST_LINE, pattern=HOMEPAGE)] = ""
-    summary: Annotated[str, Field(max_length=LONGEST_LINE)] = ""
-    author: Annotated[str, Field(max_length=LONGEST_LINE)] = ""
-    doi: Annotated[str, Field(max_length=LONGEST_LINE, pattern=DOI)] = ""
+    homepage: Annotated[_Line, Meta(pattern=HOMEPAGE)] = ""
+    summary: _Line = ""
+    author: _Line = ""
+    doi: Annotated[_Line, Meta(pattern=DOI)] = ""
 
 
-class _Meta(_Record):
+class _Meta(Struct, kw_only=True):
     """The meta data that are published; nothing else of them is."""
 
-    run: Annotated[str, Field(min_length=1, max_length=200)]
+    run: _Digest
     started: _Moment
     finished: _Moment | None = None
     seeds: list[int] = []
@@ -89,12 +88,12 @@ class _Meta(_Record):
     starts: dict[Name, list[Nominal]] = {}
     alike: list[Name] = []
     cases: dict[Name, _Case]
-    classes: dict[Name, Annotated[list[_Word], Field(max_length=50)]] = {}
-    citations: dict[Name, Annotated[str, Field(max_length=5_000)]] = {}
+    classes: dict[Name, Annotated[list[_Word], Meta(max_length=50)]] = {}
+    citations: dict[Name, Annotated[str, Meta(max_length=5_000)]] = {}
     about: dict[Name, _About] = {}
-    reference: dict[Name, dict[Literal["used", "higher", "modified"], float]]
-    versions: Annotated[dict[_Word, _Word], Field(max_length=50)] = {}
-    machine: _Machine = _Machine()
+    reference: dict[Name, dict[_BlockName, Percent]]
+    versions: Annotated[dict[_Word, _Word], Meta(max_length=50)] = {}
+    machine: _Machine = field(default_factory=_Machine)
     git_commit: _Word | None = None
     plan: _Word | None = None
     sandbox: _Word | None = None
@@ -187,24 +186,12 @@ def _records(results: Iterable[JobResult]) -> list[dict[str, Any]]:
 
 
 def _meta(run: Run, file: Path) -> dict[str, Any]:
-    try:
-        # Without halves of characters, which no file could hold.
-        record = _Meta.model_validate(
-            json.loads(json.dumps(run.meta, ensure_ascii=False).encode("utf-8", "replace"))
-        )
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = ".".join(["meta", *map(str, first["loc"])])
-        raise InputError(first["msg"], file=file, key=key) from error
-    data: dict[str, Any] = record.model_dump()
+    # Without halves of characters, which no file could hold.
+    record = read_plain(_Meta, to_plain(run.meta), file=file, key="meta")
+    data: dict[str, Any] = to_plain(record)
     for name in ("baseline", "structures", "classes", "about"):
         if not data[name]:  # as in what was published before there was one
             del data[name]
-    for name, blocks in data["reference"].items():
-        for block, value in blocks.items():
-            if not 0.0 <= value <= 1e150:
-                key = f"meta.reference.{name}.{block}"
-                raise InputError(f"{value}", file=file, key=key, expected="an error >= 0 in %")
     return data
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -80,7 +80,7 @@ class Results:
         if slot.stale:
             # Workers import a strategy when they need it: this may be the result of either source.
             key, provenance["strategy"] = "", f"{provenance['strategy']}, changed during the run"
-        result = result.changed(key=key, provenance=provenance)
+        result = replace(result, key=key, provenance=provenance)
         if self._store is not None:
             self._store.append(self._run, result)
         self._tell(index, result)
@@ -109,7 +109,7 @@ class Results:
                 missing.append(index)
                 continue
             if result.nominal != slot.nominal:
-                result = result.changed(nominal=slot.nominal)
+                result = replace(result, nominal=slot.nominal)
             if self._store is not None and not there:
                 self._store.append(self._run, result)
             self._tell(index, result)

@@ -14,13 +14,14 @@ from typing import Any
 
 from femubench.core.errors import InputError
 from femubench.core.run.sealed_file import lines_of
+from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.records import (
     compact,
+    decode_result,
+    encode_result,
     meta_from_json,
     parse_json,
     result_from_json,
-    result_from_line,
-    result_to_line,
 )
 from femubench.core.schema.results import JobResult
 from femubench.core.schema.sealing import TAIL, is_whole, sealed, sum_of
@@ -35,7 +36,7 @@ _HEAD = re.compile(
     rb'\{"schema":2,"record":"(run|result|end)","after":"([0-9a-f]{8}|)",'
     rb'(?:"key":("[^"\\]*(?:\\.[^"\\]*)*"),"status":"([a-z-]+)",)?'
 )
-_RESULT, _MODES, _DETAILS = b'"result":', b',"modes":{', b',"details":'
+_RESULT, _DETAILS = b'"result":', b',"details":{'
 
 
 @dataclass(slots=True)
@@ -79,15 +80,14 @@ class Record:
         Raises:
             InputError: naming the first field that is wrong.
         """
-        text = self._text
-        start = text.index(_RESULT) + len(_RESULT)
-        # A quote within a text of JSON has a backslash before it: these are found nowhere else.
-        middle = text.find(_MODES, start)
-        end = text.index(_DETAILS, max(start, middle))
-        modes = None if middle < 0 else text[middle + len(_MODES) - 1 : end]
-        figures = text[start : end if modes is None else middle]
-        details = text[end + len(_DETAILS) : -TAIL]
-        return result_from_line(figures, modes, details, file=self.file, line=self.number)
+        start = self._text.index(_RESULT) + len(_RESULT)
+        parted = _DETAILS in self._text
+        try:
+            return decode_result(_joined(self._text) if parted else self._text[start:-TAIL])
+        except InputError as fault:
+            key = ".".join(part for part in ("result", fault.key) if part)
+            where = {"file": self.file, "line": self.number, "key": key}
+            raise InputError(fault.what, **where, expected=fault.expected) from None  # type: ignore[arg-type]
 
     def meta(self) -> dict[str, Any]:
         """Return the meta data.
@@ -102,6 +102,16 @@ class Record:
     def at(self) -> float:
         """Return when the run began, in seconds since 1970."""
         return float(json.loads(self._text).get("at") or 0.0)
+
+
+def _joined(text: bytes) -> bytes:
+    """Return the JSON of a result that was stored in parts, its modes as rows of values."""
+    line = json.loads(text)
+    result = {**line["result"], **line["details"]}
+    for name, rows in (line.get("modes") or {}).items():
+        modes = [dict(zip(PairedMode.__struct_encode_fields__, row, strict=True)) for row in rows]
+        result["blocks"][name]["modes"] = modes
+    return json.dumps(result).encode()
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,26 +161,24 @@ AnyRecord = Record | OldRecord
 def begun(meta: Mapping[str, Any], after: bytes, at: float | None = None) -> bytes:
     """Return the line of a run that begins now, or began at a time in seconds since 1970."""
     when = time.time() if at is None else at
-    return _line("run", after, compact({"at": when, "meta": meta}))
+    return _line("run", after, compact({"at": when, "meta": meta}).encode())
 
 
 def ended(meta: Mapping[str, Any], after: bytes) -> bytes:
     """Return the line of a run that ends."""
-    return _line("end", after, compact({"meta": meta}))
+    return _line("end", after, compact({"meta": meta}).encode())
 
 
 def done(result: JobResult, after: bytes) -> bytes:
     """Return the line of a result."""
-    figures, modes, details = result_to_line(result)
     key, status = json.dumps(result.key), json.dumps(result.status)
-    head = f'{{"key":{key},"status":{status},"result":{figures}'
-    body = f'{head},"modes":{modes},"details":{details}}}'
-    return _line("result", after, body)
+    head = f'{{"key":{key},"status":{status},"result":'
+    return _line("result", after, head.encode() + encode_result(result) + b"}")
 
 
-def _line(kind: str, after: bytes, body: str) -> bytes:
-    head = f'{{"schema":{SCHEMA},"record":"{kind}","after":"{after.decode()}",{body[1:]}'
-    return sealed(head.encode())
+def _line(kind: str, after: bytes, body: bytes) -> bytes:
+    head = f'{{"schema":{SCHEMA},"record":"{kind}","after":"{after.decode()}",'
+    return sealed(head.encode() + body[1:])
 
 
 def records_of(path: Path, faults: list[InputError]) -> Iterator[AnyRecord]:

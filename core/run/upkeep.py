@@ -50,8 +50,7 @@ def faults_of(store: Store) -> list[InputError]:
         for record in _chained(file, found):
             try:
                 if record.kind == "result":
-                    result = record.result()
-                    _ = result.history, [block.modes for block in result.blocks.values()]
+                    record.result()
                 else:
                     record.meta()
             except InputError as fault:

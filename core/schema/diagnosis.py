@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
+from msgspec import Struct, field
+
 from femubench.core.roles import Side, Wording
+from femubench.core.schema.bounds import Number
 
 Verdict = Literal["named", "none", "unknown", "ambiguous", "not-confirmed"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class CauseParameter:
     """A parameter of a cause.
 
@@ -21,14 +25,14 @@ class CauseParameter:
     """
 
     name: str
-    value: float
-    std: float | None
+    value: Number
+    std: Number | None
     unit: str
     textbook: bool = False
     wording: Wording = "value"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Cause:
     """An effect at a place, with what it takes; `summary` says it as a clause.
 
@@ -45,15 +49,15 @@ class Cause:
     effect: str
     place: str
     parameters: tuple[CauseParameter, ...]
-    probability: float
+    probability: Number
     summary: str = ""
-    place_probability: float = float("nan")
-    places: tuple[tuple[str, float], ...] = ()
+    place_probability: Number = float("nan")
+    places: tuple[tuple[str, Number], ...] = ()
     mirrors: tuple[str, ...] = ()
     side: Side = "model"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Rival:
     """Another explanation.
 
@@ -66,12 +70,12 @@ class Rival:
 
     effect: str
     place: str
-    delta_chi2: float
-    probability: float
-    angle: float = float("nan")
+    delta_chi2: Number
+    probability: Number
+    angle: Number = float("nan")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Evidence:
     """What speaks for the first explanation against another one, in ln of the odds.
 
@@ -83,45 +87,44 @@ class Evidence:
     """
 
     against: str
-    data: float
-    prior: float
+    data: Number
+    prior: Number
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Advice:
     """A measurement that one could make, and the distance in squared sigmas (d2) it creates."""
 
     measurement: str
-    separation: float
+    separation: Number
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class SmallestVisible:
     """The smallest size of an effect, at its best place, that these data would have shown."""
 
     effect: str
     place: str
-    size: float
+    size: Number
     unit: str
     wording: Wording = "value"
 
 
-@dataclass(frozen=True)
-class ErrorScale:
-    """How large a class of model error is beside the first explanation, standard deviation.
+class ErrorScale(Struct, frozen=True):
+    """How large a class of model error is under the first explanation, standard deviation.
 
     Arguments:
-        name: of the class.
+        name: of the class; ``class`` in JSON.
         scale: of the perturbations of the class.
         unit: empty for a ratio.
     """
 
-    name: str
-    scale: float
+    name: str = field(name="class")
+    scale: Number
     unit: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ResidualRow:
     """One datum before and after, in standard deviations of the measurement.
 
@@ -136,12 +139,12 @@ class ResidualRow:
     kind: str
     mode: int | None
     sensor: str
-    measured: float
-    before: float | None
-    after: float | None
+    measured: Number
+    before: Number | None
+    after: Number | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class LookWarning:
     """Something that a plain look at the model finds, before any fit.
 
@@ -156,10 +159,10 @@ class LookWarning:
     what: str
     where: str
     effect: str
-    changes: tuple[tuple[int, float], ...] = ()
+    changes: tuple[tuple[int, Number], ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class LocationRow:
     """An indicator of where the error sits, scaled to 1 at its largest.
 
@@ -170,10 +173,10 @@ class LocationRow:
 
     indicator: str
     place: str
-    value: float
+    value: Number
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Scatter:
     """Whether what is left of one kind of data is as much as their stated scatter lets expect.
 
@@ -187,15 +190,15 @@ class Scatter:
     """
 
     kind: str
-    chi2: float
+    chi2: Number
     dof: int
-    less_p: float
-    more_p: float
-    factor: float
+    less_p: Number
+    more_p: Number
+    factor: Number
     warning: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Gain:
     """Frequency errors in percent, before and after: medians, or root mean squares.
 
@@ -204,7 +207,68 @@ class Gain:
         cross_validated: the same over modes left out in turn, where nothing is held out.
     """
 
-    used_percent: tuple[float, float]
-    held_out_percent: tuple[float, float] | None = None
-    modified_percent: tuple[float, float] | None = None
-    cross_validated_percent: tuple[float, float] | None = None
+    used_percent: tuple[Number, Number]
+    held_out_percent: tuple[Number, Number] | None = None
+    modified_percent: tuple[Number, Number] | None = None
+    cross_validated_percent: tuple[Number, Number] | None = None
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class DiagnosisReport:
+    """What is missing in a model, where, how sure, and what it gains: all that JSON has of it.
+
+    What older versions did not write has a default.
+
+    Arguments:
+        case: name of the case.
+        verdict: see the case for each in docs/diagnosis.md.
+        sentence: the verdict in one sentence.
+        causes: named effects; with ``ambiguous`` the members of the inseparable group, with
+            ``unknown`` and ``not-confirmed`` a best guess, with ``none`` nothing.
+        rivals: every other explanation worth a look, most probable first.
+        reason: why the members of a group cannot be told apart; empty without a group.
+        advice: measurements that would separate them, best first.
+        smallest_visible: one row an effect.
+        residuals: every datum.
+        gain: medians before and after.
+        gain_rms: the same as root mean squares, as `bench run` has them; None in older files.
+        chi2: before and after, in the metric of the noise model.
+        data_count: number of data behind chi2.
+        adequacy_p: probability of a chi-square as large as the one after.
+        nothing: probability that the model lacks nothing.
+        looks: what the plain look found.
+        locations: where the error sits.
+        base: textbook effects that the names rest on, as ``effect`` slugs.
+        notes: further remarks, one sentence each.
+        seconds: spent.
+        evidence: what the data say for the first explanation, and what the prior adds.
+        model_error: what the drawing gets wrong, under the first explanation; empty where the
+            structure is taken for a beam model.
+        like_a_beam: probability that it is one, but for ordinary scatter.
+        scatter: whether what is left is as much as the stated deviations let expect.
+    """
+
+    case: str = ""
+    verdict: Verdict
+    sentence: str = ""
+    causes: tuple[Cause, ...]
+    rivals: tuple[Rival, ...]
+    reason: str = ""
+    advice: tuple[Advice, ...]
+    smallest_visible: tuple[SmallestVisible, ...]
+    residuals: tuple[ResidualRow, ...]
+    gain: Gain
+    chi2: tuple[Number, Number] = (math.nan, math.nan)
+    data_count: int = 0
+    adequacy_p: Number
+    nothing: Number = math.nan
+    looks: tuple[LookWarning, ...] = ()
+    locations: tuple[LocationRow, ...] = ()
+    base: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    seconds: Number = math.nan
+    evidence: tuple[Evidence, ...] = ()
+    model_error: tuple[ErrorScale, ...] = ()
+    like_a_beam: Number = 1.0
+    gain_rms: Gain | None = None
+    scatter: tuple[Scatter, ...] = ()

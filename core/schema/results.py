@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields as fields_of
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict, get_args
 
 from femubench.core.display import Shown, counted
 from femubench.core.schema.bounds import (
-    READING,
+    LONGEST_TEXT,
+    Figure,
     Mac,
     Name,
+    Note,
+    Number,
     Percent,
     Rank,
     Score,
@@ -19,8 +23,7 @@ from femubench.core.schema.bounds import (
     Text,
     Whole,
 )
-from femubench.core.schema.details import DETAILS, decoded
-from femubench.core.schema.paired_modes import PairedMode, Row, rows_from_texts, rows_of
+from femubench.core.schema.paired_modes import PairedMode
 
 Status = Literal["ok", "failed", "timeout", "crashed", "diverged", "not-applicable"]
 STATUSES: tuple[Status, ...] = get_args(Status)
@@ -33,17 +36,8 @@ Nominal = Literal["drawn", "textbook"]
 NOMINALS: tuple[Nominal, ...] = get_args(Nominal)
 
 
-_set = object.__setattr__  # of what nobody else has yet
-
-
-class _Stored:
-    """What may come from a store, of which a part is read when it is asked for."""
-
-    __slots__ = ("_unread",)
-
-
 @dataclass(frozen=True, slots=True)
-class Block(_Stored):
+class Block:
     """The error of one set of modes: used, higher or modified.
 
     Arguments:
@@ -53,26 +47,19 @@ class Block(_Stored):
         modes: the pairs.
     """
 
-    __pydantic_config__: ClassVar = READING
-
     rms_percent: Percent
-    mean_mac: Mac | None
+    mean_mac: Mac | None = None
     modes: tuple[PairedMode, ...] = ()
 
-    if not TYPE_CHECKING:
 
-        def __getattr__(self, name):  # noqa: ANN001, ANN204 - checkers know the fields
-            """Decode the modes of a stored block when they are asked for."""
-            if name != "modes":
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            text, own = self._unread
-            (found,) = rows_from_texts([text])
-            _set(self, name, tuple(PairedMode(*row) for row in found.get(own, ())))
-            return self.modes
+if TYPE_CHECKING:
+    Blocks: TypeAlias = Mapping[str, Block]
+else:
+    Blocks = TypedDict("Blocks", dict.fromkeys(BLOCKS, Block), total=False)
 
 
 @dataclass(frozen=True, slots=True)
-class JobResult(_Stored):
+class JobResult:
     """The outcome of one (case, strategy, seed), started from one nominal model.
 
     Arguments:
@@ -102,15 +89,13 @@ class JobResult(_Stored):
             applicable; empty where that is the textbook model.
     """
 
-    __pydantic_config__: ClassVar = READING
-
     case: Name
     strategy: Name
     seed: Whole
     status: Status
     reason: Text = ""
     seconds: Seconds = 0.0
-    blocks: Mapping[str, Block] = field(default_factory=dict)
+    blocks: Blocks = field(default_factory=dict)
     rigid_body_modes: Whole | None = None
     rigid_body_modes_expected: Whole | None = None
     negative_eigenvalues: Whole | None = None
@@ -118,34 +103,28 @@ class JobResult(_Stored):
     evaluations: Whole | None = None
     score: Score | None = None
     rank: Rank | None = None
-    parameters: tuple[Mapping[str, Any], ...] = ()
-    history: tuple[Mapping[str, float], ...] = ()
-    diagnostics: Mapping[str, float] = field(default_factory=dict)
-    traceback: str = ""
+    parameters: tuple[Mapping[str, Figure], ...] = ()
+    history: tuple[Mapping[str, Number], ...] = ()
+    diagnostics: Mapping[str, Number] = field(default_factory=dict)
+    traceback: Text = ""
     key: Name = ""
-    provenance: Mapping[str, Any] = field(default_factory=dict)
+    provenance: Mapping[str, Note] = field(default_factory=dict)
     nominal: Nominal = "drawn"
     surplus_partners: Whole | None = None
     start_percent: Mapping[str, Percent] = field(default_factory=dict)
 
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name):  # noqa: ANN001, ANN204 - checkers know the fields
-            """Decode the details of a stored result when the first of them is asked for."""
-            if name not in DETAILS:
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            for detail, value in decoded(self._unread[0]).items():
-                if not _is_there(self, detail):
-                    _set(self, detail, value)
-            return getattr(self, name)
-
-    def changed(self, **fields: object) -> JobResult:
-        """Return this result with other figures; details that are not decoded stay so."""
-        made = object.__new__(JobResult)
-        for name in _PARTS:
-            if name in fields or _is_there(self, name):
-                _set(made, name, fields[name] if name in fields else getattr(self, name))
-        return made
+    def __post_init__(self) -> None:
+        """Keep texts to what can be read again, and take null of JSON for nan."""
+        if len(self.reason) > LONGEST_TEXT:
+            _set(self, "reason", self.reason[:LONGEST_TEXT])
+        if len(self.traceback) > LONGEST_TEXT:
+            _set(self, "traceback", self.traceback[-LONGEST_TEXT:])
+        if self.parameters:
+            _set(self, "parameters", tuple(map(_with_values, self.parameters)))
+        if any(None in row.values() for row in self.history):
+            _set(self, "history", tuple(map(_with_nan, self.history)))
+        if None in self.diagnostics.values():
+            _set(self, "diagnostics", _with_nan(self.diagnostics))
 
     @property
     def rigid_modes_lost(self) -> int:
@@ -159,56 +138,25 @@ class JobResult(_Stored):
         return self.status == "ok" and bool(damage)
 
 
-_NOTHING = b"", None, None
-_PARTS = ("_unread", *(field.name for field in fields_of(JobResult)))
+_set = object.__setattr__  # of what nobody else has yet
 
 
-def _is_there(thing: _Stored, name: str) -> bool:
-    try:
-        object.__getattribute__(thing, name)
-    except AttributeError:
-        return False
-    return True
+def _with_nan(figures: Mapping[str, Any]) -> Mapping[str, Number]:
+    if None not in figures.values():
+        return figures
+    return {name: math.nan if value is None else value for name, value in figures.items()}
 
 
-def leave_unread(result: JobResult, modes: bytes | None, details: bytes) -> None:
-    """Let a result that nobody else has yet decode modes and details when they are asked for.
-
-    Arguments:
-        modes: text for `rows_from_texts`; None where its blocks have them.
-        details: text of a table of JSON; see `decoded`.
-    """
-    for name in DETAILS:
-        object.__delattr__(result, name)
-    _set(result, "_unread", (details, modes, result.blocks))
-    if modes is not None:
-        for name, block in result.blocks.items():
-            object.__delattr__(block, "modes")
-            _set(block, "_unread", (modes, name))
+def _with_values(parameter: Mapping[str, Any]) -> Mapping[str, Any]:
+    if parameter.get("before") is not None and parameter.get("after") is not None:
+        return parameter
+    return {**parameter, **_with_nan({n: parameter.get(n) for n in ("before", "after")})}
 
 
 def rate(result: JobResult, score: float, rank: int) -> None:
     """Give a result that nobody else has yet its score and rank."""
     _set(result, "score", score)
     _set(result, "rank", rank)
-
-
-def mode_rows(results: Iterable[JobResult]) -> list[Mapping[str, Sequence[Row]]]:
-    """Return the modes of every result by block; those of stored ones are decoded at once.
-
-    Raises:
-        InputError: where the text of some is damaged.
-    """
-    listed = [(result.blocks, getattr(result, "_unread", _NOTHING)) for result in results]
-    # A result that was given other blocks has none of the text.
-    texts = [unread[1] if unread[2] is blocks else None for blocks, unread in listed]
-    read = iter(rows_from_texts([text for text in texts if text is not None]))
-    return [
-        {name: rows_of(block.modes) for name, block in blocks.items()}
-        if text is None
-        else next(read)
-        for (blocks, _), text in zip(listed, texts, strict=True)
-    ]
 
 
 def origins_of(meta: Mapping[str, Any], *kinds: str) -> dict[str, str]:

@@ -1,43 +1,104 @@
-"""Data of strangers against a schema: the first field that is wrong comes out as one line."""
+"""Plain data and JSON against a class: the first field that is wrong comes out as one line."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from pydantic import BaseModel, ValidationError
+import msgspec
 
 from femubench.core.errors import InputError
 
-_R = TypeVar("_R", bound=BaseModel)
+_T = TypeVar("_T")
+_WORDS = {
+    **{"int": "a whole number", "float": "a number", "str": "a text", "null": "nothing"},
+    **{"object": "a table", "array": "a list", "bool": "true or false"},
+}
 
 
-def validated(
-    kind: type[_R],
-    record: object,
+def read_plain(
+    kind: type[_T],
+    data: object,
+    *,
     file: Path | str | None = None,
     line: int | None = None,
     key: str = "",
-) -> _R:
-    """Return plain data as a record.
+    hidden: str = "",
+) -> _T:
+    """Return plain data as an instance of a class, with every field checked.
+
+    Arguments:
+        kind: what `msgspec.convert` can make.
+        data: of JSON.
+        file, line, key: where the data stand, for the message.
+        hidden: a key of `data` that the file has not, and the message leaves out.
 
     Raises:
         InputError: naming the first field that is wrong.
     """
     try:
-        return kind.model_validate(record)
-    except ValidationError as error:
-        raise wrong_field(error, file, line, key) from error
+        return msgspec.convert(data, kind)
+    except msgspec.ValidationError as error:
+        path, what, expected = find_fault(kind, data, error)
+    path = (key + path.replace(f".{hidden}.", ".", 1)).lstrip(".")
+    raise InputError(what, file=file, line=line, key=path or None, expected=expected)
 
 
-def wrong_field(
-    error: ValidationError, file: Path | str | None, line: int | None, key: str
-) -> InputError:
-    """Return the error that names the first field that is wrong.
+def find_fault(
+    kind: Any,  # noqa: ANN401 - any type
+    data: object,
+    error: msgspec.ValidationError,
+) -> tuple[str, str, str | None]:
+    """Return path, fault and expectation of an error that `msgspec.convert` raised.
 
     Arguments:
-        file, line, key: where the data stand.
+        kind, data: that it was given.
     """
-    first = error.errors(include_url=False)[0]
-    path = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in first["loc"])
-    return InputError(first["msg"], file=file, line=line, key=(key + path).lstrip(".") or None)
+    # Behind " - at " stand names of fields alone, and dots for a key of a mapping.
+    text, _, where = str(error).rpartition(" - at `")
+    if not text:
+        text, where = where, ""
+    steps: list[Any] = []
+    for name, number in re.findall(r"\.(\w+)|\[(\d+|\.\.\.)\]", where.partition("$")[2]):
+        step = name or number
+        steps.append(_culprit(kind, data, steps, str(error)) if step == "..." else step)
+        if step.isdigit():
+            steps[-1] = int(step)
+    path = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps)
+    missing = re.fullmatch(r"Object missing required field `(\w+)`", text)
+    if missing:
+        return f"{path}.{missing[1]}", "missing", None
+    words = re.sub(
+        r"`([a-z| ]+)`", lambda m: " or ".join(_WORDS.get(w, w) for w in m[1].split(" | ")), text
+    )
+    expected, got, what = words.removeprefix("Expected ").partition(", got ")
+    if not words.startswith("Expected "):
+        return path, words, None
+    if where.startswith("key") or not got:
+        return path, "out of bounds", expected
+    return path, what, expected
+
+
+def _culprit(kind: Any, data: object, steps: Sequence[Any], message: str) -> str:  # noqa: ANN401
+    """Return the key of a mapping at which the same error is raised again."""
+    table: Any = data
+    for step in steps:
+        table = table[step]
+    for name, value in table.items():
+        try:
+            msgspec.convert(_put(data, steps, {name: value}), kind)
+        except msgspec.ValidationError as error:
+            if str(error) == message:
+                return str(name)
+    return "..."
+
+
+def _put(data: Any, steps: Sequence[Any], value: object) -> object:  # noqa: ANN401
+    """Return plain data with another value at a place."""
+    if not steps:
+        return value
+    changed = dict(data) if isinstance(data, Mapping) else list(data)
+    changed[steps[0]] = _put(data[steps[0]], steps[1:], value)
+    return changed

@@ -12,12 +12,12 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import chain
-from operator import itemgetter
+from operator import attrgetter
 
 import numpy as np
 from scipy.special import ndtr
 
-from femubench.core.schema.results import UNSEEN, JobResult, mode_rows
+from femubench.core.schema.results import UNSEEN, JobResult
 from femubench.core.typing import BoolArray, FloatArray, IntArray
 
 COLUMNS = ("coverage90", "crps_percent", "log_score")
@@ -59,7 +59,8 @@ class Forecasts:
             blocks: those of them whose modes are taken.
         """
         listed = list(results)
-        modes = [rows.get(name, ()) for rows in mode_rows(listed) for name in UNSEEN]
+        found = [result.blocks.get(name) for result in listed for name in UNSEEN]
+        modes = [block.modes if block else () for block in found]
         hertz = np.array(list(map(_HERTZ, chain(*modes))), dtype=float).reshape(-1, 3).T
         counts = np.array(list(map(len, modes)), dtype=int)
         owner = np.repeat(np.arange(len(modes)) // len(UNSEEN), counts)
@@ -153,7 +154,7 @@ def log_score(error: FloatArray, std: FloatArray) -> FloatArray:
     return np.asarray(-np.log((1.0 - ANYTHING) * density + ANYTHING / (2.0 * LOST_PERCENT)))
 
 
-_HERTZ = itemgetter(1, 2, 5)  # measured, predicted, its std
+_HERTZ = attrgetter("measured_hz", "predicted_hz", "predicted_std_hz")
 
 
 def _percent(hertz: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -137,7 +138,7 @@ def rank_results(
     listed = tuple(results)
     found = scores_and_ranks(listed, reference, baseline)
     return tuple(
-        result.changed(score=score, rank=rank)
+        replace(result, score=score, rank=rank)
         for result, score, rank in zip(listed, *found, strict=True)
     )
 

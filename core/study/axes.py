@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
-from pydantic import Field, TypeAdapter, ValidationError
+from msgspec import Meta
 
 from femubench.core.errors import InputError
 from femubench.core.plugin.validation import did_you_mean
 from femubench.core.schema.bounds import Name
+from femubench.core.schema.records import to_plain
 from femubench.core.schema.results import NOMINALS, Nominal, Run
+from femubench.core.schema.validation import read_plain
 
 Value = bool | int | float | str | None
 _NOISE, _LEFT_OUT = "noise", "sensors_left_out"
 _FIXED = (_NOISE, _LEFT_OUT, "strategy", "case", "nominal")
-_Factor = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-_Number = Annotated[int, Field(ge=0)]
+_Factor = Annotated[float, Meta(gt=0, le=sys.float_info.max)]
+_Number = Annotated[int, Meta(ge=0)]
 
 
 @dataclass(frozen=True)
@@ -95,13 +98,7 @@ class StudyAxes:
         kept = request.get("study") if isinstance(request, Mapping) else None
         if kept is None:
             return None
-        try:
-            return _READER.validate_python(kept)
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            key = ".".join(map(str, ("request", "study", *first["loc"])))
-            what = f"run {run.meta.get('run')}: {first['msg']}"
-            raise InputError(what, key=key, expected="what `bench study` keeps") from error
+        return read_plain(cls, kept, file=f"run {run.meta.get('run')}", key="request.study")
 
     @staticmethod
     def title_of(axis: str) -> str:
@@ -123,7 +120,7 @@ class StudyAxes:
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data for the run's `request`."""
-        plain: dict[str, Any] = _READER.dump_python(self, mode="json")
+        plain: dict[str, Any] = to_plain(self)
         return plain
 
     @property
@@ -185,6 +182,3 @@ class StudyAxes:
             return self.heat_map
         x, y, *_ = [*self.varied, *(name for name in _FIXED if name not in self.varied)]
         return x, y
-
-
-_READER = TypeAdapter(StudyAxes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -75,7 +76,7 @@ def _figures(run: Run, arms: Sequence[_Arm], by_arm: dict[_Arm, list[JobResult]]
     structures, reference = run.meta.get("structures") or {}, run.meta.get("reference") or {}
     names = {arm: f"{number}" for number, arm in enumerate(arms)}
     results = tuple(
-        result.changed(case=name, strategy="cell", nominal="drawn")
+        replace(result, case=name, strategy="cell", nominal="drawn")
         for arm, name in names.items()
         for result in by_arm.get(arm, ())
     )

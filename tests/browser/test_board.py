@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec import structs
 from playwright.sync_api import Page
 
 from femubench import report
@@ -226,7 +227,8 @@ def stated_run() -> Run:
             name: replace(
                 block,
                 modes=tuple(
-                    replace(mode, predicted_std_hz=0.01 * mode.measured_hz) for mode in block.modes
+                    structs.replace(mode, predicted_std_hz=0.01 * mode.measured_hz)
+                    for mode in block.modes
                 ),
             )
             for name, block in result.blocks.items()
