@@ -152,9 +152,9 @@ def _measured(model: _Variables, test: _Variables) -> dict[str, str | FloatArray
     """Return sensors and modes; where a shape is one by definition its deviation is left out."""
     dofs = model.array("measDOFs").ravel().astype(int).tolist()
     moving = np.flatnonzero(model.array("M0").any(axis=0)) + 1
-    if strangers := [dof for dof in dofs if dof not in moving]:
+    if unknown := [dof for dof in dofs if dof not in moving]:
         expected = f"rows with mass, from 1 to {moving.max(initial=0)}"
-        raise InputError(f"measDOFs has row {strangers[0]}", file=model.file, expected=expected)
+        raise InputError(f"measDOFs has row {unknown[0]}", file=model.file, expected=expected)
     count = len(USED + HELD_OUT)
     values, value_std = (test.array(name, count, 1) for name in ("lambdaExp", "std_lambdaExp"))
     shape = (len(dofs), count)

@@ -21,9 +21,9 @@ from femubench.core.inference.examine import Terms, examine
 from femubench.core.inference.fault_search import _Drawn, inquire, log_density
 from femubench.core.plugin.loader import load_plugins, registered_faults
 from femubench.effect import Suspect
-from femubench.plugins.faults.readings import multiplied, swapped
+from femubench.plugins.faults.readings import multiply_readings, swap_readings
 from femubench.plugins.faults.section_turned import SectionTurned
-from femubench.plugins.faults.sections import resized, sections_of
+from femubench.plugins.faults.sections import resize_section, sections_of
 from femubench.plugins.faults.unit_slip import UnitSlip
 from femubench.scenarios import SUITE
 from tests.diagnosis_problems import effects_named
@@ -103,7 +103,7 @@ def without_support(direction: str, case: Case) -> Case:
     return replace(case, model=Model.of(replace(frame, supports=supports)))
 
 
-SIGN = partial(edited, lambda m: multiplied(m, "P6z", -1.0))
+SIGN = partial(edited, lambda m: multiply_readings(m, "P6z", -1.0))
 DATA: dict[str, tuple[Edit, str, float | None]] = {
     "frequency-outlier": (
         partial(edited, partial(multiply, "frequencies", [1.0, 0.96])),
@@ -112,9 +112,9 @@ DATA: dict[str, tuple[Edit, str, float | None]] = {
     ),
     "modes-swapped": (partial(edited, partial(exchange, 3, 1)), "mode:2+4", None),
     "sensor-sign": (SIGN, "sensor:P6z", None),
-    "sensor-gain": (partial(edited, lambda m: multiplied(m, "P4z", 0.6)), "sensor:P4z", 0.6),
+    "sensor-gain": (partial(edited, lambda m: multiply_readings(m, "P4z", 0.6)), "sensor:P4z", 0.6),
     "sensors-swapped": (
-        partial(edited, lambda m: swapped(m, ("P9z", "P12z"))),
+        partial(edited, lambda m: swap_readings(m, ("P9z", "P12z"))),
         "sensor:P9z+P12z",
         None,
     ),
@@ -184,7 +184,7 @@ def test_what_a_drawing_gets_wrong_of_a_solid_is_no_fault(name: str) -> None:
 
 @pytest.mark.parametrize(("name", "sensor"), [("h-tube", "9Z"), ("stiffened-strip", "3Z")])
 def test_a_wrong_sign_stands_out_of_what_a_drawing_gets_wrong(name: str, sensor: str) -> None:
-    found = diagnosed(edited(lambda m: multiplied(m, sensor, -1.0), solid(name)))
+    found = diagnosed(edited(lambda m: multiply_readings(m, sensor, -1.0), solid(name)))
     assert faults_of(found) == [("sensor-sign", f"sensor:{sensor}")]
 
 
@@ -234,7 +234,7 @@ def test_the_density_is_that_of_what_was_measured() -> None:
     sound = case.used_measurement()
     look: Any = partial(examine, effects=(), tolerance=0.005)
     same = log_density(look(case.model, sound), sound)
-    wrong = swapped(sound, ("P9z", "P12z"))
+    wrong = swap_readings(sound, ("P9z", "P12z"))
     assert log_density(look(case.model, sound), wrong) == pytest.approx(same)
     # Half the reading at half the deviation: each density is twice as high.
     half = np.where(np.array(sound.sensors.labels)[:, None] == "P4z", 0.5, 1.0)
@@ -254,12 +254,12 @@ def test_a_size_in_millimetres_is_a_slip() -> None:
     structure = case.model.frame_structure
     (section,) = sections_of(structure.frame)
     assert section.width is not None
-    typed = resized(section, {"width": 1e3 * section.width, "height": 1e3 * section.width})
+    typed = resize_section(section, {"width": 1e3 * section.width, "height": 1e3 * section.width})
     assert typed is not None
     members = tuple(replace(m, section=typed) for m in structure.frame.members)
     wrong = replace(case, model=Model.of(replace(structure.frame, members=members)))
     assert faults_of(diagnosed(wrong)) == [("unit-slip", "section:")]
-    back = resized(typed, {"width": section.width, "height": section.width})
+    back = resize_section(typed, {"width": section.width, "height": section.width})
     assert back is not None
     assert pytest.approx([section.A, section.J]) == [back.A, back.J]
 

@@ -14,104 +14,15 @@ from femubench.core.change.terms import Term, sparse_matrix, weigh_term
 from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.model import Model
 from femubench.core.fem.model_parameters import (
-    MatrixSlopes,
     mass_slopes,
     matrix_slopes,
     updated_mass,
     with_values,
 )
 from femubench.core.fem.parameters import Property
+from femubench.core.fem.slopes import JoinedSlopes, MatrixSlopes, TermSlopes
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
-
-
-@dataclass(frozen=True)
-class TermSlopes:
-    """dK/dx and dM/dx of changes that are sums of terms.
-
-    Arguments:
-        terms: on the dofs of the model.
-        factors: d factor / dx of every term, (n_parameters, n_terms).
-    """
-
-    terms: tuple[Term, ...]
-    factors: FloatArray
-
-    @property
-    def count(self) -> int:
-        """Return the number of parameters."""
-        return len(self.factors)
-
-    def quadratic(self, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return left_j' dK/dx right_j and the same for dM, two arrays (m, n_parameters)."""
-        found = {name: np.zeros((left.shape[1], self.count)) for name in ("stiffness", "mass")}
-        for term, own in zip(self.terms, self.factors.T, strict=True):
-            energy = np.einsum("nm,nm->m", left, term.operator.apply(right))
-            used = np.flatnonzero(own)
-            found[term.matrix][:, used] += np.outer(energy, own[used])
-        return found["stiffness"], found["mass"]
-
-    def inner(self, left: FloatArray, right: FloatArray, matrix: str = "stiffness") -> FloatArray:
-        """Return left' dK/dx right, or that of the mass, (n_parameters, m_left, m_right)."""
-        found = np.zeros((self.count, left.shape[1], right.shape[1]))
-        for term, own in zip(self.terms, self.factors.T, strict=True):
-            if term.matrix == matrix:
-                used = np.flatnonzero(own)
-                form = left.T @ term.operator.apply(right)
-                found[used] += own[used, None, None] * form
-        return found
-
-    def combined(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
-        """Return the sum of weights[p] dK/dx @ vector, (n, k), of weights (n_parameters, k)."""
-        return self.products(vector, 0.0) @ weights
-
-    def products(self, vector: FloatArray, eigenvalue: float) -> FloatArray:
-        """Return (dK/dx - eigenvalue dM/dx) @ vector for every parameter, (n, n_parameters)."""
-        result = np.zeros((len(vector), self.count))
-        for term, own in zip(self.terms, self.factors.T, strict=True):
-            used = np.flatnonzero(own)
-            factor = own[used] if term.matrix == "stiffness" else -eigenvalue * own[used]
-            result[:, used] += np.outer(term.operator.apply(vector[:, None])[:, 0], factor)
-        return result
-
-
-@dataclass(frozen=True)
-class JoinedSlopes:
-    """Slopes by properties and by terms, in the order of the parameters.
-
-    Arguments:
-        parts: each with the numbers of its parameters.
-        count: of all parameters.
-    """
-
-    parts: tuple[tuple[MatrixSlopes, IntArray], ...]
-    count: int
-
-    def quadratic(self, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return left_j' dK/dx right_j and the same for dM, two arrays (m, n_parameters)."""
-        found = np.zeros((2, left.shape[1], self.count))
-        for part, own in self.parts:
-            found[:, :, own] = part.quadratic(left, right)
-        return found[0], found[1]
-
-    def inner(self, left: FloatArray, right: FloatArray) -> FloatArray:
-        """Return left' dK/dx right of every parameter, (n_parameters, m_left, m_right)."""
-        found = np.zeros((self.count, left.shape[1], right.shape[1]))
-        for part, own in self.parts:
-            found[own] = part.inner(left, right)
-        return found
-
-    def combined(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
-        """Return the sum of weights[p] dK/dx @ vector, (n, k), of weights (n_parameters, k)."""
-        products = [part.combined(vector, weights[own]) for part, own in self.parts]
-        return sum(products[1:], start=products[0])
-
-    def products(self, vector: FloatArray, eigenvalue: float) -> FloatArray:
-        """Return (dK/dx - eigenvalue dM/dx) @ vector for every parameter, (n, n_parameters)."""
-        result = np.zeros((len(vector), self.count))
-        for part, own in self.parts:
-            result[:, own] = part.products(vector, eigenvalue)
-        return result
+from femubench.core.typing import BoolArray, FloatArray, SparseArray
 
 
 @dataclass(frozen=True)
@@ -279,12 +190,16 @@ class ParametricModel:
         """
         if not self.terms:
             return matrix_slopes(model, self.properties)
-        own = np.flatnonzero(~self.is_property)
-        terms = TermSlopes(self.terms, self.factor_slopes(x)[own]), own
+        terms = self._term_slopes(x)
         if not self.properties:
-            return terms[0]
-        known = matrix_slopes(model, self.properties), np.flatnonzero(self.is_property)
-        return JoinedSlopes((known, terms), len(self))
+            return terms
+        own, known = np.flatnonzero(~self.is_property), np.flatnonzero(self.is_property)
+        parts = (matrix_slopes(model, self.properties), known), (terms.take(own), own)
+        return JoinedSlopes(parts, len(self))
+
+    def _term_slopes(self, x: FloatArray) -> TermSlopes:
+        parts = tuple((term.matrix, term.operator.apply) for term in self.terms)
+        return TermSlopes(parts, self.factor_slopes(x))
 
     def steps(self, x: FloatArray) -> FloatArray:
         """Return what the units of `slopes` are in x: that of a set value, 1 of all else, (p,)."""
@@ -323,8 +238,7 @@ class ParametricModel:
         """Return left_i' dM/dx right_k of the terms there, (p, m_left, m_right); None for none."""
         if not any(term.matrix == "mass" for term in self.terms):
             return None
-        slopes = TermSlopes(self.terms, self.factor_slopes(np.zeros(len(self))))
-        return slopes.inner(left, right, "mass")
+        return self._term_slopes(np.zeros(len(self))).inner(left, right, "mass")
 
     def of(self, chosen: Sequence[int]) -> ParametricModel:
         """Return the same model with the changes of some of the parameters only."""

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
+from functools import partial
+from operator import matmul
 
 import numpy as np
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
+from femubench.core.fem.slopes import Matrix, TermSlopes
 from femubench.core.typing import FloatArray, SparseArray
 
 GROUP = "group:"
 _ALL = "all"
-Matrix = Literal["mass", "stiffness"]
 _MATRIX: dict[str, Matrix] = {"E": "stiffness", "density": "mass"}
 
 
@@ -94,61 +95,13 @@ def _part(model: Model, matrix: Matrix, places: Sequence[str]) -> SparseArray:
     return sum(parts[1:], start=parts[0])
 
 
-@dataclass(frozen=True)
-class GroupDerivatives:
-    """dK/dp and dM/dp of factors on groups, about their present values as 1.
-
-    Arguments:
-        parts: what each factor scales, and the matrix.
-        size: number of dofs n.
-    """
-
-    parts: tuple[tuple[Matrix, SparseArray], ...]
-    size: int
-
-    @property
-    def count(self) -> int:
-        """Return the number of parameters."""
-        return len(self.parts)
-
-    def quadratic(self, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return left_j' dK/dp right_j and the same for dM, two arrays (m, n_parameters)."""
-        found = {name: np.zeros((left.shape[1], self.count)) for name in ("stiffness", "mass")}
-        for p, (matrix, part) in enumerate(self.parts):
-            found[matrix][:, p] = np.einsum("nm,nm->m", left, part @ right)
-        return found["stiffness"], found["mass"]
-
-    def inner(self, left: FloatArray, right: FloatArray) -> FloatArray:
-        """Return left' dK/dp right of every parameter, (n_parameters, m_left, m_right)."""
-        found = np.zeros((self.count, left.shape[1], right.shape[1]))
-        for p, (matrix, part) in enumerate(self.parts):
-            if matrix == "stiffness":
-                found[p] = left.T @ (part @ right)
-        return found
-
-    def combined(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
-        """Return the sum of weights[p] dK/dp @ vector, (n, k), of weights (n_parameters, k)."""
-        return self.products(vector, 0.0) @ weights
-
-    def products(self, vector: FloatArray, eigenvalue: float) -> FloatArray:
-        """Return (dK/dp - eigenvalue dM/dp) @ vector for every parameter, (n, n_parameters)."""
-        result = np.zeros((self.size, self.count))
-        for p, (matrix, part) in enumerate(self.parts):
-            result[:, p] = (1.0 if matrix == "stiffness" else -eigenvalue) * (part @ vector)
-        return result
-
-    def masses(self, shift: FloatArray) -> FloatArray:
-        """Return shift' dM/dp shift, (n_parameters,), of a motion of all dofs, (n,)."""
-        return np.asarray(self.quadratic(shift[:, None], shift[:, None])[1][0])
-
-
-def group_derivatives(model: Model, parameters: Sequence[Property]) -> GroupDerivatives:
-    """Return the derivatives of stiffness and mass with respect to factors on groups.
+def group_derivatives(model: Model, parameters: Sequence[Property]) -> TermSlopes:
+    """Return the derivatives of stiffness and mass by factors on groups, which are now 1.
 
     Raises:
         ModelError: as in `with_group_factors`.
     """
-    parts: list[tuple[Matrix, SparseArray]] = [
-        (_matrix(p), _part(model, _matrix(p), p.places)) for p in parameters
-    ]
-    return GroupDerivatives(tuple(parts), model.size)
+    parts = tuple(
+        (_matrix(p), partial(matmul, _part(model, _matrix(p), p.places))) for p in parameters
+    )
+    return TermSlopes(parts, np.eye(len(parts)))

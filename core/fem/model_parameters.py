@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
@@ -11,32 +10,8 @@ from femubench.core.fem.derivatives import derivatives, element_masses
 from femubench.core.fem.group_factors import group_derivatives, with_group_factors
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
+from femubench.core.fem.slopes import MatrixSlopes
 from femubench.core.typing import FloatArray
-
-
-class MatrixSlopes(Protocol):
-    """dK/dp and dM/dp of several parameters, never as global dense matrices."""
-
-    @property
-    def count(self) -> int:
-        """Return the number of parameters."""
-        ...
-
-    def quadratic(self, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return left_j' dK/dp right_j and the same for dM, two arrays (m, n_parameters)."""
-        ...
-
-    def inner(self, left: FloatArray, right: FloatArray) -> FloatArray:
-        """Return left' dK/dp right of every parameter, (n_parameters, m_left, m_right)."""
-        ...
-
-    def combined(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
-        """Return the sum of weights[p] dK/dp @ vector, (n, k), of weights (n_parameters, k)."""
-        ...
-
-    def products(self, vector: FloatArray, eigenvalue: float) -> FloatArray:
-        """Return (dK/dp - eigenvalue dM/dp) @ vector for every parameter, (n, n_parameters)."""
-        ...
 
 
 def with_values(
@@ -79,4 +54,5 @@ def mass_slopes(model: Model, parameters: Sequence[Property]) -> FloatArray:
         return element_masses(model.structure, parameters)
     shift = model.dofs.motions[:, :3]
     heaviest = int(np.einsum("nd,nd->d", shift, model.mass_times(shift)).argmax())
-    return group_derivatives(model, parameters).masses(shift[:, heaviest])
+    motion = shift[:, [heaviest]]
+    return np.asarray(group_derivatives(model, parameters).quadratic(motion, motion)[1][0])

@@ -41,6 +41,15 @@ class Section:
     shape: str = ""
     name: str = field(default="", compare=False)
 
+    def same_shape(self, width: float, height: float, wall: float) -> Section:
+        """Return a section of the same shape with the constants of other outer sizes, in m."""
+        if self.shape == "rectangular-tube":
+            return rectangular_tube(width, height, wall)
+        if self.shape == "round-tube":
+            return round_tube(width, wall)
+        assert self.shape == "solid-rectangle"
+        return solid_rectangle(width, height)
+
 
 def constant_kappa(value: float, along_z: float | None = None) -> ShearCoefficients:
     """Return shear coefficients that are the same for every material.

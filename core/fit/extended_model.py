@@ -12,7 +12,6 @@ from femubench.core.fem.model import Model
 from femubench.core.fit.modal_fit import Fit, Problem, fit, signed_hz
 from femubench.core.fit.projection import Projection
 from femubench.core.modal.eigen import enough_modes, modes_of
-from femubench.core.roles import EffectParameter
 from femubench.core.typing import FloatArray
 
 _ROUNDS = 3
@@ -31,19 +30,20 @@ def extended(model: Model, parts: Sequence[Projection], x: FloatArray) -> Model:
         h = part.hypothesis
         values = h.values(x[None, start : start + len(h.parameters)])[0]
         start += len(h.parameters)
-        pairs = zip(h.parameters, values, strict=True)
-        found = h.effect.extend(model, h.place, [_as_it_acts(p, float(v)) for p, v in pairs])
+        # A stiffness that hardly gives costs digits alone.
+        found = h.effect.extend(
+            model,
+            h.place,
+            [
+                np.inf if p.scaling == "compliance" and v > _RIGID * p.scale else float(v)
+                for p, v in zip(h.parameters, values, strict=True)
+            ],
+        )
         if not isinstance(found, Model):
             what = f"effect {h.effect.name!r} gave {type(found).__name__}"
             raise ModelError(f"{what}, expected femubench.Model")
         model = found
     return model
-
-
-def _as_it_acts(parameter: EffectParameter, value: float) -> float:
-    """Return a stiffness that hardly gives as one that does not: it would cost digits alone."""
-    rigid = parameter.scaling == "compliance" and value > _RIGID * parameter.scale
-    return float("inf") if rigid else value
 
 
 def raw_residual(problem: Problem, model: Model) -> FloatArray:

@@ -261,7 +261,10 @@ def fit(
         promised = point.linearised.promise(step)
         if promised < _SETTLED or point.cost - 3.0 * promised > give_up:
             break
-        trial = _tried(problem, parts, point, step, low, high)
+        try:
+            trial = state_at(problem, parts, np.clip(point.x + step, low, high))
+        except ModelError:
+            trial = None
         if trial is not None and trial.cost < point.cost:
             gained, point = point.cost - trial.cost, trial
             damping = damping / 10.0 if damping > 1e-3 else 0.0
@@ -272,20 +275,6 @@ def fit(
             if damping > 1e6:
                 break
     return Fit(point, log_evidence(point))
-
-
-def _tried(
-    problem: Problem,
-    parts: Sequence[Projection],
-    point: State,
-    step: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-) -> State | None:
-    try:
-        return state_at(problem, parts, np.clip(point.x + step, low, high))
-    except ModelError:
-        return None
 
 
 def log_evidence(point: State) -> float:

@@ -9,8 +9,9 @@ import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
-from femubench.core.fem.model_parameters import MatrixSlopes, matrix_slopes
+from femubench.core.fem.model_parameters import matrix_slopes
 from femubench.core.fem.parameters import Property
+from femubench.core.fem.slopes import MatrixSlopes
 from femubench.core.modal.eigen import Modes
 from femubench.core.modal.factorisation import LU
 from femubench.core.typing import FloatArray

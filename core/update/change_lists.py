@@ -13,9 +13,10 @@ from femubench.core.change.parametric_model import ParametricModel
 from femubench.core.change.tabulated import change_of
 from femubench.core.errors import InputError, NotApplicable, UnknownNameError
 from femubench.core.fem.frame import Frame
-from femubench.core.fem.group_factors import GROUP, Matrix, group_places
+from femubench.core.fem.group_factors import GROUP, group_places
 from femubench.core.fem.joints import JointGroup, all_elements, elements_at, joint_groups
 from femubench.core.fem.model import Model
+from femubench.core.fem.slopes import Matrix
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.group_prior import STRUCTURE_STD, group_prior_std, support_groups
 from femubench.core.plugin.loader import registered_effects

@@ -11,7 +11,8 @@ import numpy as np
 
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
-from femubench.core.fem.model_parameters import MatrixSlopes, updated_mass
+from femubench.core.fem.model_parameters import updated_mass
+from femubench.core.fem.slopes import MatrixSlopes
 from femubench.core.modal.correlated_errors import undone
 from femubench.core.modal.correlation import modal_scale_factor, seen_modes
 from femubench.core.modal.eigen import Modes, enough_modes, solve_modes

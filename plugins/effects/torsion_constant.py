@@ -26,9 +26,6 @@ from femubench.fem import (
     Frame,
     Section,
     bredt,
-    rectangular_tube,
-    round_tube,
-    solid_rectangle,
     stiffness_matrices,
     wall_of,
 )
@@ -133,24 +130,12 @@ def shape_torsion_constant(section: Section) -> float | None:
 
     A section whose numbers are not those of its shape has none.
     """
-    own = _of_shape(section)
-    if own is None:
+    if section.width is None or section.height is None or not section.shape:
         return None
+    own = section.same_shape(section.width, section.height, wall_of(section))
     numbers = [section.A, section.Iy, section.Iz]
     alike = np.allclose([own.A, own.Iy, own.Iz], numbers, rtol=_SAME, atol=0)
     return own.J if alike else None
-
-
-def _of_shape(section: Section) -> Section | None:
-    """Return the section with the shape, size and area of a section; the wall follows from A."""
-    width, height = section.width, section.height
-    if width is None or height is None:
-        return None
-    if section.shape == "rectangular-tube":
-        return rectangular_tube(width, height, wall_of(section))
-    if section.shape == "round-tube":
-        return round_tube(width, wall_of(section))
-    return solid_rectangle(width, height) if section.shape == "solid-rectangle" else None
 
 
 def estimated_torsion_constant(section: Section) -> tuple[float, str] | None:
@@ -167,8 +152,10 @@ def estimated_torsion_constant(section: Section) -> tuple[float, str] | None:
     if min(a, iy) <= 0.0:
         return None
     if section.width is not None and section.height is not None:
-        own = _of_shape(section) if section.shape in _RULES else None
-        return None if own is None else (own.J, _RULES[section.shape])
+        if section.shape not in _RULES:
+            return None
+        own = section.same_shape(section.width, section.height, wall_of(section))
+        return own.J, _RULES[section.shape]
     if a**2 > _SOLID * np.sqrt(iy * iz):
         return a**4 / (4.0 * np.pi**2 * (iy + iz)), "by Saint-Venant's estimate for a solid section"
     if abs(iy / iz - 1.0) < _CLOSE:

@@ -34,8 +34,6 @@ from femubench.fem import (
     Section,
     Structure,
     mass_matrices,
-    rectangular_tube,
-    round_tube,
     stiffness_matrices,
     wall_of,
 )
@@ -159,17 +157,11 @@ def _wall(section: Section) -> float | None:
     return wall if wall < (1.0 - 1e-9) * min(width, height) / 2.0 else None
 
 
-def _tube(section: Section, wall: float) -> Section:
-    width, height = section.width or 0.0, section.height or 0.0
-    if section.shape == "round-tube":
-        return round_tube(width, wall)
-    return rectangular_tube(width, height, wall)
-
-
 def _with_wall(section: Section, factor: float) -> Section:
     """Return a tube with so many times the wall."""
     wall = _wall(section) or 0.0
-    old, new = _tube(section, wall), _tube(section, factor * wall)
+    sizes = section.width or 0.0, section.height or 0.0
+    old, new = section.same_shape(*sizes, wall), section.same_shape(*sizes, factor * wall)
     constants = {
         name: getattr(section, name) * getattr(new, name) / getattr(old, name)
         for name in ("A", "Iy", "Iz", "J", "Jp")

@@ -7,9 +7,9 @@ from femubench import hookimpl
 CLASSES = {
     "frequency-outlier": "frequency_outlier:FrequencyOutlier",
     "modes-swapped": "modes_swapped:ModesSwapped",
-    "sensor-sign": "sensor_sign:SensorSign",
-    "sensor-gain": "sensor_gain:SensorGain",
-    "sensors-swapped": "sensors_swapped:SensorsSwapped",
+    "sensor-sign": "readings:SensorSign",
+    "sensor-gain": "readings:SensorGain",
+    "sensors-swapped": "readings:SensorsSwapped",
     "sigma-misstated": "sigma_misstated:SigmaMisstated",
     "unit-slip": "unit_slip:UnitSlip",
     "section-turned": "section_turned:SectionTurned",

@@ -1,15 +1,92 @@
-"""Readings of sensors, exchanged and multiplied."""
+"""Sensors mounted the other way round, with a wrong sensitivity, or with exchanged cables."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import combinations
+from typing import ClassVar, Literal
 
 import numpy as np
 
-from femubench import Measurement
+from femubench import Measurement, Model
+from femubench.effect import Corrected, Parameter, Suspect
+
+_GAIN = Parameter("gain", "", 1.0, neutral=1.0, lower=0.2, upper=5.0)
 
 
-def read_sensors(measurement: Measurement) -> tuple[str, ...]:
+class SensorGain:
+    """One sensor reads too much or too little, by the same factor in all modes."""
+
+    name: ClassVar[str] = "sensor-gain"
+    side: ClassVar[Literal["data"]] = "data"
+
+    def suspects(self, model: Model, measurement: Measurement) -> Sequence[Suspect]:
+        """Return every sensor that was read."""
+        return [
+            Suspect(
+                f"sensor:{label}",
+                f"sensor {label} reads with a wrong gain",
+                partial(self._corrected, label),
+                _GAIN,
+            )
+            for label in _read_sensors(measurement)
+        ]
+
+    def _corrected(
+        self, label: str, model: Model, measurement: Measurement, value: float
+    ) -> Corrected:
+        return model, multiply_readings(measurement, label, 1.0 / value)
+
+
+class SensorSign:
+    """One sensor reads with the wrong sign in all modes."""
+
+    name: ClassVar[str] = "sensor-sign"
+    side: ClassVar[Literal["data"]] = "data"
+
+    def suspects(self, model: Model, measurement: Measurement) -> Sequence[Suspect]:
+        """Return every sensor that was read."""
+        return [
+            Suspect(
+                f"sensor:{label}",
+                f"sensor {label} reads with the wrong sign",
+                partial(self._corrected, label),
+            )
+            for label in _read_sensors(measurement)
+        ]
+
+    def _corrected(
+        self, label: str, model: Model, measurement: Measurement, value: float
+    ) -> Corrected:
+        return model, multiply_readings(measurement, label, -1.0)
+
+
+class SensorsSwapped:
+    """Two sensors have each other's readings in all modes."""
+
+    name: ClassVar[str] = "sensors-swapped"
+    side: ClassVar[Literal["data"]] = "data"
+
+    def suspects(self, model: Model, measurement: Measurement) -> Sequence[Suspect]:
+        """Return every pair of sensors that were read."""
+        return [
+            Suspect(
+                f"sensor:{one}+{two}",
+                f"sensors {one} and {two} are swapped",
+                partial(self._corrected, (one, two)),
+            )
+            for one, two in combinations(_read_sensors(measurement), 2)
+        ]
+
+    def _corrected(
+        self, labels: tuple[str, str], model: Model, measurement: Measurement, value: float
+    ) -> Corrected:
+        return model, swap_readings(measurement, labels)
+
+
+def _read_sensors(measurement: Measurement) -> tuple[str, ...]:
     """Return the sensors that were read in one mode at least, if there are two of them."""
     read = np.asarray(np.isfinite(measurement.shapes).any(axis=1))
     labels = measurement.sensors.labels
@@ -17,7 +94,7 @@ def read_sensors(measurement: Measurement) -> tuple[str, ...]:
     return found if len(found) > 1 else ()
 
 
-def multiplied(measurement: Measurement, label: str, factor: float) -> Measurement:
+def multiply_readings(measurement: Measurement, label: str, factor: float) -> Measurement:
     """Return a measurement with the readings of one sensor times a factor.
 
     What amplifies a reading amplifies its noise; what diminishes it need not diminish that.
@@ -31,7 +108,7 @@ def multiplied(measurement: Measurement, label: str, factor: float) -> Measureme
     )
 
 
-def swapped(measurement: Measurement, labels: tuple[str, str]) -> Measurement:
+def swap_readings(measurement: Measurement, labels: tuple[str, str]) -> Measurement:
     """Return a measurement with the readings of two sensors exchanged."""
     order = np.arange(len(measurement.sensors))
     i, j = (measurement.sensors.labels.index(label) for label in labels)

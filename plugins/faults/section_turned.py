@@ -8,9 +8,9 @@ from functools import partial
 from typing import ClassVar, Literal
 
 from femubench import Measurement, Model
-from femubench.effect import Corrected, Suspect
+from femubench.effect import Suspect
 from femubench.fem import Section
-from femubench.plugins.faults.sections import sections_of, with_section
+from femubench.plugins.faults.sections import correct_section, sections_of
 
 _ALIKE = 0.02  # relative, below which a turn changes nothing that is seen
 
@@ -29,28 +29,25 @@ class SectionTurned:
             Suspect(
                 f"section:{section.name}",
                 f"section {section.name} is turned by a right angle".replace("  ", " "),
-                partial(self._corrected, section),
+                partial(correct_section, section, _turn_section(section)),
             )
             for section in sections_of(model.structure.frame)
             if min(section.Iy, section.Iz) > 0.0 and abs(section.Iy / section.Iz - 1.0) > _ALIKE
         ]
 
-    def _corrected(
-        self, section: Section, model: Model, measurement: Measurement, value: float
-    ) -> Corrected:
-        kappa = section.kappa
-        turned = replace(
-            section,
-            Iy=section.Iz,
-            Iz=section.Iy,
-            width=section.height,
-            height=section.width,
-            kappa=None if kappa is None else partial(_turned, section),
-        )
-        return with_section(model, section, turned), measurement
+
+def _turn_section(section: Section) -> Section:
+    return replace(
+        section,
+        Iy=section.Iz,
+        Iz=section.Iy,
+        width=section.height,
+        height=section.width,
+        kappa=None if section.kappa is None else partial(_turn_kappa, section),
+    )
 
 
-def _turned(section: Section, nu: float) -> tuple[float, float]:
+def _turn_kappa(section: Section, nu: float) -> tuple[float, float]:
     assert section.kappa is not None
     along_y, along_z = section.kappa(nu)
     return along_z, along_y

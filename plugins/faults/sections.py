@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from femubench import Model
-from femubench.fem import Frame, Section, rectangular_tube, round_tube, solid_rectangle, wall_of
+from femubench import Measurement, Model
+from femubench.effect import Corrected
+from femubench.fem import Frame, Section, wall_of
 
 _SAME = 1e-6
-_SHAPES = ("rectangular-tube", "round-tube", "solid-rectangle")
 _CONSTANTS = ("A", "Iy", "Iz", "J", "Jp")
 
 
@@ -24,14 +24,14 @@ def sections_of(frame: Frame) -> tuple[Section, ...]:
 def sizes_of(section: Section) -> dict[str, float]:
     """Return the sizes of a section with a shape as they may have been typed, in m."""
     width, height = section.width, section.height
-    if width is None or height is None or section.shape not in _SHAPES:
+    if width is None or height is None or not section.shape:
         return {}
     if width == height:
         return {"width": width}
     return {"width": width, "height": height}
 
 
-def resized(section: Section, sizes: Mapping[str, float]) -> Section | None:
+def resize_section(section: Section, sizes: Mapping[str, float]) -> Section | None:
     """Return a section with other sizes, and what was typed in beside its shape as it was.
 
     None for one without a shape, or with a wall too thick for the sizes. A square or round one
@@ -51,26 +51,23 @@ def resized(section: Section, sizes: Mapping[str, float]) -> Section | None:
         new["wall"] = 0.5 * width  # solid
     if new["wall"] > 0.5 * min(width, height):
         return None
-    own = _made(section.shape, old["width"], old.get("height", old["width"]), wall)
+    own = section.same_shape(old["width"], old.get("height", old["width"]), wall)
     typed = {
         key: getattr(section, key)
         for key in _CONSTANTS
         if not np.isclose(getattr(section, key), getattr(own, key), rtol=_SAME, atol=0.0)
     }
-    return replace(_made(section.shape, width, height, new["wall"]), **typed, name=section.name)
+    return replace(section.same_shape(width, height, new["wall"]), **typed, name=section.name)
 
 
-def _made(shape: str, width: float, height: float, wall: float) -> Section:
-    if shape == "rectangular-tube":
-        return rectangular_tube(width, height, wall)
-    return round_tube(width, wall) if shape == "round-tube" else solid_rectangle(width, height)
-
-
-def with_section(model: Model, old: Section, new: Section) -> Model:
+def correct_section(
+    old: Section, new: Section, model: Model, measurement: Measurement, value: float
+) -> Corrected:
     """Return the model with one section in the place of another one of the same name."""
     structure = model.frame_structure
     members = tuple(
         replace(m, section=new) if (m.section, m.section.name) == (old, old.name) else m
         for m in structure.frame.members
     )
-    return Model.of(structure.rebuilt(replace(structure.frame, members=members)))
+    frame = replace(structure.frame, members=members)
+    return Model.of(structure.rebuilt(frame)), measurement

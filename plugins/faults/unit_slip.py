@@ -12,12 +12,12 @@ import numpy as np
 
 from femubench import Measurement, Model
 from femubench.effect import Corrected, Suspect
-from femubench.fem import Frame, Material, Section, wall_of
+from femubench.fem import Frame, Material, wall_of
 from femubench.plugins.faults.sections import (
-    resized,
+    correct_section,
+    resize_section,
     sections_of,
     sizes_of,
-    with_section,
 )
 
 _KILO = 1e3
@@ -67,15 +67,15 @@ def _of_sections(frame: Frame) -> Iterator[Suspect]:
         options = {key: {key: typed} for key, typed in sizes.items()} | {"sizes": whole}
         for (key, typed), factor in product(options.items(), (1.0 / _KILO, _KILO)):
             new = {name: size / factor for name, size in typed.items()}
-            right = resized(section, new)
+            right = resize_section(section, new)
             wrong = [s for s in sizes.values() if not _LEAST < s < _LARGEST * span]
-            mended = [s for s in (sizes | new).values() if _LEAST < s < _LARGEST * span]
-            if wrong and right is not None and len(mended) >= len(sizes):
+            possible = [s for s in (sizes | new).values() if _LEAST < s < _LARGEST * span]
+            if wrong and right is not None and len(possible) >= len(sizes):
                 yield Suspect(
                     f"section:{section.name}",
                     f"{key} of section {section.name} {'are' if key == 'sizes' else 'is'} "
                     f"{factor:g} times too large",
-                    partial(_with_section, section, right),
+                    partial(correct_section, section, right),
                     known={f"{key}, typed over right": factor},
                     blatant=True,
                 )
@@ -90,9 +90,3 @@ def _with_material(
     )
     frame = replace(structure.frame, members=members)
     return Model.of(structure.rebuilt(frame)), measurement
-
-
-def _with_section(
-    wrong: Section, right: Section, model: Model, measurement: Measurement, value: float
-) -> Corrected:
-    return with_section(model, wrong, right), measurement

@@ -19,11 +19,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench import InputError
-from femubench.plugins.readers.reading import opened
+from femubench.plugins.readers.reading import SPARSE_PARTS, opened, sparse_of
 
 _MEMORY, _PER_BYTE = 900 * 2**20, 64  # bytes beyond the libraries, and more for each of the file
 _SECONDS = 300
-_PARTS = ("data", "indices", "indptr", "shape")
 _NAMES = "names"
 
 
@@ -65,8 +64,7 @@ def apart(function: Callable[[Path], dict[str, Any]], path: Path, expected: str)
                 if f"v{i}" in arrays:
                     found[name] = arrays[f"v{i}"]
                 else:
-                    data, indices, indptr, shape = (arrays[f"v{i}.{part}"] for part in _PARTS)
-                    found[name] = sp.csc_array((data, indices, indptr), shape=tuple(shape.tolist()))
+                    found[name] = sparse_of(*(arrays[f"v{i}.{part}"] for part in SPARSE_PARTS))
             return found
 
 
@@ -84,7 +82,7 @@ def in_child(module: str, function: str, path: str, result: str) -> None:
                     matrix = sp.csc_array(value)
                     matrix.check_format(full_check=True)
                     arrays |= {
-                        f"{key}.{part}": np.asarray(getattr(matrix, part)) for part in _PARTS
+                        f"{key}.{part}": np.asarray(getattr(matrix, part)) for part in SPARSE_PARTS
                     }
                 elif isinstance(value, np.ndarray) and value.dtype.kind in "fiucbUS":
                     arrays[key] = value

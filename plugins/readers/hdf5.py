@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from femubench import InputError
 from femubench.plugins.readers.apart import apart, limit_memory
-from femubench.plugins.readers.reading import needs
+from femubench.plugins.readers.reading import needs, sparse_of
 from femubench.plugins.readers.variables import Variables, VariablesReader
 
 _KIND = "an HDF5 file with matrices by name"
@@ -75,10 +74,8 @@ def _found(group: Any, above: str, path: Path) -> Iterator[tuple[str, Any]]:  # 
             data, indices, indptr = (np.asarray(item[part][()]) for part in form)
             columns = len(indptr) - 1
             rows = int(item.attrs.get(_ROWS, columns))
-            parts = (data, indices.astype(np.int64), indptr.astype(np.int64))
-            matrix = sp.csc_array(parts, shape=(rows, columns))
-            matrix.check_format(full_check=True)
-            yield name, matrix
+            places = (indices.astype(np.int64), indptr.astype(np.int64))
+            yield name, sparse_of(data, *places, (rows, columns))
         elif name.count("/") < _DEEPEST:
             yield from _found(item, f"{name}/", path)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from femubench import InputError, Measurement, Sensors
 from femubench.modal import real_modes
+from femubench.plugins.readers.reading import DIRECTIONS, words_of
 
 # What a variable may be called, without case and underscores; the first is its key in a case.
 NAMES: Mapping[str, tuple[str, ...]] = {
@@ -32,7 +33,6 @@ EXPECTED = (
     "where there are: frequency_std, shape_std, damping, labels, or nodes and directions, xyz"
 )
 _MOST = 20_000_000
-_DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 Array = NDArray[np.float64]
 
@@ -132,26 +132,18 @@ def _wrong(key: str, what: str, expected: str, path: Path) -> InputError:
     return InputError(f"{key}: {what}", file=path, expected=expected)
 
 
-def _words(value: Any) -> list[str]:  # noqa: ANN401 - numbers or words
-    array = np.asarray(value).reshape(-1)
-    if array.dtype.kind == "f" and (array % 1 == 0).all():
-        array = array.astype(np.int64)
-    texts = [v.decode("utf-8", "replace") if isinstance(v, bytes) else str(v) for v in array]
-    return [text.strip() for text in texts]
-
-
 def _sensors(found: Mapping[str, Any], count: int, path: Path) -> Sensors:
     """Return the sensors: by their labels, by nodes and directions, or 1, 2, ..."""
-    words = {key: _words(found[key]) for key in ("labels", "nodes", "directions") if key in found}
+    words = {key: words_of(found[key]) for key in ("labels", "nodes", "directions") if key in found}
     for key, listed in words.items():
         if len(listed) != count:
             raise _wrong(key, f"{len(listed)} entries", f"{count}, one a row of shapes", path)
     ways = [
-        _DIRECTIONS[int(way) - 1] if way in ("1", "2", "3", "4", "5", "6") else way
+        DIRECTIONS[int(way) - 1] if way in ("1", "2", "3", "4", "5", "6") else way
         for way in words.get("directions", ["x"] * count)
     ]
-    if wrong := [way for way in ways if way.lstrip("+-") not in _DIRECTIONS]:
-        raise _wrong("directions", repr(wrong[0]), f"{', '.join(_DIRECTIONS)}, or 1 to 6", path)
+    if wrong := [way for way in ways if way.lstrip("+-") not in DIRECTIONS]:
+        raise _wrong("directions", repr(wrong[0]), f"{', '.join(DIRECTIONS)}, or 1 to 6", path)
     labels = words.get("labels")
     if labels is None and "nodes" in words:
         labels = [f"{node}:{way}" for node, way in zip(words["nodes"], ways, strict=True)]

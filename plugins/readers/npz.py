@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.plugins.readers.reading import opened
+from femubench.plugins.readers.reading import SPARSE_PARTS, opened, sparse_of
 from femubench.plugins.readers.variables import Variables, VariablesReader
 
 _KIND = "an archive of numpy.savez or scipy.sparse.save_npz"
-_SPARSE = ("data", "indices", "indptr", "shape")
 
 
 class NpzReader(VariablesReader):
@@ -35,7 +34,7 @@ class NpzReader(VariablesReader):
             for name in arrays:
                 base, dot, part = name.rpartition(".")
                 if dot and part == "indptr":
-                    found[base] = _sparse(*(arrays[f"{base}.{one}"] for one in _SPARSE))
+                    found[base] = sparse_of(*(arrays[f"{base}.{one}"] for one in SPARSE_PARTS))
             return found
 
     def save(self, path: Path, original: Path, new: Variables) -> None:
@@ -46,7 +45,7 @@ class NpzReader(VariablesReader):
                 sp.save_npz(path, value)
                 return
             if sp.issparse(value):
-                arrays |= {f"{name}.{part}": getattr(value, part) for part in _SPARSE}
+                arrays |= {f"{name}.{part}": getattr(value, part) for part in SPARSE_PARTS}
             else:
                 arrays[name] = value
         with path.open("wb") as stream:
@@ -57,10 +56,3 @@ def _arrays(path: Path) -> dict[str, Any]:
     # NumPy leaves a file open that it cannot read.
     with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
         return {name: archive[name] for name in archive.files}
-
-
-def _sparse(data: Any, indices: Any, indptr: Any, shape: Any) -> Any:  # noqa: ANN401
-    rows, columns = (int(value) for value in shape)
-    matrix = sp.csc_array((data, indices, indptr), shape=(rows, columns))
-    matrix.check_format(full_check=True)
-    return matrix

@@ -8,7 +8,7 @@ from contextlib import contextmanager, redirect_stdout
 from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from femubench.fem import SparseArray
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+SPARSE_PARTS = ("data", "indices", "indptr", "shape")
 
 
 @contextmanager
@@ -60,6 +61,15 @@ def directions(numbers: Sequence[int], path: Path) -> tuple[str, ...]:
     return tuple(DIRECTIONS[number - 1] for number in numbers)
 
 
+def words_of(column: Any) -> list[str]:  # noqa: ANN401 - numbers or words
+    """Return the entries of a column as texts, whole numbers without a point."""
+    values = np.asarray(column).reshape(-1)
+    if values.dtype.kind == "f" and np.isfinite(values).all() and (values % 1 == 0).all():
+        values = values.astype(np.int64)
+    texts = [v.decode("utf-8", "replace") if isinstance(v, bytes) else str(v) for v in values]
+    return [text.strip() for text in texts]
+
+
 def symmetric(rows: np.ndarray, columns: np.ndarray, values: np.ndarray, n: int) -> SparseArray:
     """Return a matrix of which a file has one triangle, sparse (n, n).
 
@@ -73,6 +83,14 @@ def symmetric(rows: np.ndarray, columns: np.ndarray, values: np.ndarray, n: int)
         return sp.csc_array((values, (rows, columns)), shape=(n, n))
     upper = sp.csc_array((values, (low, high)), shape=(n, n))
     return sp.csc_array(upper + sp.triu(upper, 1).T)
+
+
+def sparse_of(data: Any, indices: Any, indptr: Any, shape: Any) -> SparseArray:  # noqa: ANN401
+    """Return a sparse matrix from its `SPARSE_PARTS`; raises ValueError where they do not fit."""
+    rows, columns = (int(value) for value in shape)
+    matrix = sp.csc_array((data, indices, indptr), shape=(rows, columns))
+    matrix.check_format(full_check=True)
+    return matrix
 
 
 def lower_triangle(matrix: SparseArray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from femubench import InputError, Measurement, Sensors
 from femubench.fem import Outline
 from femubench.modal import FrequencyResponses, TimeSignals, real_modes
-from femubench.plugins.readers.reading import opened
+from femubench.plugins.readers.axes import BASIC, System
+from femubench.plugins.readers.reading import DIRECTIONS, opened
 from femubench.plugins.readers.universal_datasets import Dataset, read_datasets
 
-_DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _COORDINATES, _UNITS, _SYSTEMS, _SHAPES = (15, 2411), 164, (18, 2420), (55, 2414)
 _HEADER, _TRACES, _ELEMENTS = 151, 82, 2412
 _WANTED = (*_COORDINATES, _UNITS, *_SYSTEMS, *_SHAPES, _HEADER, _TRACES, _ELEMENTS)
@@ -136,41 +136,9 @@ def _length_factor(path: Path, datasets: Sequence[Dataset]) -> float:
     return factors.pop()
 
 
-@dataclass(frozen=True)
-class _System:
-    """Axes of a file: cartesian or cylindrical (radius, degrees, height)."""
-
-    origin: NDArray[np.float64]
-    axes: NDArray[np.float64]  # a row an axis, (3, 3)
-    cylindrical: bool = False
-
-    def point(self, xyz: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return a point given in these axes in those that they are told in, (3,)."""
-        if self.cylindrical:
-            radius, angle = xyz[0], math.radians(xyz[1])
-            xyz = np.array([radius * math.cos(angle), radius * math.sin(angle), xyz[2]])
-        return np.asarray(self.origin + xyz @ self.axes)
-
-    def triad(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the directions of displacements at a point, a row each, (3, 3)."""
-        away = self.axes[:2] @ (at - self.origin)
-        radius = float(np.linalg.norm(away))
-        if not self.cylindrical or radius == 0.0:
-            return self.axes
-        c, s = away / radius
-        return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ self.axes
-
-    def within(self, outer: _System) -> _System:
-        """Return these axes in those in which the outer ones are told."""
-        return _System(outer.point(self.origin), self.axes @ outer.axes, self.cylindrical)
-
-
-_HERE = _System(np.zeros(3), np.eye(3))
-
-
-def _systems(path: Path, datasets: Sequence[Dataset]) -> dict[int, _System]:
+def _systems(path: Path, datasets: Sequence[Dataset]) -> dict[int, System]:
     """Return the coordinate systems by number, in global axes."""
-    systems: dict[int, _System] = dict.fromkeys(map(int, _GLOBAL), _HERE)
+    systems: dict[int, System] = dict.fromkeys(_GLOBAL, BASIC)
     for dataset in _of(datasets, 2420):
         triples = zip(
             dataset["CS_sys_labels"], dataset["CS_types"], dataset["CS_matrices"], strict=True
@@ -188,10 +156,10 @@ def _systems(path: Path, datasets: Sequence[Dataset]) -> dict[int, _System]:
             rows = np.array([first, second, np.cross(first, second)])
             own = _system(path, 18, int(label), int(dataset["cs_type"][i]), origin, rows)
             outer = systems.get(int(dataset["ref_cs_num"][i]))
-            if outer is None or outer.cylindrical:
+            if outer is None or outer.kind == "C":
                 what = f"coordinate system {int(label)} is told in one that is not there"
                 raise InputError(what, file=path, key="dataset 18", expected="cartesian axes")
-            systems[int(label)] = own.within(outer)
+            systems[int(label)] = System(outer.point(own.origin), own.axes @ outer.axes, own.kind)
     return systems
 
 
@@ -202,7 +170,7 @@ def _system(
     kind: int,
     origin: NDArray[np.float64],
     rows: NDArray[np.float64],
-) -> _System:
+) -> System:
     """Return a coordinate system of three axes of any length."""
     key, length = f"dataset {dataset}", np.linalg.norm(rows, axis=1)
     if kind not in (0, 1):
@@ -212,7 +180,7 @@ def _system(
     if not (np.isfinite(origin).all() and np.allclose(axes @ axes.T, np.eye(3), atol=1e-3)):
         what = f"the axes of coordinate system {label} are not at right angles"
         raise InputError(what, file=path, key=key, expected="three axes")
-    return _System(origin, axes, kind == 1)
+    return System(origin, axes, "C" if kind == 1 else "R")
 
 
 def _nodes(path: Path, datasets: Sequence[Dataset]) -> dict[int, _Node]:
@@ -234,7 +202,7 @@ def _nodes(path: Path, datasets: Sequence[Dataset]) -> dict[int, _Node]:
                     expected = "one that dataset 18 or 2420 defines"
                     raise InputError(what, file=path, key=key, expected=expected)
             at = systems[used[0]].point(np.array(xyz))
-            node = _Node(at / factor, systems[used[1]].triad(at))
+            node = _Node(at / factor, systems[used[1]].axes_at(at))
             other = nodes.setdefault(int(number), node)
             if not np.array_equal(other.xyz, node.xyz):
                 what = f"node {int(number)} lies at two places"
@@ -307,7 +275,7 @@ def _mode(
     shape = {
         (int(node), direction): complex(value)
         for node, row in zip(nodes, rows, strict=True)
-        for direction, value in zip(_DIRECTIONS, row, strict=False)
+        for direction, value in zip(DIRECTIONS, row, strict=False)
     }
     return _Mode(number, frequency, damping, shape)
 
@@ -330,7 +298,7 @@ def _measurement(path: Path, nodes: Mapping[int, _Node], modes: Sequence[_Mode])
             raise InputError(what, file=path, expected=f"at most {_MOST_NUMBERS}")
         places = [p for p in listed if any(mode.shape.get(p, 0.0) != 0.0 for mode in modes)]
     else:
-        places = [(node, direction) for node in nodes for direction in _DIRECTIONS[:3]]
+        places = [(node, direction) for node in nodes for direction in DIRECTIONS[:3]]
     nowhere = _Node(np.full(3, math.nan), np.eye(3))
     at = [nodes.get(node, nowhere) for node, _ in places]
     sensors = Sensors.along(
@@ -357,7 +325,7 @@ def _measurement(path: Path, nodes: Mapping[int, _Node], modes: Sequence[_Mode])
 
 def _axis(node: _Node, direction: str) -> NDArray[np.float64]:
     """Return a direction of a node in (x, y, z, rx, ry, rz), (6,)."""
-    axis, row = np.zeros(6), _DIRECTIONS.index(direction)
+    axis, row = np.zeros(6), DIRECTIONS.index(direction)
     axis[3 * (row // 3) : 3 * (row // 3) + 3] = node.triad[row % 3]
     return axis
 

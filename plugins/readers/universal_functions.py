@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from femubench import InputError, Sensors
 from femubench.modal import FrequencyResponses, TimeSignals
+from femubench.plugins.readers.reading import DIRECTIONS
 from femubench.plugins.readers.universal_datasets import Dataset, read_datasets
 
-_DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _TIME, _RESPONSE = 1, 4  # types of a function
 _QUANTITIES = {8: "receptance", 11: "mobility", 12: "accelerance"}
 _FORCES = (0, 9, 13)  # unknown, reaction, excitation
@@ -100,11 +100,11 @@ def _function(path: Path, dataset: Dataset, length: float, force: float) -> _Fun
 def _place(path: Path, dataset: Dataset, what: str) -> tuple[Place, float]:
     """Return node and direction without sign, and the sign."""
     number, node = int(dataset[f"{what}_dir"]), int(dataset[f"{what}_node"])
-    if not 1 <= abs(number) <= len(_DIRECTIONS):
+    if not 1 <= abs(number) <= len(DIRECTIONS):
         said = f"the function at node {node} has the direction {number}"
         expected = "1 to 6 for x, y, z, rx, ry, rz, with a sign"
         raise InputError(said, file=path, key=_KEY, expected=expected)
-    return (node, _DIRECTIONS[abs(number) - 1]), math.copysign(1.0, number)
+    return (node, DIRECTIONS[abs(number) - 1]), math.copysign(1.0, number)
 
 
 def _shared_axis(path: Path, functions: Sequence[_Function]) -> NDArray[np.float64]:

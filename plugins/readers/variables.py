@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench import InputError
-from femubench.plugins.readers.reading import DIRECTIONS, directions, opened
+from femubench.plugins.readers.reading import DIRECTIONS, directions, opened, words_of
 
 if TYPE_CHECKING:
     from femubench import Measurement, Model
@@ -105,7 +105,7 @@ def model_of(variables: Variables, path: Path) -> Model:
         return matrix_model(
             variables[mass],
             variables[stiffness],
-            nodes=None if nodes is None else _words(nodes),
+            nodes=None if nodes is None else words_of(nodes),
             directions=None if along is None else _directions(along, path),
             xyz=None if xyz is None else np.asarray(xyz, dtype=float),
             groups={group: variables[name] for group, name in groups.items()},
@@ -116,16 +116,8 @@ def model_of(variables: Variables, path: Path) -> Model:
         ) from None
 
 
-def _words(column: Any) -> list[str]:  # noqa: ANN401 - numbers or words
-    values = np.asarray(column).reshape(-1)
-    if values.dtype.kind == "f" and np.isfinite(values).all() and (values % 1 == 0).all():
-        values = values.astype(np.int64)
-    texts = [v.decode("utf-8", "replace") if isinstance(v, bytes) else str(v) for v in values]
-    return [text.strip() for text in texts]
-
-
 def _directions(column: Any, path: Path) -> tuple[str, ...]:  # noqa: ANN401
-    words = _words(column)
+    words = words_of(column)
     if all(word.isdigit() and len(word) < 9 for word in words):
         return directions([int(word) for word in words], path)
     for word in words:

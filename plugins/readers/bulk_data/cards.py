@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import re
 from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from femubench import InputError
 
@@ -28,6 +29,8 @@ _KEYWORD = re.compile(r"\*[A-Za-z]{3,}")  # of Abaqus and CalculiX; in Nastran a
 _ONE_SECTION = "BEGIN BULK, and all of the structure in it"
 _INCLUDE = re.compile(r"""\s*INCLUDE\s*['"]?([^'"]+?)['"]?\s*""", re.IGNORECASE)
 _CHOICE = re.compile(r"\s*(SPC|MPC)\s*=\s*(\d{1,8})\s*", re.IGNORECASE)
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +81,12 @@ class Card:
         if not 0 < found <= _HIGHEST_ID and found != default:
             raise self.error(f"{found}", f"a number from 1 to {_HIGHEST_ID}", key)
         return found
+
+    def pick(self, table: Mapping[int, T], number: int, kind: str, key: str) -> T:
+        """Return what a field of the card names by its number; raises InputError."""
+        if number not in table:
+            raise self.error(f"there is no {kind} {number}", f"the number of a {kind}", key)
+        return table[number]
 
     def real(self, number: int, key: str, default: float | None = None) -> float:
         """Return a real number such as ``1.5-3``; raises InputError."""
@@ -133,95 +142,80 @@ def _shown(text: str) -> str:
     return repr(text[:40]) if text else "blank"
 
 
-@dataclass
 class Deck:
     """All cards of a file and of what it includes.
 
+    `lines` are those of every file, with their ends, byte for byte; `cards` are in their order;
+    `end` is the file and line, from 0, behind the last card: of ``ENDDATA`` where it is there;
+    `chosen` is the set that case control chooses, for ``SPC`` and ``MPC``; `controlled` tells
+    whether there is a case control.
+
     Arguments:
         file: the main one.
-        lines: of every file, with their ends, byte for byte.
-        cards: in their order.
-        end: file and line, from 0, behind the last card: of ``ENDDATA`` where it is there.
-        chosen: the set that case control chooses, for ``SPC`` and ``MPC``.
-        controlled: whether there is a case control.
-    """
-
-    file: Path
-    lines: dict[Path, list[bytes]] = field(default_factory=dict)
-    end: tuple[Path, int] | None = None
-    cards: list[Card] = field(default_factory=list)
-    chosen: dict[str, int] = field(default_factory=dict)
-    controlled: bool = False
-
-
-def read_deck(file: Path) -> Deck:
-    """Return the cards of a file.
 
     Raises:
         InputError: for what cannot be read, a line that is no card, a continuation of another
             card, or an included file outside of the folder.
     """
-    return _Reading(file).deck
-
-
-class _Reading:
-    """Collects cards file by file."""
 
     def __init__(self, file: Path) -> None:
-        self.deck = Deck(file)
-        self.left, self.lines_left = LARGEST * 2**20, _MOST_LINES
-        lines = self.load(file)
-        start = self.control(lines)
-        self.bulk(file, lines, start)
+        self.file, self.controlled = file, False
+        self.lines: dict[Path, list[bytes]] = {}
+        self.end: tuple[Path, int] | None = None
+        self.cards: list[Card] = []
+        self.chosen: dict[str, int] = {}
+        self._left, self._lines_left = LARGEST * 2**20, _MOST_LINES
+        lines = self._load(file)
+        self._bulk(file, lines, self._control(lines))
 
-    def load(self, file: Path) -> list[bytes]:
+    def _load(self, file: Path) -> list[bytes]:
         """Return the lines of a file with their ends."""
-        if file in self.deck.lines or len(self.deck.lines) >= _MOST_FILES:
-            what = "is included twice" if file in self.deck.lines else "one file too many"
+        if file in self.lines or len(self.lines) >= _MOST_FILES:
+            what = "is included twice" if file in self.lines else "one file too many"
             raise InputError(what, file=file, expected=f"at most {_MOST_FILES}, each once")
         try:
             with file.open("rb") as stream:
-                content = stream.read(self.left + 1)
+                content = stream.read(self._left + 1)
         except OSError as error:
             raise InputError(f"cannot be read: {error.strerror}", file=file) from None
-        self.left -= len(content)
-        if self.left < 0:
+        self._left -= len(content)
+        if self._left < 0:
             expected = f"at most {LARGEST} MiB with all that is included"
             raise InputError("file is too large", file=file, expected=expected)
         if b"\0" in content:
             raise InputError("not a text: a NUL byte", file=file, expected="bulk data")
-        self.lines_left -= len(_ENDS.findall(content))
-        if self.lines_left < 0:
+        self._lines_left -= len(_ENDS.findall(content))
+        if self._lines_left < 0:
             what, expected = "file has too many lines", f"at most {_MOST_LINES} with all included"
             raise InputError(what, file=file, expected=expected)
-        self.deck.lines[file] = content.splitlines(keepends=True)
-        return self.deck.lines[file]
+        self.lines[file] = content.splitlines(keepends=True)
+        return self.lines[file]
 
-    def control(self, lines: list[bytes]) -> int:
+    def _control(self, lines: list[bytes]) -> int:
         """Return where bulk data start, and keep which constraints case control chooses."""
         begin = next((i for i, line in enumerate(lines) if _BEGIN.match(_text(line))), None)
         if begin is None:
             control = [i for i, line in enumerate(lines) if _text(line).strip().upper() == "CEND"]
             if control:
                 what, line = "case control without bulk data", control[0] + 1
-                raise InputError(what, file=self.deck.file, line=line, expected="BEGIN BULK")
+                raise InputError(what, file=self.file, line=line, expected="BEGIN BULK")
             return 0
         if not _BULK.fullmatch(_text(lines[begin])):
-            raise _section(self.deck.file, begin + 1, _text(lines[begin]))
-        self.deck.controlled = True
+            raise _section(self.file, begin + 1, _text(lines[begin]))
+        self.controlled = True
         for i in range(begin):
             if found := _CHOICE.fullmatch(_text(lines[i])):
                 word, number = found[1].upper(), int(found[2])
-                if self.deck.chosen.setdefault(word, number) != number:
+                if self.chosen.setdefault(word, number) != number:
                     what = f"subcases choose different sets of {word}"
-                    raise InputError(what, file=self.deck.file, line=i + 1, expected="one set")
+                    raise InputError(what, file=self.file, line=i + 1, expected="one set")
         return begin + 1
 
-    def bulk(self, file: Path, lines: list[bytes], start: int) -> None:
+    def _bulk(self, file: Path, lines: list[bytes], start: int) -> None:
         """Collect the cards of one file from a line on."""
         open_card: _Rows | None = None
         for i in range(start, len(lines)):
-            if self.deck.end is not None:
+            if self.end is not None:
                 break
             text = _text(lines[i])
             if not text.strip():
@@ -231,24 +225,24 @@ class _Reading:
             found = _INCLUDE.fullmatch(text)
             words = text.split(maxsplit=1)
             if not found and words[0].upper() != "ENDDATA":
-                open_card = self.line(file, i, text, open_card)
+                open_card = self._line(file, i, text, open_card)
                 continue
-            self.close(open_card)
+            self._close(open_card)
             open_card = None
             if found is None:
-                self.deck.end = file, i
+                self.end = file, i
                 return
-            included = _inside(self.deck.file, file, found[1], i + 1)
-            self.bulk(included, self.load(included), 0)
-        self.close(open_card)
+            included = _inside(self.file, file, found[1], i + 1)
+            self._bulk(included, self._load(included), 0)
+        self._close(open_card)
 
-    def line(self, file: Path, i: int, text: str, card: _Rows | None) -> _Rows:
+    def _line(self, file: Path, i: int, text: str, card: _Rows | None) -> _Rows:
         """Take up one line; return the card that the next line may continue."""
-        if card is None and not self.deck.cards:
+        if card is None and not self.cards:
             _check_language(text, file, i + 1)
         line = _split(text, file, i + 1)
         if not line.continues:
-            self.close(card)
+            self._close(card)
             return _Rows(file, i, line)
         if card is None:
             expected = "a card that it continues"
@@ -256,9 +250,9 @@ class _Reading:
         card.add(i, line)
         return card
 
-    def close(self, card: _Rows | None) -> None:
+    def _close(self, card: _Rows | None) -> None:
         if card is not None:
-            self.deck.cards.append(card.card())
+            self.cards.append(card.card())
 
 
 def _text(line: bytes) -> str:

@@ -98,10 +98,7 @@ def bar_of(card: Card, materials: Mapping[int, Card]) -> Bar:
     Raises:
         InputError: for constants that no bar has, or that are not read.
     """
-    number = card.id(2, "MID")
-    material = materials.get(number)
-    if material is None:
-        raise card.error(f"there is no MAT1 {number}", "the number of a MAT1", "MID")
+    material = card.pick(materials, card.id(2, "MID"), "MAT1", "MID")
     read = {"PBAR": _pbar, "PBARL": _pbarl, "PBEAM": _pbeam, "PROD": _prod}[card.name]
     E, G, nu = (material.real(i, key, 0.0) for i, key in ((2, "E"), (3, "G"), (4, "NU")))
     if not material.text(2):

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from femubench import InputError, Model
-from femubench.plugins.readers.bulk_data.cards import read_deck
+from femubench.plugins.readers.bulk_data.cards import Deck
 from femubench.plugins.readers.bulk_data.structure import BulkFrame, grids_of
 from femubench.plugins.readers.bulk_data.writing import write_cards
 
@@ -31,7 +31,7 @@ class BulkDataReader:
         Raises:
             InputError: at the line of the first card that is wrong or is not read.
         """
-        return BulkFrame(read_deck(path)).model()
+        return BulkFrame(Deck(path)).model()
 
     def read_remarks(self, path: Path) -> tuple[str, ...]:
         """Return what the model leaves out or takes otherwise, one sentence each.
@@ -39,18 +39,18 @@ class BulkDataReader:
         Raises:
             InputError: as `read_model`.
         """
-        reading = BulkFrame(read_deck(path))
+        reading = BulkFrame(Deck(path))
         reading.frame()
         return reading.remarks()
 
     def read_nodes(self, path: Path) -> dict[str, tuple[float, float, float]]:
         """Return where the grids are, whatever the elements are; raises InputError."""
-        grids = grids_of(read_deck(path)).values()
+        grids = grids_of(Deck(path)).values()
         return {g.name: (float(g.xyz[0]), float(g.xyz[1]), float(g.xyz[2])) for g in grids}
 
     def model_files(self, path: Path) -> tuple[Path, ...]:
         """Return the files that a file includes; raises InputError."""
-        return tuple(file for file in read_deck(path).lines if file != path)
+        return tuple(file for file in Deck(path).lines if file != path)
 
     def write_model(self, model: Model, path: Path, original: Path) -> None:
         """Write an updated frame: other property and material cards, all else byte for byte.

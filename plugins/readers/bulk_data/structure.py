@@ -30,8 +30,8 @@ from femubench.fem import (
 from femubench.plugins.readers.bulk_data.cards import Card, Deck
 from femubench.plugins.readers.bulk_data.properties import Bar, bar_of
 from femubench.plugins.readers.bulk_data.systems import KINDS, Systems
+from femubench.plugins.readers.reading import DIRECTIONS
 
-DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 PROPERTIES = ("PBAR", "PBARL", "PBEAM", "PROD")
 _BARS = ("CBAR", "CBEAM")
 ELEMENTS = (*_BARS, "CROD", "CELAS1", "CELAS2", "CONM2", "RBE2")
@@ -252,9 +252,7 @@ class BulkFrame:
         return self._known(card, card.id(number, key), key)
 
     def _known(self, card: Card, number: int, key: str) -> GridPoint:
-        grid = self.grids.get(number)
-        if grid is None:
-            raise card.error(f"there is no GRID {number}", "the number of a GRID", key)
+        grid = card.pick(self.grids, number, "GRID", key)
         self._joint(grid.name, grid.xyz)
         return grid
 
@@ -309,10 +307,8 @@ class BulkFrame:
         first = ends[0]
         source = card if usual is None or any(card.text(i) for i in (5, 6, 7)) else usual
         if source.is_integer(5) and not source.text(6) and not source.text(7):
-            number = source.id(5, "G0")
-            if number not in self.grids:
-                raise card.error(f"there is no GRID {number}", "the number of a GRID", "G0")
-            v = np.asarray(self.grids[number].xyz - first.xyz)
+            turn = card.pick(self.grids, source.id(5, "G0"), "GRID", "G0")
+            v = np.asarray(turn.xyz - first.xyz)
         else:
             vector = np.array(source.vector(5, "X"))
             if not vector.any():
@@ -394,11 +390,11 @@ class BulkFrame:
         return member
 
     def _spring(self, card: Card) -> None:
-        direct = card.name == "CELAS2"
-        number = 0 if direct else card.id(2, "PID", card.id(1, "EID"))
-        if not direct and number not in self.stiffnesses:
-            raise card.error(f"there is no PELAS {number}", "the number of a PELAS", "PID")
-        stiffness = card.real(2, "K") if direct else self.stiffnesses[number]
+        if card.name == "CELAS2":
+            stiffness = card.real(2, "K")
+        else:
+            number = card.id(2, "PID", card.id(1, "EID"))
+            stiffness = card.pick(self.stiffnesses, number, "PELAS", "PID")
         if stiffness < 0.0:
             raise card.error(f"{stiffness:g}", "a stiffness >= 0", "K")
         ends = []
@@ -524,9 +520,7 @@ class BulkFrame:
                         raise card.error("a displacement that is not 0", "a grid that is held", "D")
                     pairs = [(card.id(i, "G"), card.components(i + 1, "C")) for i in rows]
                 for number, components in pairs:
-                    if number not in self.grids:
-                        raise card.error(f"there is no GRID {number}", "the number of a GRID", "G")
-                    yield self.grids[number], components, card
+                    yield card.pick(self.grids, number, "GRID", "G"), components, card
 
     def _check_held(self) -> None:
         """Check that every joint is part of the structure; hold rotations that nothing resists."""

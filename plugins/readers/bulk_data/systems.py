@@ -3,68 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from femubench.fem import FloatArray
+from femubench.plugins.readers.axes import BASIC, Kind, System
 from femubench.plugins.readers.bulk_data.cards import Card
 
 _DEEPEST = 50  # systems one in another
-Kind = Literal["R", "C", "S"]  # the last letter of a card
-
-
-@dataclass(frozen=True)
-class System:
-    """A coordinate system: its origin, its axes as rows, and what its coordinates are.
-
-    Arguments:
-        kind: R for x, y, z; C for radius, angle about z, z; S for radius, angle from z, angle
-            about z.
-    """
-
-    origin: FloatArray
-    axes: FloatArray
-    kind: Kind = "R"
-
-    def point(self, coordinates: FloatArray) -> FloatArray:
-        """Return where a point lies in basic coordinates, (3,); angles are in degrees."""
-        local = coordinates
-        if self.kind == "C":
-            radius, around, z = coordinates
-            local = np.array([*(radius * _circle(around)), z])
-        elif self.kind == "S":
-            radius, down, around = coordinates
-            z, beside = radius * _circle(down)
-            local = np.array([*(beside * _circle(around)), z])
-        return np.asarray(self.origin + local @ self.axes)
-
-    def axes_at(self, point: FloatArray) -> FloatArray:
-        """Return the axes of displacements at a point (basic coordinates), as rows, (3, 3).
-
-        On the axis of a system that is not rectangular, the point counts as beside it along x.
-        """
-        if self.kind == "R":
-            return self.axes
-        x, y, z = self.axes @ (point - self.origin)
-        beside = float(np.hypot(x, y))
-        c, s = (x / beside, y / beside) if beside > 0.0 else (1.0, 0.0)
-        turned = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        if self.kind == "S":
-            radius = float(np.hypot(beside, z))
-            up, out = (z / radius, beside / radius) if radius > 0.0 else (1.0, 0.0)
-            along, across, pole = turned
-            turned = np.array([out * along + up * pole, up * along - out * pole, across])
-        return np.asarray(turned @ self.axes)
-
-
-def _circle(degrees: float) -> FloatArray:
-    angle = np.radians(degrees)
-    return np.array([np.cos(angle), np.sin(angle)])
-
-
-BASIC = System(np.zeros(3), np.eye(3))
 _BY_GRIDS, _BY_POINTS = ("CORD1R", "CORD1C", "CORD1S"), ("CORD2R", "CORD2C", "CORD2S")
 KINDS = (*_BY_GRIDS, *_BY_POINTS)
 
@@ -133,11 +79,9 @@ class Systems:
             return [base.point(np.array(card.vector(3 + 3 * i, k))) for i, k in enumerate("ABC")]
         found = []
         for i in (2, 3, 4):
-            number = card.id(i, f"G{i - 1}")
-            if number not in self._grids:
-                expected = "the number of a GRID"
-                raise card.error(f"there is no GRID {number}", expected, f"G{i - 1}")
-            found.append(self.place(self._grids[number], depth))
+            key = f"G{i - 1}"
+            grid = card.pick(self._grids, card.id(i, key), "GRID", key)
+            found.append(self.place(grid, depth))
         return found
 
 

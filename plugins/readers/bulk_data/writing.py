@@ -23,15 +23,15 @@ from femubench.fem import (
     SparseArray,
     Structure,
 )
-from femubench.plugins.readers.bulk_data.cards import Card, Deck, read_deck
+from femubench.plugins.readers.bulk_data.cards import Card, Deck
 from femubench.plugins.readers.bulk_data.properties import SHAPES, Bar
 from femubench.plugins.readers.bulk_data.structure import (
-    DIRECTIONS,
     ELEMENTS,
     PROPERTIES,
     BulkFrame,
     GridPoint,
 )
+from femubench.plugins.readers.reading import DIRECTIONS
 
 _SAME = 1e-12  # far below any update, above the rounding of a change of units
 _KEPT = 1e-9  # to which the matrices must be those of bars with other properties
@@ -60,7 +60,7 @@ def write_cards(model: Model, path: Path, original: Path) -> None:
     Raises:
         InputError: for what cards of properties cannot say.
     """
-    deck = read_deck(original)
+    deck = Deck(original)
     reading = BulkFrame(deck)
     nominal = reading.model().frame_structure
     if model.structure is None or model.mass_change or model.stiffness_change:
