@@ -32,11 +32,6 @@ class Outcome:
     others: tuple[Outcome, ...] = ()
 
     @property
-    def conflict(self) -> bool:
-        """Tell whether runs contradict each other."""
-        return bool(self.others)
-
-    @property
     def machines(self) -> int:
         """Return the number of different machines that agree."""
         return len({machine_of(run) for run in self.runs})

@@ -93,7 +93,7 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
         "boards": boards,
         "cases": _case_entries(submissions, ground),
         "strategies": strategies,
-        "conflicts": [_conflict(item) for item in findings if item.conflict],
+        "conflicts": [_conflict(item) for item in findings if item.others],
         "runs": runs,
         "news": news_of(strategies, runs),
     }
@@ -150,7 +150,7 @@ def _described(version: _Version, findings: Sequence[Outcome], ground: Scope) ->
         "machines": [machines[key] for key in sorted(machines)],
         "runs": [run.name for _, run in runs],
         **figures,
-        "conflicts": sum(item.conflict for item in findings),
+        "conflicts": sum(bool(item.others) for item in findings),
         "comparable": figures["covered"] > 0,
         "cases": cases,
     }
