@@ -1,6 +1,6 @@
 """The diagnosis as a step of a strategy: examine data, and what came out of it."""
 
-from femubench.core.diagnosis.diagnose import extended_by as extended_by
+from femubench.core.diagnosis.proof import extended_by as extended_by
 from femubench.core.diagnosis.tables import causes_in as causes_in
 from femubench.core.inference.examine import Examination as Examination, examine as examine
 from femubench.core.inference.posterior import Explanation as Explanation

@@ -27,25 +27,14 @@ from femubench.core.modal.pairing import LEAST_SENSORS, WINDOW, pair_measured
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block
-from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.partners import surplus_partners
 from femubench.core.score.predicted_spread import MORE, Spread
-from femubench.core.score.ranking import TIE, rank_results, score_of
+from femubench.core.score.ranking import (
+    TIE,
+    rank_results as rank_results,
+    score_of as score_of,
+)
 from femubench.core.typing import FloatArray, IntArray
-
-__all__ = [
-    "JudgedModel",
-    "Reference",
-    "frequency_error",
-    "given_errors",
-    "judge",
-    "leaderboard",
-    "predict_block",
-    "rank_results",
-    "reference_of",
-    "score_model",
-    "score_of",
-]
 
 _SAME_MOTION = 0.9  # squared cosine between a zero mode and the nominal rigid-body motions
 
