@@ -32,40 +32,29 @@ _SCALED = "section"  # the factor of sections that are given by numbers
 _Part = TypeVar("_Part", PointMass, GroundSpring)
 
 
-class StretchedStructures:
-    """The family of structures that are stretched piecewise; solids of some cases are kept."""
+def draw_stretched_case(case: Case, rng: np.random.Generator) -> Case:
+    """Return the case of a structure that is stretched piecewise; solids of some cases are kept.
 
-    name = "stretched"
+    It has other ratios of frequencies, and a drawing about as near to the truth. Where the drawing
+    tells two modes apart by chance alone, a stretch may leave one without a partner: that says
+    nothing of a strategy.
 
-    def variant(self, case: Case, rng: np.random.Generator) -> Case:
-        """Return the case of a stretched structure.
-
-        Raises:
-            NotApplicable: for a case without the file of a stretched solid, or where no stretch is
-                as hard as the case.
-            InputError: where that file cannot be read.
-        """
-        file = case.folder / FILE
-        if not file.is_file() or case.model.structure is None:
-            raise NotApplicable(f"no stretched solid of {case.name} is known")
-        found = _as_hard(case, ReducedSolid.read(file), rng)
-        content = hashlib.sha256(read_bytes(file, LARGEST)).hexdigest()
-        told = f"{case.digest} stretched by {content}"
-        return replace(found, digest=hashlib.sha256(told.encode()).hexdigest())
-
-
-def _as_hard(case: Case, solid: ReducedSolid, rng: np.random.Generator) -> Case:
-    """Return a stretched case with other ratios, and a drawing about as near to the truth.
-
-    Where the drawing tells two modes apart by chance alone, a stretch may leave one without a
-    partner: that says nothing of a strategy.
+    Raises:
+        NotApplicable: for a case without the file of a stretched solid, or where no stretch is
+            as hard as the case.
+        InputError: where that file cannot be read.
     """
-    known = nearness(case)
+    file = case.folder / FILE
+    if not file.is_file() or case.model.structure is None:
+        raise NotApplicable(f"no stretched solid of {case.name} is known")
+    solid, known = ReducedSolid.read(file), nearness(case)
     for _ in range(_MOST_DRAWS):
         found = stretched_case(case, solid, solid.drawn(rng), rng)
         shift = np.log(found.measurement.frequencies / case.measurement.frequencies)
         if float(np.std(shift)) >= _LEAST_SHIFT and is_as_near(nearness(found), known):
-            return found
+            content = hashlib.sha256(read_bytes(file, LARGEST)).hexdigest()
+            source = f"{case.digest} stretched by {content}"
+            return replace(found, digest=hashlib.sha256(source.encode()).hexdigest())
     raise NotApplicable(f"no stretch of {case.name} is as hard as it is")
 
 
