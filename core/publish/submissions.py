@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
 from femubench.core.errors import InputError
 from femubench.core.files import read_text
@@ -24,6 +24,7 @@ from femubench.core.schema.records import (
     run_from_json,
 )
 from femubench.core.schema.results import JobResult, Nominal, Run
+from femubench.core.schema.validation import validated
 from femubench.core.score.ranking import rank_results
 from femubench.core.score.scoring import frequency_error
 
@@ -187,16 +188,9 @@ def _records(results: Iterable[JobResult]) -> list[dict[str, Any]]:
 
 
 def _meta(run: Run, file: Path) -> dict[str, Any]:
-    try:
-        # Without halves of characters, which no file could hold.
-        record = _Meta.model_validate(
-            json.loads(json.dumps(run.meta, ensure_ascii=False).encode("utf-8", "replace"))
-        )
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = ".".join(["meta", *map(str, first["loc"])])
-        raise InputError(first["msg"], file=file, key=key) from error
-    data: dict[str, Any] = record.model_dump()
+    # Without halves of characters, which no file could hold.
+    whole = json.loads(json.dumps(run.meta, ensure_ascii=False).encode("utf-8", "replace"))
+    data: dict[str, Any] = validated(_Meta, whole, file, key="meta").model_dump()
     for name in ("baseline", "structures", "classes", "about"):
         if not data[name]:  # as in what was published before there was one
             del data[name]

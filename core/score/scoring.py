@@ -234,7 +234,7 @@ def judge(
     modes = _modes_for(model, (case.measurement,))
     negative = int(np.count_nonzero(modes.eigenvalues < -reference.zero))
     blocks, choices = _blocks(case, model, modes, spread)
-    surplus = surplus_partners(choices, reference.choices)
+    surplus, reason = surplus_partners(choices, reference.choices)
     # Of the rigid-body motions that are kept the spaces are compared, not the modes: among several
     # zero modes the eigenvectors are arbitrary.
     still = modes.shapes[:, np.abs(modes.eigenvalues) <= reference.zero]
@@ -249,7 +249,7 @@ def judge(
         basis = still @ (turn[:, keep] / np.sqrt(values[keep]))
         cosines = la.svdvals(rigid.T @ (mass @ basis))
         kept = int(np.count_nonzero(np.square(cosines) > _SAME_MOTION))
-    return JudgedModel(blocks, kept, negative, surplus.count, surplus.reason)
+    return JudgedModel(blocks, kept, negative, surplus, reason)
 
 
 def _modes_for(model: Model, measurements: Sequence[Measurement]) -> Modes:
