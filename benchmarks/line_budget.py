@@ -49,7 +49,7 @@ BUDGETS = {
     "reports": 3_720,
     "papers": 3_370,
     "scenarios": 780,
-    "femubench": 610,
+    "femubench": 580,
     "tests": 49_545,
     "truths": 8_035,
     "benchmarks": 5_860,
