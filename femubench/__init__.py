@@ -37,61 +37,13 @@ import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__all__ = [
-    "Case",
-    "Challenge",
-    "Diagnosis",
-    "Diverged",
-    "FemubenchError",
-    "Identification",
-    "InputError",
-    "Measurement",
-    "Model",
-    "Modes",
-    "NotApplicable",
-    "ParameterEstimate",
-    "PluginError",
-    "Reader",
-    "Run",
-    "RunOptions",
-    "Scenario",
-    "Sensors",
-    "Strategy",
-    "StrategyFailure",
-    "UpdateResult",
-    "Where",
-    "__version__",
-    "cases",
-    "challenge",
-    "check",
-    "compare",
-    "diagnose",
-    "effects",
-    "hookimpl",
-    "identify",
-    "init_case",
-    "new_plugin",
-    "publish",
-    "rank",
-    "read_case",
-    "read_model",
-    "read_run",
-    "report",
-    "reproduce",
-    "score_challenge",
-    "solve_modes",
-    "strategies",
-    "study",
-    "write_model",
-]
-
 if not os.path.isdir(os.path.join(os.path.dirname(__file__), "core")):
     raise ImportError(
         "femubench/core is no link to the folder core: clone once more with "
         "`git clone -c core.symlinks=true` (on Windows, in developer mode)"
     )
 
-from femubench.core.version import __version__
+from femubench.core.version import __version__ as __version__
 
 # Module -> the names that it gives.
 _NAMES = {
@@ -123,39 +75,57 @@ _NAMES = {
     "femubench.core.update.strategy": "ParameterEstimate Strategy UpdateResult",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
+__all__ = sorted(["__version__", *_HOME])
 
 if TYPE_CHECKING:
-    from femubench.core.case.case import Case
-    from femubench.core.diagnosis.result import Diagnosis
+    from femubench.core.case.case import Case as Case
+    from femubench.core.diagnosis.result import Diagnosis as Diagnosis
     from femubench.core.errors import (
-        Diverged,
-        FemubenchError,
-        InputError,
-        NotApplicable,
-        PluginError,
-        StrategyFailure,
+        Diverged as Diverged,
+        FemubenchError as FemubenchError,
+        InputError as InputError,
+        NotApplicable as NotApplicable,
+        PluginError as PluginError,
+        StrategyFailure as StrategyFailure,
     )
-    from femubench.core.fem.model import Model
-    from femubench.core.fem.sensors import Sensors
-    from femubench.core.identify.identification import Identification
-    from femubench.core.library.cases import cases, effects, read_case, strategies
-    from femubench.core.library.challenge import Challenge, challenge, score_challenge
-    from femubench.core.library.compare import compare
-    from femubench.core.library.diagnose import diagnose
-    from femubench.core.library.identify import identify
-    from femubench.core.library.models import read_model, write_model
-    from femubench.core.library.plugins import check, init_case, new_plugin
-    from femubench.core.library.publish import publish
-    from femubench.core.library.rank import Run, rank, read_run
-    from femubench.core.library.report import report
-    from femubench.core.library.reproduce import reproduce
-    from femubench.core.library.study import study
-    from femubench.core.modal.eigen import Modes, solve_modes
-    from femubench.core.modal.measurement import Measurement
-    from femubench.core.plugin.markers import hookimpl
-    from femubench.core.roles import Reader, Scenario
-    from femubench.core.schema.run_options import RunOptions, Where
-    from femubench.core.update.strategy import ParameterEstimate, Strategy, UpdateResult
+    from femubench.core.fem.model import Model as Model
+    from femubench.core.fem.sensors import Sensors as Sensors
+    from femubench.core.identify.identification import Identification as Identification
+    from femubench.core.library.cases import (
+        cases as cases,
+        effects as effects,
+        read_case as read_case,
+        strategies as strategies,
+    )
+    from femubench.core.library.challenge import (
+        Challenge as Challenge,
+        challenge as challenge,
+        score_challenge as score_challenge,
+    )
+    from femubench.core.library.compare import compare as compare
+    from femubench.core.library.diagnose import diagnose as diagnose
+    from femubench.core.library.identify import identify as identify
+    from femubench.core.library.models import read_model as read_model, write_model as write_model
+    from femubench.core.library.plugins import (
+        check as check,
+        init_case as init_case,
+        new_plugin as new_plugin,
+    )
+    from femubench.core.library.publish import publish as publish
+    from femubench.core.library.rank import Run as Run, rank as rank, read_run as read_run
+    from femubench.core.library.report import report as report
+    from femubench.core.library.reproduce import reproduce as reproduce
+    from femubench.core.library.study import study as study
+    from femubench.core.modal.eigen import Modes as Modes, solve_modes as solve_modes
+    from femubench.core.modal.measurement import Measurement as Measurement
+    from femubench.core.plugin.markers import hookimpl as hookimpl
+    from femubench.core.roles import Reader as Reader, Scenario as Scenario
+    from femubench.core.schema.run_options import RunOptions as RunOptions, Where as Where
+    from femubench.core.update.strategy import (
+        ParameterEstimate as ParameterEstimate,
+        Strategy as Strategy,
+        UpdateResult as UpdateResult,
+    )
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - one door for every name

@@ -1,152 +1,88 @@
 """What an author of an effect needs: places, parameters, the change of mass and stiffness."""
 
-from femubench.core.change.change import Change, proportional
-from femubench.core.change.interpolation import barycentric, chebyshev_nodes
-from femubench.core.change.parameter import Parameter
+from femubench.core.change.change import Change as Change, proportional as proportional
+from femubench.core.change.interpolation import (
+    barycentric as barycentric,
+    chebyshev_nodes as chebyshev_nodes,
+)
+from femubench.core.change.parameter import Parameter as Parameter
 from femubench.core.change.terms import (
-    ElementOperator,
-    MatrixOperator,
-    Operator,
-    RowOperator,
-    Term,
-    sparse_term,
+    ElementOperator as ElementOperator,
+    MatrixOperator as MatrixOperator,
+    Operator as Operator,
+    RowOperator as RowOperator,
+    Term as Term,
+    sparse_term as sparse_term,
 )
 from femubench.core.effect.attachments import (
-    directed_places,
-    directed_point,
-    elastic_band,
-    elongation_row,
-    free_translations,
-    mass_term,
-    point_in,
-    point_motion,
-    total_mass,
-    translation_rows,
-    with_extra,
+    directed_places as directed_places,
+    directed_point as directed_point,
+    elastic_band as elastic_band,
+    elongation_row as elongation_row,
+    free_translations as free_translations,
+    mass_term as mass_term,
+    point_in as point_in,
+    point_motion as point_motion,
+    total_mass as total_mass,
+    translation_rows as translation_rows,
+    with_extra as with_extra,
 )
 from femubench.core.effect.flexible_ends import (
-    end_arm,
-    end_room,
-    end_stiffness,
-    flexible_ends_change,
-    free_arm_change,
-    rate_nodes,
-    softened_ends,
+    end_arm as end_arm,
+    end_room as end_room,
+    end_stiffness as end_stiffness,
+    flexible_ends_change as flexible_ends_change,
+    free_arm_change as free_arm_change,
+    rate_nodes as rate_nodes,
+    softened_ends as softened_ends,
 )
-from femubench.core.effect.flexible_supports import flexible_supports_change, softened_supports
-from femubench.core.effect.frame_effect import FrameEffect
+from femubench.core.effect.flexible_supports import (
+    flexible_supports_change as flexible_supports_change,
+    softened_supports as softened_supports,
+)
+from femubench.core.effect.frame_effect import FrameEffect as FrameEffect
 from femubench.core.effect.interfaces import (
-    facing_nodes,
-    interface_directions,
-    interface_places,
-    node_pairs,
+    facing_nodes as facing_nodes,
+    interface_directions as interface_directions,
+    interface_places as interface_places,
+    node_pairs as node_pairs,
 )
 from femubench.core.effect.places import (
-    APART,
-    FREE,
-    bare_place,
-    branch_places,
-    element_labels,
-    elements_of,
-    end_places,
-    ends_of,
-    joint_types,
-    joints_of,
-    joints_with_members,
-    member_labels,
-    member_length,
-    members_at,
-    members_of,
-    pair_of,
-    point_of,
-    point_places,
-    set_places,
-    split_direction,
-    support_places,
-    supports_of,
-    type_place,
-    type_places,
+    APART as APART,
+    FREE as FREE,
+    bare_place as bare_place,
+    branch_places as branch_places,
+    element_labels as element_labels,
+    elements_of as elements_of,
+    end_places as end_places,
+    ends_of as ends_of,
+    joint_types as joint_types,
+    joints_of as joints_of,
+    joints_with_members as joints_with_members,
+    member_labels as member_labels,
+    member_length as member_length,
+    members_at as members_at,
+    members_of as members_of,
+    pair_of as pair_of,
+    point_of as point_of,
+    point_places as point_places,
+    set_places as set_places,
+    split_direction as split_direction,
+    support_places as support_places,
+    supports_of as supports_of,
+    type_place as type_place,
+    type_places as type_places,
 )
-from femubench.core.effect.reading import Reading
-from femubench.core.effect.sizes import Site, Size
-from femubench.core.effect.suspect import Corrected, Suspect
-from femubench.core.effect.textbook import textbook_model, textbook_values
-from femubench.core.look.modes import Seen
-from femubench.core.modal.eigen import once_for
-from femubench.core.roles import Effect, Fault
-from femubench.core.schema.diagnosis import LookWarning
+from femubench.core.effect.reading import Reading as Reading
+from femubench.core.effect.sizes import Site as Site, Size as Size
+from femubench.core.effect.suspect import Corrected as Corrected, Suspect as Suspect
+from femubench.core.effect.textbook import (
+    textbook_model as textbook_model,
+    textbook_values as textbook_values,
+)
+from femubench.core.look.modes import Seen as Seen
+from femubench.core.modal.eigen import once_for as once_for
+from femubench.core.roles import Effect as Effect, Fault as Fault
+from femubench.core.schema.diagnosis import LookWarning as LookWarning
 
-__all__ = [
-    "APART",
-    "FREE",
-    "Change",
-    "Corrected",
-    "Effect",
-    "Parameter",
-    "ElementOperator",
-    "Fault",
-    "FrameEffect",
-    "LookWarning",
-    "MatrixOperator",
-    "Operator",
-    "Reading",
-    "RowOperator",
-    "Seen",
-    "Site",
-    "Size",
-    "Suspect",
-    "Term",
-    "bare_place",
-    "barycentric",
-    "branch_places",
-    "chebyshev_nodes",
-    "directed_places",
-    "directed_point",
-    "elastic_band",
-    "element_labels",
-    "elements_of",
-    "elongation_row",
-    "end_arm",
-    "end_places",
-    "end_room",
-    "end_stiffness",
-    "ends_of",
-    "facing_nodes",
-    "flexible_ends_change",
-    "flexible_supports_change",
-    "free_arm_change",
-    "free_translations",
-    "interface_directions",
-    "interface_places",
-    "joint_types",
-    "joints_of",
-    "joints_with_members",
-    "mass_term",
-    "member_labels",
-    "member_length",
-    "members_at",
-    "members_of",
-    "node_pairs",
-    "once_for",
-    "pair_of",
-    "point_in",
-    "point_motion",
-    "point_of",
-    "point_places",
-    "proportional",
-    "rate_nodes",
-    "set_places",
-    "softened_ends",
-    "softened_supports",
-    "sparse_term",
-    "split_direction",
-    "support_places",
-    "supports_of",
-    "textbook_model",
-    "textbook_values",
-    "total_mass",
-    "translation_rows",
-    "type_place",
-    "type_places",
-    "with_extra",
-]
+__all__ = [name for name in dir() if not name.startswith("_")]

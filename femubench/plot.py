@@ -4,54 +4,30 @@ No function touches pyplot: ``ax.get_figure().savefig("mode.svg")`` writes what 
 function raises `InputError` for what it cannot draw.
 """
 
-from femubench.core.drawing.wireframe import Wireframe, wireframe_of
-from femubench.core.plot.calibration import calibration
-from femubench.core.plot.chart import Axis, Chart, Mark, Series
-from femubench.core.plot.cost import error_against_cost
+from femubench.core.drawing.wireframe import Wireframe as Wireframe, wireframe_of as wireframe_of
+from femubench.core.plot.calibration import calibration as calibration
+from femubench.core.plot.chart import Axis as Axis, Chart as Chart, Mark as Mark, Series as Series
+from femubench.core.plot.cost import error_against_cost as error_against_cost
 from femubench.core.plot.diagnosis import (
-    MOST_ROWS,
-    ResidualDot,
-    Spot,
-    evidence,
-    residual_dots,
-    residuals,
-    strongest_places,
+    MOST_ROWS as MOST_ROWS,
+    ResidualDot as ResidualDot,
+    Spot as Spot,
+    evidence as evidence,
+    residual_dots as residual_dots,
+    residuals as residuals,
+    strongest_places as strongest_places,
 )
-from femubench.core.plot.findings import changes
-from femubench.core.plot.heat_map import heat_map
-from femubench.core.plot.identification import stabilisation, synthesis
-from femubench.core.plot.mac import mac
-from femubench.core.plot.matching import matching
-from femubench.core.plot.mode_shape import mode_shape
-from femubench.core.plot.receptance import receptance
-from femubench.core.plot.svg import svg
-from femubench.core.plot.updating import convergence, parameters
+from femubench.core.plot.findings import changes as changes
+from femubench.core.plot.heat_map import heat_map as heat_map
+from femubench.core.plot.identification import (
+    stabilisation as stabilisation,
+    synthesis as synthesis,
+)
+from femubench.core.plot.mac import mac as mac
+from femubench.core.plot.matching import matching as matching
+from femubench.core.plot.mode_shape import mode_shape as mode_shape
+from femubench.core.plot.receptance import receptance as receptance
+from femubench.core.plot.svg import svg as svg
+from femubench.core.plot.updating import convergence as convergence, parameters as parameters
 
-__all__ = [
-    "MOST_ROWS",
-    "Axis",
-    "Chart",
-    "Mark",
-    "ResidualDot",
-    "Series",
-    "Spot",
-    "Wireframe",
-    "calibration",
-    "changes",
-    "convergence",
-    "error_against_cost",
-    "evidence",
-    "heat_map",
-    "mac",
-    "matching",
-    "mode_shape",
-    "parameters",
-    "receptance",
-    "residual_dots",
-    "residuals",
-    "stabilisation",
-    "strongest_places",
-    "svg",
-    "synthesis",
-    "wireframe_of",
-]
+__all__ = [name for name in dir() if not name.startswith("_")]

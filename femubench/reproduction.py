@@ -1,46 +1,39 @@
 """What the study of a paper is made of: cells, pages, grounds, figures, verdicts."""
 
-from femubench.core.plot.figure import Bars, Curve, Curves, Figure, MatrixImage, StructureMap
-from femubench.core.reproduction.cell import Cell, Page
-from femubench.core.reproduction.convention import Choice, Convention, under
-from femubench.core.reproduction.equation import Equation
-from femubench.core.reproduction.ground import VERDICTS, Ground, Verdict
-from femubench.core.reproduction.printed_table import (
-    Entry,
-    Grid,
-    PrintedTable,
-    as_printed,
-    places_of,
+from femubench.core.plot.figure import (
+    Bars as Bars,
+    Curve as Curve,
+    Curves as Curves,
+    Figure as Figure,
+    MatrixImage as MatrixImage,
+    StructureMap as StructureMap,
 )
-from femubench.core.reproduction.study import FIGURES, Extra, Study, verdict_counts
-from femubench.core.reproduction.workbench import Workbench
-from femubench.core.roles import Paper
+from femubench.core.reproduction.cell import Cell as Cell, Page as Page
+from femubench.core.reproduction.convention import (
+    Choice as Choice,
+    Convention as Convention,
+    under as under,
+)
+from femubench.core.reproduction.equation import Equation as Equation
+from femubench.core.reproduction.ground import (
+    VERDICTS as VERDICTS,
+    Ground as Ground,
+    Verdict as Verdict,
+)
+from femubench.core.reproduction.printed_table import (
+    Entry as Entry,
+    Grid as Grid,
+    PrintedTable as PrintedTable,
+    as_printed as as_printed,
+    places_of as places_of,
+)
+from femubench.core.reproduction.study import (
+    FIGURES as FIGURES,
+    Extra as Extra,
+    Study as Study,
+    verdict_counts as verdict_counts,
+)
+from femubench.core.reproduction.workbench import Workbench as Workbench
+from femubench.core.roles import Paper as Paper
 
-__all__ = [
-    "FIGURES",
-    "VERDICTS",
-    "Bars",
-    "Cell",
-    "Choice",
-    "Convention",
-    "Curve",
-    "Curves",
-    "Entry",
-    "Equation",
-    "Extra",
-    "Figure",
-    "Grid",
-    "Ground",
-    "MatrixImage",
-    "Page",
-    "Paper",
-    "PrintedTable",
-    "StructureMap",
-    "Study",
-    "Verdict",
-    "Workbench",
-    "as_printed",
-    "places_of",
-    "under",
-    "verdict_counts",
-]
+__all__ = [name for name in dir() if not name.startswith("_")]

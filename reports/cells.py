@@ -30,7 +30,7 @@ def first_of(entries: Sequence[object], most: int) -> str:
     return ", ".join(map(plain, entries[:most])) + (f" and {more} more" if more > 0 else "")
 
 
-def joined(names: Sequence[str]) -> str:
+def join_names(names: Sequence[str]) -> str:
     """Return names as in a sentence."""
     return " and ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
 

@@ -116,7 +116,7 @@ def _sections(data: Mapping[str, Any], *, screen: bool = False) -> Iterator[Pass
         if scenario is not None:
             name = 2 * _BLANK + plain(scenario) if screen else f"{name}, {plain(scenario)}"
         cells.append([name, row["jobs"], *map(values.get, _RATIOS), values["failures"]])
-    says = (None if screen else partial(_told, key) for key in _RATIOS)
+    says = (None if screen else partial(_ratio_text, key) for key in _RATIOS)
     figures = [
         Column(key, max(len(key), 6), digits=2 if key == "seconds" else 3, say=say)
         for key, say in zip(_RATIOS, says, strict=True)
@@ -153,7 +153,7 @@ def _drawn(evidence: Sequence[Mapping[str, Any]]) -> list[Block]:
     return [Drawing("B over A", _FOREST, shown)] if shown else []
 
 
-def _told(name: str, ratio: float | None) -> str:
+def _ratio_text(name: str, ratio: float | None) -> str:
     return fixed(ratio, 2 if name == "seconds" else 3, 6) + _arrow(name, ratio)
 
 

@@ -31,10 +31,6 @@ class ModesCsvReporter(CsvReporter):
 
 def harmless_csv(frame: pd.DataFrame) -> str:
     """Return a table as CSV that no spreadsheet runs anything of."""
-    text: str = frame.map(_harmless).to_csv(index=False, lineterminator="\n")
+    safe = frame.map(lambda c: f"'{c}" if isinstance(c, str) and c.startswith(_FORMULA) else c)
+    text: str = safe.to_csv(index=False, lineterminator="\n")
     return text.rstrip("\n")
-
-
-def _harmless(cell: object) -> object:
-    """Return a cell that no spreadsheet takes for a formula; numbers stay as they are."""
-    return f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULA) else cell

@@ -35,7 +35,7 @@ def feeds_of(index: Mapping[str, Any]) -> dict[str, str]:
             "id": _name(*(item[key] for key in _ABOUT)),
             "url": home + item["page"],
             "title": headline_of(item),
-            "content_text": _told(item),
+            "content_text": _news_text(item),
             "date_published": item["when"],
         }
         for item in index["news"]
@@ -52,7 +52,7 @@ def feeds_of(index: Mapping[str, Any]) -> dict[str, str]:
     return {"feed.xml": atom, "feed.json": json.dumps(feed, indent=1) + "\n"}
 
 
-def _told(item: Mapping[str, Any]) -> str:
+def _news_text(item: Mapping[str, Any]) -> str:
     """Return version and skill of who is in the news."""
     told = f"Version {plain(item['version'])}, femubench {plain(item['femubench'])}: "
     if item["skill"] is None:

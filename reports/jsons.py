@@ -34,7 +34,10 @@ class JsonReporter:
 
     def render(self, run: Run) -> str:
         """Return strict JSON: what is not a finite number is null."""
-        plain = {**run_to_json(run), "leaderboard": board_of(run), **cells_of(run)}
+        plain = {**run_to_json(run), "leaderboard": board_of(run)}
+        if StudyAxes.asked(run) is not None:
+            cells = skill_by(run).to_dict("records")
+            plain["cells"] = [{str(name): clean(v) for name, v in row.items()} for row in cells]
         return json.dumps(plain, indent=1, allow_nan=False)
 
 
@@ -57,11 +60,3 @@ def board_of(run: Run) -> list[dict[str, Any]]:
         }
         for row in board.to_dict("records")
     ]
-
-
-def cells_of(run: Run) -> dict[str, list[dict[str, Any]]]:
-    """Return the skill of every cell of a study; nothing for another run."""
-    if StudyAxes.asked(run) is None:
-        return {}
-    rows = skill_by(run).to_dict("records")
-    return {"cells": [{str(name): clean(value) for name, value in row.items()} for row in rows]}

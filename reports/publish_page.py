@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from femubench.plot import Axis, Chart, Mark, Series
-from femubench.reports.cells import fixed, interval, joined, plain, shortened
+from femubench.reports.cells import fixed, interval, join_names, plain, shortened
 from femubench.reports.feed import feeds_of, headline_of
 from femubench.reports.svg import drawing
 from femubench.reports.templating import asset, templates
@@ -71,7 +71,7 @@ def _strategy_page(item: Data, index: Data) -> str:
     ranks = sum(row["rank"] is not None for row in index["boards"][0]["rows"])
     answer = "No rank: the latest version lacks a case of the ranking."
     if item["rank"]:
-        answer = f"Rank {item['rank']} of {ranks} with {_told_skill(latest)}."
+        answer = f"Rank {item['rank']} of {ranks} with {_skill_words(latest)}."
     return _page(
         "strategy", index, item,
         plain(item["name"]) or "a strategy without name",
@@ -86,8 +86,8 @@ def _answer(board: Data) -> Iterator[str]:
     first = [row for row in board["rows"] if row["rank"] == 1]
     others = [row for row in board["rows"] if _stand(row) in _OTHERS]
     if first:
-        who = joined([plain(row["strategy"]) for row in first])
-        yield f"{who} {'lead' if first[1:] else 'leads'} with {_told_skill(first[0])}."
+        who = join_names([plain(row["strategy"]) for row in first])
+        yield f"{who} {'lead' if first[1:] else 'leads'} with {_skill_words(first[0])}."
     else:
         yield "Nobody leads: no strategy has all cases of the ranking."
     near = [plain(row["strategy"]) for row in others if not row["below_best"]]
@@ -106,7 +106,7 @@ def _answer(board: Data) -> Iterator[str]:
     yield f"On {told} that more than half of the strategies were run on."
 
 
-def _told_skill(row: Data) -> str:
+def _skill_words(row: Data) -> str:
     sure = "" if row["low"] is None else f" (95 % interval {interval(row['low'], row['high'])})"
     return f"skill {fixed(row['skill'], 3, 7)}{sure}"
 

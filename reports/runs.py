@@ -45,8 +45,6 @@ if TYPE_CHECKING:
     from femubench import Identification
     from femubench.reproduction import Study
 
-_Row = Mapping[Any, Any]
-_Printed = Mapping[str, Mapping[int, float | None]]
 
 _FIGURES = {
     "skill": Column("skill", 5, digits=3),
@@ -98,7 +96,7 @@ class TerminalReporter:
     def render(self, run: Run) -> str:
         """Return the ranking, the failures and what the columns mean."""
         if StudyAxes.asked(run) is not None:
-            return study.study_text(run)
+            return to_terminal(study.sections_of(run))
         failed = failures(troubles(run.results))
         told = [*failed, *_notes(run)]
         return to_terminal([*_board(run), *(Passage("", [block]) for block in told)])
@@ -147,7 +145,8 @@ class MarkdownReporter:
     def render(self, run: Run) -> str:
         """Return the report."""
         if StudyAxes.asked(run) is not None:
-            return study.study_markdown(run)
+            sections = [*study.sections_of(run), study.about_axes(run)]
+            return to_markdown(sections, study.title_of(run))
         title = f"Updating strategies compared: run {run.meta.get('run', '')}".rstrip()
         return to_markdown(_document(run), title)
 
@@ -188,7 +187,7 @@ def floors_said(run: Run) -> tuple[str, str]:
     return label, f"the same but for {named}." if moved else "the same."
 
 
-def _marks(row: _Row) -> str:
+def _marks(row: Mapping[Any, Any]) -> str:
     """Return what must not be overlooked: lost physics, and jobs that the errors leave out."""
     incomplete = row["ok"] + row["not_applicable"] < row["total"]
     return ("!" if row["unphysical"] else "") + ("*" if incomplete else "")
@@ -300,7 +299,9 @@ def _document(run: Run) -> Iterator[Passage]:
         yield Passage("Strategies", [Items(list(cited.items()))])
 
 
-def _case(run: Run, case: str, others: Iterable[tuple[str, _Printed]]) -> Iterator[Block]:
+def _case(
+    run: Run, case: str, others: Iterable[tuple[str, Mapping[str, Mapping[int, float | None]]]]
+) -> Iterator[Block]:
     """Yield the frequencies of one case, a strategy a row, as the papers tabulate them.
 
     Arguments:

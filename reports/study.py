@@ -9,9 +9,7 @@ from typing import Any
 from femubench import InputError
 from femubench.reports.blocks import Block, Column, Drawing, Items, Passage, Table
 from femubench.reports.cells import NOTHING, fixed, interval, plain
-from femubench.reports.markdown import to_markdown
 from femubench.reports.summary import failures, header, lead, notes_of, troubles
-from femubench.reports.terminal import to_terminal
 from femubench.results import Run, StudyAxes, skill_by
 
 _MOST_ON_SCREEN = 60  # cells
@@ -28,29 +26,22 @@ _PICTURE = (
 )
 
 
-def study_text(run: Run) -> str:
-    """Return a study as plain text of 80 columns."""
-    return to_terminal(_sections(run))
-
-
-def study_markdown(run: Run) -> str:
-    """Return a study in GitHub's Markdown."""
-    return to_markdown([*_sections(run), _about(run)], _title(run))
-
-
 def study_html(run: Run) -> str:
     """Return a study as one HTML document that needs nothing besides itself."""
     from femubench.reports.html import to_html
 
-    title, sections = _title(run), [*_sections(run, _drawing(run)), _about(run)]
+    title = title_of(run)
+    sections = [*sections_of(run, _drawing(run)), about_axes(run)]
     return to_html(sections, title=f"femubench: {title}", heading=title)
 
 
-def _title(run: Run) -> str:
+def title_of(run: Run) -> str:
+    """Return the title of a study."""
     return plain(StudyAxes.of(run).title) or f"Study {plain(run.meta.get('run', ''))}"
 
 
-def _sections(run: Run, *drawing: Block) -> Iterator[Passage]:
+def sections_of(run: Run, *drawing: Block) -> Iterator[Passage]:
+    """Yield what every form of the report has; `drawing` where there is one."""
     known = StudyAxes.of(run)
     x, y = known.pictured
     yield Passage("", [lead(run)], area="first")
@@ -63,7 +54,8 @@ def _sections(run: Run, *drawing: Block) -> Iterator[Passage]:
         yield Passage("Notes", [Items(notes)])
 
 
-def _about(run: Run) -> Passage:
+def about_axes(run: Run) -> Passage:
+    """Return the axes with their values, and how the study was run."""
     known = StudyAxes.of(run)
     axes = [(name, ", ".join(map(StudyAxes.text_of, known.values(name)))) for name in known.names]
     return Passage("Study", [Items([*axes, *header(run)])])

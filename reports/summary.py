@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from femubench.reports.blocks import Block, Column, Table
-from femubench.reports.cells import first_of, interval, joined, plain
+from femubench.reports.cells import first_of, interval, join_names, plain
 from femubench.results import (
     JobResult,
     PairedMode,
@@ -162,7 +162,7 @@ def finding(
     first = [plain(row["strategy"]) for row in board if row["rank"] == best["rank"]]
     leads = "leads: it takes" if len(first) == 1 else "share the first rank: each takes"
     told = [
-        f"{joined(first)} {leads} away {100.0 * skill:.0f} % of the {models}' error on "
+        f"{join_names(first)} {leads} away {100.0 * skill:.0f} % of the {models}' error on "
         f"{data} (skill {skill:.3f}{sure})."
         if skill >= _SHOWN
         else f"No strategy improves on the {models} on {data}; the best, {name}, has a skill of "

@@ -23,7 +23,7 @@ def templates() -> Environment:
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-        finalize=_one_line,
+        finalize=lambda value: value if hasattr(value, "__html__") else plain(value),
     )
     room.filters.update(fixed=fixed, plain=plain, shortened=shortened, chance=chance)
     room.filters["sentence"] = sentence
@@ -34,7 +34,3 @@ def asset(name: str) -> str:
     """Return the text of a file beside the templates of pages."""
     path = files("femubench.reports").joinpath("page", "assets", name)
     return path.read_text(encoding="utf-8")
-
-
-def _one_line(value: object) -> object:
-    return value if hasattr(value, "__html__") else plain(value)

@@ -151,7 +151,7 @@ def test_a_strategy_that_changes_the_checks_in_its_process_changes_no_verdict(
     toy: type[Strategy],
 ) -> None:
     (check,) = (check for check in checks_of("strategy") if check.name == toys.FORGED[toy])
-    found = kit.judged(check, Bench(toy()))
+    found = kit.judge_check(check, Bench(toy()))
     assert found.status == "fail", found
     assert "\n" not in found.message
 
@@ -161,9 +161,9 @@ def test_a_strategy_is_checked_in_the_sandbox(tmp_path: Path) -> None:
     file = tmp_path / "held_out.csv"
     file.write_text("123.4")
     checks = {check.name: check for check in checks_of("strategy")}
-    assert kit.judged(checks["returns"], Bench(toys.Nosy(str(file)))).status == "pass"
+    assert kit.judge_check(checks["returns"], Bench(toys.Nosy(str(file)))).status == "pass"
     # What it does find is told.
-    shown = kit.judged(checks["returns"], Bench(toys.Nosy(toys.__file__)))
+    shown = kit.judge_check(checks["returns"], Bench(toys.Nosy(toys.__file__)))
     assert "Strategies that break one rule each" in shown.message
 
 
@@ -174,7 +174,7 @@ def test_a_verdict_that_is_none_is_a_failure(told: bytes, monkeypatch: pytest.Mo
 
     monkeypatch.setattr(kit, "run_apart", run_here)
     found = Bench(toys.Spring()).apart(print)
-    assert found == kit.Verdict("fail", "what its process told is no verdict")
+    assert found == kit.Verdict("fail", "what its process sent is no verdict")
 
 
 @pytest.mark.usefixtures("here")

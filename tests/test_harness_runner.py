@@ -25,7 +25,8 @@ from femubench.core.run.runner import Plan, Receivers, run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult
 from femubench.core.schema.run_options import RunOptions
-from femubench.core.score.scoring import leaderboard, reference_of, score_model
+from femubench.core.score.leaderboard import leaderboard
+from femubench.core.score.scoring import reference_of, score_model
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 from typing import Never

@@ -32,7 +32,7 @@ from femubench.core.fem.sections import (
     solid_rectangle,
 )
 from femubench.core.fem.sensors import Sensors
-from femubench.core.look.look import mesh_bias
+from femubench.core.fit.mesh_error import mesh_bias
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.typing import FloatArray

@@ -15,8 +15,7 @@ from femubench.core.fem.frame import Factor, Frame, Place, PointMass, Preload
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.structure import Structure
-from femubench.core.fit.mesh_error import refined
-from femubench.core.look.look import mesh_bias
+from femubench.core.fit.mesh_error import mesh_bias, refined
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.typing import FloatArray
 

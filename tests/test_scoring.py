@@ -18,14 +18,13 @@ from femubench.core.modal import eigen
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block, JobResult, Run, Status
-from femubench.core.score.ranking import ranked, score_of
+from femubench.core.score.leaderboard import leaderboard
+from femubench.core.score.ranking import rank_results, ranked, score_of
 from femubench.core.score.scoring import (
     Reference,
     frequency_error,
     judge,
-    leaderboard,
     predict_block,
-    rank_results,
     reference_of,
     score_model,
 )

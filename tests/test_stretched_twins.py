@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -22,8 +23,8 @@ from femubench.core.run.runner import run_jobs
 from femubench.core.run.starts import Starts
 from femubench.core.score.twin_skill import TwinSkill, twin_skills
 from femubench.core.twin.reduced_solid import ReducedSolid
-from femubench.core.twin.stretched_case import FILE, StretchedStructures, stretched_case
-from femubench.core.twin.twins import FAMILIES, SimilarStructures, TruthFamily, twin_of, twins_of
+from femubench.core.twin.stretched_case import FILE, draw_stretched_case, stretched_case
+from femubench.core.twin.twins import FAMILIES, TruthFamily, twin_of, twins_of
 from truths.affine import StretchedSolid
 from truths.drawing import case_text
 from truths.elasticity import assemble
@@ -282,10 +283,10 @@ def test_a_damaged_file_is_one_line(content: bytes, tmp_path: Path) -> None:
 
 def test_a_case_without_a_file_has_none_of_them() -> None:
     with pytest.raises(NotApplicable, match="no stretched solid"):
-        StretchedStructures().variant(toys.tiny_case(), np.random.default_rng(0))
+        draw_stretched_case(toys.tiny_case(), np.random.default_rng(0))
 
 
-def skill(families: tuple[TruthFamily, ...]) -> dict[str, TwinSkill]:
+def skill(families: Mapping[str, TruthFamily]) -> dict[str, TwinSkill]:
     """What twins of some families say of who knows ratios by heart, and of who does nothing."""
     case = builtin("stiffened-strip")
     twins = list(twins_of([case], 2, 13, families))
@@ -296,7 +297,7 @@ def skill(families: tuple[TruthFamily, ...]) -> dict[str, TwinSkill]:
 
 
 def test_who_knows_ratios_by_heart_is_marked_by_stretched_twins_alone() -> None:
-    similar, stretched_too = skill((SimilarStructures(),)), skill(FAMILIES)
+    similar, stretched_too = skill({"similar": FAMILIES["similar"]}), skill(FAMILIES)
     assert similar["ratios"].original_skill > 0.5
     assert similar["ratios"].skill == pytest.approx(similar["ratios"].original_skill, abs=1e-3)
     assert not similar["ratios"].suspicious

@@ -53,7 +53,7 @@ from femubench.core.score.scoring import judge, reference_of
 from femubench.core.score.twin_skill import twin_skills
 from femubench.core.twin.disguise import disguised
 from femubench.core.twin.similarity import Similarity, matrix_factors, similar_case, similar_frame
-from femubench.core.twin.twins import SimilarStructures, Twin, again, twin_of, twins_of
+from femubench.core.twin.twins import FAMILIES, Twin, again, twin_of, twins_of
 from femubench.core.typing import SparseArray
 from femubench.results import leaderboard
 
@@ -116,7 +116,7 @@ def builtin(name: str) -> Case:
 
 @cache
 def twin(name: str) -> Twin:
-    return twin_of(builtin(name), 1, 5, (SimilarStructures(),))
+    return twin_of(builtin(name), 1, 5, {"similar": FAMILIES["similar"]})
 
 
 def rms(case: Case) -> np.ndarray:

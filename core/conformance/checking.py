@@ -19,7 +19,7 @@ from femubench.core.conformance.kit import (
     Role,
     Status,
     Verdict,
-    judged,
+    judge_check,
     prepare,
 )
 from femubench.core.conformance.problems import UpdatingProblem
@@ -94,7 +94,7 @@ def findings(subject: Subject) -> Iterator[CheckResult]:
     if subject.role == "strategy":
         prepare(subject.checks, subject.bench)
     for check in subject.checks:
-        yield CheckResult(check, judged(check, subject.bench))
+        yield CheckResult(check, judge_check(check, subject.bench))
 
 
 def counts(found: Iterable[CheckResult]) -> dict[str, int]:

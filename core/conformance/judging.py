@@ -62,17 +62,17 @@ def judge_handed(handed: Handed) -> bytes:
     return json.dumps([faults, fingerprint(result, "the result outside")]).encode()
 
 
-def confirmed(told: Observation, ending: Ending) -> Observation:
-    """Return what a worker told of a result, with what was found outside of it.
+def confirm_observation(seen: Observation, ending: Ending) -> Observation:
+    """Return what a worker saw of a result, with what was found outside of it.
 
     Arguments:
-        told: of the strategy's worker.
+        seen: of the strategy's worker.
         ending: of `judge_handed`.
     """
     if ending.how != "answer":
         faults, prints = {_TRAVELLED: f"it cannot be judged: {ending.reason}"}, {}
     else:
         faults, prints = json.loads(ending.answer)
-    if told.faults:  # why it did not arrive has been said
+    if seen.faults:  # why it did not arrive has been said
         faults.pop(_TRAVELLED, None)
-    return replace(told, faults={**faults, **told.faults}, prints={**told.prints, **prints})
+    return replace(seen, faults={**faults, **seen.faults}, prints={**seen.prints, **prints})

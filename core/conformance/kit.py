@@ -11,16 +11,16 @@ from functools import cached_property
 from typing import Any, Literal, TypeAlias, get_args
 
 from femubench.core.conformance import SECONDS
-from femubench.core.conformance.judging import Handed, confirmed, judge_handed
+from femubench.core.conformance.judging import Handed, confirm_observation, judge_handed
 from femubench.core.conformance.problems import PLAIN, UpdatingProblem, problem
 from femubench.core.conformance.trial import (
     Observation,
     Trial,
     Want,
-    brought,
+    import_subject,
     promises_of,
+    read_observation,
     run_trial,
-    told_by,
 )
 from femubench.core.errors import harmless
 from femubench.core.plugin.foreign import is_foreign
@@ -192,19 +192,19 @@ class Bench:
             if want not in self._seen:
                 tasks[want] = run_trial, Trial(code, self._problem(want), want)
         apart = replace(self.limits, sandbox="auto")
-        told = {
-            want: told_by(want.problem, ending)
+        observed = {
+            want: read_observation(want.problem, ending)
             for want, ending in run_apart(tasks, apart, self._jobs).items()
         }
         handed = {
             want: (judge_handed, Handed(self._problem(want), answer, promises_of(strategy)))
-            for want, (seen, answer) in told.items()
+            for want, (seen, answer) in observed.items()
             for strategy in (self._strategy(want),)
             if seen.kind == "result"
         }
         judged = run_apart(handed, self.limits, self._jobs)
-        for want, (seen, _) in told.items():
-            self._seen[want] = confirmed(seen, judged[want]) if want in judged else seen
+        for want, (seen, _) in observed.items():
+            self._seen[want] = confirm_observation(seen, judged[want]) if want in judged else seen
         return [self._seen[want] for want in wants]
 
     def _unrun(self, want: Want) -> Observation | None:
@@ -242,7 +242,7 @@ class Bench:
                 return Verdict(status, harmless(str(message)[:_LONGEST]))
         except (ValueError, TypeError, RecursionError):
             pass
-        return failed("what its process told is no verdict")
+        return failed("what its process sent is no verdict")
 
 
 def run_apart(
@@ -280,7 +280,7 @@ def _judged(task: tuple[Callable[..., Verdict], bytes]) -> bytes:
     function, arguments = task
     try:
         subject, *further = pickle.loads(arguments)
-        verdict = function(brought(subject), *further)
+        verdict = function(import_subject(subject), *further)
     except BaseException as error:
         verdict = failed(f"{one_line(error)}, expected no exception")
     return json.dumps([verdict.status, verdict.message]).encode()
@@ -303,7 +303,7 @@ def picklable(bench: Bench, what: str) -> Verdict:
     return passed()
 
 
-def judged(check: Check, bench: Bench) -> Verdict:
+def judge_check(check: Check, bench: Bench) -> Verdict:
     """Return the verdict of one check."""
     if check.role == "strategy" and not check.first and bench.sound:
         return not_applicable(bench.sound)

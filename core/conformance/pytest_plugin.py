@@ -184,13 +184,13 @@ class _CheckItem(pytest.Item):
         self.check = check
 
     def runtest(self) -> None:
-        from femubench.core.conformance.kit import judged, prepare
+        from femubench.core.conformance.kit import judge_check, prepare
 
         bench = self.parent.subject.bench
         if self.check.role == "strategy":
             same = (item for item in self.session.items if isinstance(item, _CheckItem))
             prepare([item.check for item in same if item.parent is self.parent], bench)
-        verdict = judged(self.check, bench)
+        verdict = judge_check(self.check, bench)
         if verdict.status == "fail":
             raise ConformanceError(verdict.message)
         if verdict.status == "not-applicable":

@@ -105,26 +105,26 @@ def run_trial(trial: Trial) -> bytes:
         found, answer = _observe(trial)
     except Exception as error:
         found = Observation(trial.problem.name, "error", one_line(error))
-    head = _told().dump_json(found)
+    head = _adapter().dump_json(found)
     return len(head).to_bytes(_LENGTH, "big") + head + answer
 
 
 @cache
-def _told() -> TypeAdapter[Observation]:
+def _adapter() -> TypeAdapter[Observation]:
     return TypeAdapter(Observation)
 
 
-def told_by(problem: str, ending: Ending) -> tuple[Observation, bytes]:
+def read_observation(problem: str, ending: Ending) -> tuple[Observation, bytes]:
     """Return what a worker says that it saw, or how it ended, and what was handed back."""
     if ending.how != "answer":
         return Observation(problem, "stopped", ending.reason, ending.seconds), b""
     size = int.from_bytes(ending.answer[:_LENGTH], "big")
     try:
-        found = _told().validate_json(ending.answer[_LENGTH : _LENGTH + min(size, _LONGEST)])
+        found = _adapter().validate_json(ending.answer[_LENGTH : _LENGTH + min(size, _LONGEST)])
     except (ValidationError, RecursionError):
         found = None
     if found is None or found.kind == "lacking":  # what a problem lacks is not for it to say
-        return Observation(problem, "error", "what its process told is no observation"), b""
+        return Observation(problem, "error", "what its process sent is no observation"), b""
     texts: dict[str, Any] = {
         name: value and harmless(value[:_LONGEST_TEXT])
         for name in ("text", "changed", "disturbed")
@@ -132,12 +132,12 @@ def told_by(problem: str, ending: Ending) -> tuple[Observation, bytes]:
     }
     texts["faults"] = {name: harmless(text[:_LONGEST_TEXT]) for name, text in found.faults.items()}
     seconds = found.seconds if math.isfinite(found.seconds) else ending.seconds
-    told = replace(found, problem=problem, seconds=seconds, **texts)
-    return told, ending.answer[_LENGTH + size :]
+    checked = replace(found, problem=problem, seconds=seconds, **texts)
+    return checked, ending.answer[_LENGTH + size :]
 
 
 def _observe(trial: Trial) -> tuple[Observation, bytes]:
-    strategy: Strategy = brought(pickle.loads(trial.strategy))
+    strategy: Strategy = import_subject(pickle.loads(trial.strategy))
     problem = trial.problem
     # What is handed over may be spoilt; the problem itself is needed to judge the result.
     model, measurement = pickle.loads(pickle.dumps((problem.model, problem.measurement)))
@@ -146,7 +146,7 @@ def _observe(trial: Trial) -> tuple[Observation, bytes]:
     random.seed(trial.want.scramble)
     np.random.seed(trial.want.scramble)  # noqa: NPY002 - so that two runs find another state
     around = global_state()
-    found, result = _called(strategy, given, trial)
+    found, result = _call_strategy(strategy, given, trial)
     disturbed = first_difference(around, global_state())
     found = replace(found, changed=first_difference(before, _inputs(given)), disturbed=disturbed)
     if result is None:
@@ -162,7 +162,7 @@ def _observe(trial: Trial) -> tuple[Observation, bytes]:
     return found, packed(outcome, problem.model)
 
 
-def brought(subject: Any) -> Any:  # noqa: ANN401 - any role
+def import_subject(subject: Any) -> Any:  # noqa: ANN401 - any role
     """Return a subject whose code is there: in a worker that of a stranger may be imported."""
     if isinstance(subject, Variant):
         return replace(subject, base=imported(subject.base))
@@ -173,7 +173,7 @@ def _inputs(given: UpdatingProblem) -> dict[str, str]:
     return fingerprint(given.model, "model") | fingerprint(given.measurement, "measurement")
 
 
-def _called(
+def _call_strategy(
     strategy: Strategy, given: UpdatingProblem, trial: Trial
 ) -> tuple[Observation, UpdateResult | None]:
     rng = np.random.default_rng(np.random.SeedSequence([0, *given.name.encode()]))

@@ -346,6 +346,3 @@ def _error_notes(examination: Examination, leader: Explanation) -> tuple[str, ..
         "structure is a beam model but for ordinary scatter has probability "
         f"{examination.like_a_beam:.2g}.",
     )
-
-
-__all__ = ["diagnose", "extended_by"]

@@ -410,18 +410,15 @@ def _weighed(now: _Drawn, faults: Sequence[Fault], effort: Effort) -> Weighed:
             with effort.piece("typed"):
                 promises += now.typed(charge)
         with effort.piece("faults"):
-            return _likeliest(now, [*now.all_screened(data), *promises])
-
-
-def _likeliest(now: _Drawn, promises: Weighed) -> Weighed:
-    """Return those that promise something at scales of their own, likeliest first."""
-    kinds: dict[str, Weighed] = {}
-    for charge, gain in in_order(promises, lambda pair: -pair[1]):
-        kinds.setdefault(charge.fault.name, []).append((charge, gain))
-    few = [pair for kind in kinds.values() for pair in kind[: settings.of_a_kind]]
-    exact = [now.exactly(charge, gain) for charge, gain in few]
-    kept = [(c, gain) for c, gain in exact if c.reweighs or np.isfinite(gain)]
-    return in_order(kept, lambda pair: -pair[1])
+            promises = [*now.all_screened(data), *promises]
+            kinds: dict[str, Weighed] = {}
+            for charge, gain in in_order(promises, lambda pair: -pair[1]):
+                kinds.setdefault(charge.fault.name, []).append((charge, gain))
+            few = [pair for kind in kinds.values() for pair in kind[: settings.of_a_kind]]
+            # Those that promise something at scales of their own, likeliest first.
+            exact = [now.exactly(charge, gain) for charge, gain in few]
+            kept = [(c, gain) for c, gain in exact if c.reweighs or np.isfinite(gain)]
+            return in_order(kept, lambda pair: -pair[1])
 
 
 def _possible(

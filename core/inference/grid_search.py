@@ -408,6 +408,3 @@ def _solve(
     turned = np.swapaxes(inverse, 1, 2)
     values, vectors = np.linalg.eigh(inverse @ stiffness @ turned)
     return values[:, :count], turned @ vectors[:, :, :count]
-
-
-__all__ = ["Screened", "likely", "screen"]

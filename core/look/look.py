@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from femubench.core.fem.model import Model
-from femubench.core.fit.mesh_error import mesh_bias
 from femubench.core.look.freedom import look_at_freedom
 from femubench.core.look.mesh import look_at_mesh
 from femubench.core.look.modes import Seen
@@ -48,6 +47,3 @@ def look(
     if band is not None:
         found += look_at_band(seen, band)
     return tuple(found)
-
-
-__all__ = ["look", "mesh_bias"]

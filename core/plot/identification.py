@@ -81,7 +81,12 @@ def stabilisation(found: Identification, *, ax: Axes | None = None) -> Axes:
 def _background(found: Identification, ax: Axes) -> None:
     """Draw the level of what was measured, on a scale of its own."""
     if found.measured is not None:
-        hz, levels = found.measured.frequencies, _mean_level(found.measured.values)
+        hz, values = found.measured.frequencies, found.measured.values
+        # The mean over all channels, each at a level of one.
+        power = np.square(np.abs(values)).reshape(len(values), -1)
+        power = power[:, np.isfinite(power).all(axis=0)]
+        mean = power.mean(axis=0)
+        levels = _decibels(np.sqrt((power[:, mean > 0.0] / mean[mean > 0.0]).mean(axis=1)))
     elif found.spectrum is not None:
         hz, levels = found.spectrum.T
     else:
@@ -91,14 +96,6 @@ def _background(found: Identification, ax: Axes) -> None:
     behind.set_axis_off()
     ax.set_zorder(behind.get_zorder() + 1)
     ax.patch.set_visible(False)
-
-
-def _mean_level(values: FloatArray) -> FloatArray:
-    """Return the mean over all channels in dB, each at a level of one; (n_f,)."""
-    power = np.square(np.abs(values)).reshape(len(values), -1)
-    power = power[:, np.isfinite(power).all(axis=0)]
-    mean = power.mean(axis=0)
-    return _decibels(np.sqrt((power[:, mean > 0.0] / mean[mean > 0.0]).mean(axis=1)))
 
 
 def _decibels(values: FloatArray) -> FloatArray:

@@ -32,11 +32,6 @@ class Outcome:
     others: tuple[Outcome, ...] = ()
 
     @property
-    def conflict(self) -> bool:
-        """Tell whether runs contradict each other."""
-        return bool(self.others)
-
-    @property
     def machines(self) -> int:
         """Return the number of different machines that agree."""
         return len({machine_of(run) for run in self.runs})
@@ -66,7 +61,7 @@ def findings_of(submissions: Iterable[Submission], references: References) -> li
                     break
             else:
                 listed.append(Outcome(result, (item,)))
-    return [_settled(groups[job], references) for job in sorted(groups)]
+    return [_settle_outcomes(groups[job], references) for job in sorted(groups)]
 
 
 def agree(first: JobResult, second: JobResult) -> bool:
@@ -86,7 +81,7 @@ def machine_of(item: Submission) -> tuple[str, str, str]:
     return str(machine["cpu"]), str(machine["blas"]), str(machine["platform"])
 
 
-def _settled(found: Sequence[Outcome], references: References) -> Outcome:
+def _settle_outcomes(found: Sequence[Outcome], references: References) -> Outcome:
     sound = [item for item in found if item.result.status not in _NO_RESULT] or list(found)
     if all(item.result.status in _NO_RESULT for item in found):
         sound = [replace(found[0], runs=tuple(run for item in found for run in item.runs))]

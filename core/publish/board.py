@@ -64,8 +64,8 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
     # The version with the earliest last run comes first.
     versions = {version: groups[version] for version in sorted(groups, key=age)}
     latest = {version.strategy: version for version in versions}  # the last one stays
-    ranked = _ranked(latest.values(), versions, current)
-    told = _told(submissions, "structures"), _told(submissions, "classes")
+    ranked = _ranked_cases(latest.values(), versions, current)
+    told = _stated_in_runs(submissions, "structures"), _stated_in_runs(submissions, "classes")
     ground = Scope(ranked, current, references, *told)
     runs = [
         {
@@ -80,7 +80,7 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
         }
         for item in submissions
     ]
-    described = {v: _described(v, listed, ground) for v, listed in versions.items()}
+    described = {v: _describe(v, listed, ground) for v, listed in versions.items()}
     entrants = {name: versions[version] for name, version in latest.items()}
     boards = [
         {"class": name, "page": f"classes/{slug(name)}.html" if name else "index.html", **board}
@@ -93,7 +93,7 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
         "boards": boards,
         "cases": _case_entries(submissions, ground),
         "strategies": strategies,
-        "conflicts": [_conflict(item) for item in findings if item.conflict],
+        "conflicts": [_conflict(item) for item in findings if item.others],
         "runs": runs,
         "news": news_of(strategies, runs),
     }
@@ -105,7 +105,7 @@ def _cases(item: Submission) -> dict[str, dict[str, Any]]:
     return {name: case for name, case in item.run.meta["cases"].items() if name in used}
 
 
-def _ranked(
+def _ranked_cases(
     latest: Iterable[_Version],
     versions: Mapping[_Version, Sequence[Outcome]],
     current: Mapping[str, str],
@@ -123,7 +123,7 @@ def _ranked(
     return tuple(sorted(case for case, count in counts.items() if 2 * count > len(listed)))
 
 
-def _described(version: _Version, findings: Sequence[Outcome], ground: Scope) -> dict[str, Any]:
+def _describe(version: _Version, findings: Sequence[Outcome], ground: Scope) -> dict[str, Any]:
     """Return a version with its results on every case and what they come to."""
     groups: dict[tuple[str, str], list[Outcome]] = {}
     for item in findings:
@@ -150,7 +150,7 @@ def _described(version: _Version, findings: Sequence[Outcome], ground: Scope) ->
         "machines": [machines[key] for key in sorted(machines)],
         "runs": [run.name for _, run in runs],
         **figures,
-        "conflicts": sum(item.conflict for item in findings),
+        "conflicts": sum(bool(item.others) for item in findings),
         "comparable": figures["covered"] > 0,
         "cases": cases,
     }
@@ -171,7 +171,7 @@ def _marks(strategy: str, findings: Iterable[Outcome]) -> list[str]:
     return marks
 
 
-def _told(submissions: Iterable[Submission], what: str) -> dict[str, Any]:
+def _stated_in_runs(submissions: Iterable[Submission], what: str) -> dict[str, Any]:
     """Return what the runs say of their cases; the first that says something counts."""
     found: dict[str, Any] = {}
     for item in submissions:

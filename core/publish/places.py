@@ -151,8 +151,11 @@ def skill_on(ground: Scope, counted: Sequence[Mapping[str, Any]]) -> dict[str, A
         "skill": None if left is None else 1.0 - left,
         "low": None if high is None else 1.0 - high,
         "high": None if low is None else 1.0 - low,
-        **{f"{name}_percent": _median(counted, f"{name}_percent") for name in BLOCKS},
-        "seconds": _median([c for c in counted if c["status"] == "ok"], "seconds"),
+        **{
+            name: _median(case[name] for case in counted)
+            for name in (f"{block}_percent" for block in BLOCKS)
+        },
+        "seconds": _median(case["seconds"] for case in counted if case["status"] == "ok"),
         "covered": len(counted),
         "complete": complete,
         "unphysical": any(case["unphysical"] for case in counted),
@@ -179,7 +182,7 @@ def on_case(
         **errors_of(results),
         "seconds": statistics.median(result.seconds for result in results),
         "unphysical": any(result.unphysical for result in results),
-        "conflict": any(item.conflict for item in findings),
+        "conflict": any(item.others for item in findings),
         "machines": min(item.machines for item in listed),
     }
 
@@ -187,16 +190,11 @@ def on_case(
 def errors_of(results: Sequence[JobResult]) -> dict[str, float | None]:
     """Return the median error of every block."""
     return {
-        f"{name}_percent": _middle(
-            [r.blocks[name].rms_percent for r in results if name in r.blocks]
-        )
+        f"{name}_percent": _median(r.blocks[name].rms_percent for r in results if name in r.blocks)
         for name in BLOCKS
     }
 
 
-def _middle(values: Sequence[float]) -> float | None:
-    return statistics.median(values) if values else None
-
-
-def _median(cases: Iterable[Mapping[str, Any]], name: str) -> float | None:
-    return _middle([case[name] for case in cases if case[name] is not None])
+def _median(values: Iterable[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return statistics.median(known) if known else None

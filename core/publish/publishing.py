@@ -81,7 +81,7 @@ def publish(
         expected = "http or https, without a query"
         raise InputError(f"{harmless(told)!r} is no address of a site", expected=expected)
     home = f"{told.rstrip('/')}/" if told else ""
-    merged = _merged([*old, *(_submission(file, verify, unverified) for file in files)])
+    merged = _merge_runs([*old, *(_submission(file, verify, unverified) for file in files)])
     index = {**index_of(merged), "address": home}
     pages = {
         **render(index),
@@ -133,7 +133,7 @@ def check_site(folder: Path) -> None:
         raise InputError(what, file=file, key="schema", expected=str(SCHEMA))
 
 
-def _merged(submissions: Iterable[Submission]) -> list[Submission]:
+def _merge_runs(submissions: Iterable[Submission]) -> list[Submission]:
     """Return every run once, whatever order they came in.
 
     A run that another file of the same run holds whole, as one made before it was resumed or was

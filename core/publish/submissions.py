@@ -23,7 +23,7 @@ from femubench.core.schema.records import (
     run_from_json,
     to_plain,
 )
-from femubench.core.schema.results import Block, JobResult, Nominal, Run
+from femubench.core.schema.results import JobResult, Nominal, Run
 from femubench.core.schema.validation import read_plain
 from femubench.core.score.ranking import rank_results
 from femubench.core.score.scoring import frequency_error
@@ -229,16 +229,11 @@ def _check(result: JobResult, meta: Mapping[str, Any], file: Path, key: str) -> 
     if not reference:
         refuse("missing", f"meta.reference.{result.case}", "the errors of the nominal model")
     for name, block in result.blocks.items():
-        _check_block(block, reference, file, f"{key}.{name}")
-
-
-def _check_block(block: Block, reference: Mapping[str, float], file: Path, key: str) -> None:
-    name = key.rpartition(".")[2]
-    if name not in reference or not block.modes:
-        what = "no modes" if name in reference else "a block that the nominal model has not"
-        raise InputError(what, file=file, key=key, expected="one of meta.reference, with modes")
-    errors = [frequency_error(mode) for mode in block.modes]
-    rms = 100.0 * (sum(error * error for error in errors) / len(errors)) ** 0.5
-    if abs(rms - block.rms_percent) > _ROUNDING * (1.0 + rms):
-        what = f"{block.rms_percent:g} %, its modes give {rms:g} %"
-        raise InputError(what, file=file, key=f"{key}.rms_percent", expected="the rms of its modes")
+        if name not in reference or not block.modes:
+            what = "no modes" if name in reference else "a block that the nominal model has not"
+            refuse(what, f"{key}.{name}", "one of meta.reference, with modes")
+        errors = [frequency_error(mode) for mode in block.modes]
+        rms = 100.0 * (sum(error * error for error in errors) / len(errors)) ** 0.5
+        if abs(rms - block.rms_percent) > _ROUNDING * (1.0 + rms):
+            what = f"{block.rms_percent:g} %, its modes give {rms:g} %"
+            refuse(what, f"{key}.{name}.rms_percent", "the rms of its modes")

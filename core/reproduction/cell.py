@@ -106,16 +106,14 @@ class Page:
         """Return the cell with its verdict: figures decide whether, grounds for what."""
         deciding = weakest(self.grounds)
         note = "; ".join(dict.fromkeys(ground.words for ground in self.grounds))
-        if deciding.verdict != "cannot-be-checked" and not self._meets(printed, ours):
+        off = deviation_percent(printed, ours, self.unit)
+        same = ours is not None and round(ours - printed, 12) == 0.0
+        digits = math.inf if self.decimals is None else self.decimals
+        rounds = ours is not None and abs(ours - printed) <= 0.5000001 * 10.0**-digits
+        meets = same or rounds or (off is not None and abs(off) <= self.tolerance)
+        if deciding.verdict != "cannot-be-checked" and not meets:
             deciding, note = self.fault, self.fault.words
         return Cell(
             self.paper, self.table, row, column, printed, ours,
             deciding.verdict, note, self.unit, deciding.tried, self,
         )  # fmt: skip
-
-    def _meets(self, printed: float, ours: float | None) -> bool:
-        off = deviation_percent(printed, ours, self.unit)
-        same = ours is not None and round(ours - printed, 12) == 0.0
-        digits = math.inf if self.decimals is None else self.decimals
-        rounds = ours is not None and abs(ours - printed) <= 0.5000001 * 10.0**-digits
-        return same or rounds or (off is not None and abs(off) <= self.tolerance)

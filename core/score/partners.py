@@ -6,8 +6,6 @@ wherever that is: which one it is, the measurement says and not the model.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from femubench.core.typing import IntArray
@@ -18,21 +16,8 @@ _MOST = 2.0 / 3.0
 _ALWAYS = 1  # an oscillator that was attached doubles a mode
 
 
-@dataclass(frozen=True)
-class Surplus:
-    """Possible partners that a model has beyond those of the nominal one.
-
-    Arguments:
-        count: of them; 0 where there are not too many for a prediction.
-        reason: what was counted then.
-    """
-
-    count: int = 0
-    reason: str = ""
-
-
-def surplus_partners(found: IntArray, expected: IntArray) -> Surplus:
-    """Return possible partners beyond those of the nominal model, where they are too many.
+def surplus_partners(found: IntArray, expected: IntArray) -> tuple[int, str]:
+    """Return the number of partners beyond the nominal model's, and what was counted, if too many.
 
     More than two for every three measured modes are, of the structure as tested and of all its
     modifications together; one is always allowed. A mode without a partner makes no room for
@@ -45,6 +30,6 @@ def surplus_partners(found: IntArray, expected: IntArray) -> Surplus:
     own, known = np.maximum(found, 1), np.maximum(expected, 1)
     count = int(own.sum() - known.sum())
     if count <= max(_ALWAYS, _MOST * len(own)):
-        return Surplus()
-    told = f"{own.sum()} modes could be partners of {len(own)} measured ones"
-    return Surplus(count, f"{told}, of the nominal model {known.sum()}")
+        return 0, ""
+    possible = f"{own.sum()} modes could be partners of {len(own)} measured ones"
+    return count, f"{possible}, of the nominal model {known.sum()}"

@@ -27,25 +27,14 @@ from femubench.core.modal.pairing import LEAST_SENSORS, WINDOW, pair_measured
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block
-from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.partners import surplus_partners
 from femubench.core.score.predicted_spread import MORE, Spread
-from femubench.core.score.ranking import TIE, rank_results, score_of
+from femubench.core.score.ranking import (
+    TIE,
+    rank_results as rank_results,
+    score_of as score_of,
+)
 from femubench.core.typing import FloatArray, IntArray
-
-__all__ = [
-    "JudgedModel",
-    "Reference",
-    "frequency_error",
-    "given_errors",
-    "judge",
-    "leaderboard",
-    "predict_block",
-    "rank_results",
-    "reference_of",
-    "score_model",
-    "score_of",
-]
 
 _SAME_MOTION = 0.9  # squared cosine between a zero mode and the nominal rigid-body motions
 
@@ -245,7 +234,7 @@ def judge(
     modes = _modes_for(model, (case.measurement,))
     negative = int(np.count_nonzero(modes.eigenvalues < -reference.zero))
     blocks, choices = _blocks(case, model, modes, spread)
-    surplus = surplus_partners(choices, reference.choices)
+    surplus, reason = surplus_partners(choices, reference.choices)
     # Of the rigid-body motions that are kept the spaces are compared, not the modes: among several
     # zero modes the eigenvectors are arbitrary.
     still = modes.shapes[:, np.abs(modes.eigenvalues) <= reference.zero]
@@ -260,7 +249,7 @@ def judge(
         basis = still @ (turn[:, keep] / np.sqrt(values[keep]))
         cosines = la.svdvals(rigid.T @ (mass @ basis))
         kept = int(np.count_nonzero(np.square(cosines) > _SAME_MOTION))
-    return JudgedModel(blocks, kept, negative, surplus.count, surplus.reason)
+    return JudgedModel(blocks, kept, negative, surplus, reason)
 
 
 def _modes_for(model: Model, measurements: Sequence[Measurement]) -> Modes:

@@ -58,7 +58,12 @@ class Similarity:
     def drawn(cls, rng: np.random.Generator) -> Similarity:
         """Return factors, log-uniform, that move the frequencies by a tenth at least."""
         while True:
-            found = cls(*(_drawn(rng, *limits) for limits in (LENGTHS, MODULI, MODULI)))
+            found = cls(
+                *(
+                    float(np.exp(rng.uniform(np.log(low), np.log(high))))
+                    for low, high in (LENGTHS, MODULI, MODULI)
+                )
+            )
             if abs(np.log(found.frequency)) >= np.log(_LEAST_SHIFT):
                 return found
 
@@ -85,10 +90,6 @@ class Similarity:
         """Return a point or a vector between points, m."""
         x, y, z = (self.length * value for value in xyz)
         return x, y, z
-
-
-def _drawn(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def similar_case(case: Case, by: Similarity) -> Case:

@@ -32,81 +32,57 @@ _SCALED = "section"  # the factor of sections that are given by numbers
 _Part = TypeVar("_Part", PointMass, GroundSpring)
 
 
-class StretchedStructures:
-    """The family of structures that are stretched piecewise; solids of some cases are kept."""
+def draw_stretched_case(case: Case, rng: np.random.Generator) -> Case:
+    """Return the case of a structure that is stretched piecewise; solids of some cases are kept.
 
-    name = "stretched"
+    It has other ratios of frequencies, and a drawing about as near to the truth. Where the drawing
+    tells two modes apart by chance alone, a stretch may leave one without a partner: that says
+    nothing of a strategy.
 
-    def variant(self, case: Case, rng: np.random.Generator) -> Case:
-        """Return the case of a stretched structure.
-
-        Raises:
-            NotApplicable: for a case without the file of a stretched solid, or where no stretch is
-                as hard as the case.
-            InputError: where that file cannot be read.
-        """
-        file = case.folder / FILE
-        if not file.is_file() or case.model.structure is None:
-            raise NotApplicable(f"no stretched solid of {case.name} is known")
-        found = _as_hard(case, ReducedSolid.read(file), rng)
-        content = hashlib.sha256(read_bytes(file, LARGEST)).hexdigest()
-        told = f"{case.digest} stretched by {content}"
-        return replace(found, digest=hashlib.sha256(told.encode()).hexdigest())
-
-
-def _as_hard(case: Case, solid: ReducedSolid, rng: np.random.Generator) -> Case:
-    """Return a stretched case with other ratios, and a drawing about as near to the truth.
-
-    Where the drawing tells two modes apart by chance alone, a stretch may leave one without a
-    partner: that says nothing of a strategy.
+    Raises:
+        NotApplicable: for a case without the file of a stretched solid, or where no stretch is
+            as hard as the case.
+        InputError: where that file cannot be read.
     """
-    known = nearness(case)
+    file = case.folder / FILE
+    if not file.is_file() or case.model.structure is None:
+        raise NotApplicable(f"no stretched solid of {case.name} is known")
+    solid, known = ReducedSolid.read(file), nearness(case)
     for _ in range(_MOST_DRAWS):
         found = stretched_case(case, solid, solid.drawn(rng), rng)
         shift = np.log(found.measurement.frequencies / case.measurement.frequencies)
-        if float(np.std(shift)) >= _LEAST_SHIFT and is_as_near(nearness(found), known):
-            return found
+        as_near = all(
+            alone <= most and error <= _FARTHER * usual
+            for (alone, error), (most, usual) in zip(nearness(found), known, strict=True)
+        )
+        if float(np.std(shift)) >= _LEAST_SHIFT and as_near:
+            content = hashlib.sha256(read_bytes(file, LARGEST)).hexdigest()
+            source = f"{case.digest} stretched by {content}"
+            return replace(found, digest=hashlib.sha256(source.encode()).hexdigest())
     raise NotApplicable(f"no stretch of {case.name} is as hard as it is")
 
 
-@dataclass(frozen=True)
-class Nearness:
-    """How near a model is to the modes of one state of a structure.
+def nearness(case: Case) -> list[tuple[int, float]]:
+    """Return how near the nominal model is, as built and after each design change.
 
-    Arguments:
-        alone: number of measured modes without a partner in the model.
-        error: rms of ln(f_predicted / f_measured) of the others.
+    That is the number of measured modes without a partner in it, and the rms of
+    ln(f_predicted / f_measured) of the others.
     """
-
-    alone: int
-    error: float
-
-
-def nearness(case: Case) -> tuple[Nearness, ...]:
-    """Return how near the nominal model is, as built and after each design change."""
     found = [_nearness(case.model, case.measurement)]
     for change in case.modifications:
         model = case.model.attach(change.masses, change.springs)
         found.append(_nearness(model, change.measurement))
-    return tuple(found)
+    return found
 
 
-def is_as_near(found: tuple[Nearness, ...], known: tuple[Nearness, ...]) -> bool:
-    """Tell whether a model is about as near to one structure as another one to another."""
-    return all(
-        one.alone <= other.alone and one.error <= _FARTHER * other.error
-        for one, other in zip(found, known, strict=True)
-    )
-
-
-def _nearness(model: Model, measured: Measurement) -> Nearness:
+def _nearness(model: Model, measured: Measurement) -> tuple[int, float]:
     modes = solve_modes(model)
     partners = pair_measured(measured, modes, model.observe(measured.sensors) @ modes.shapes).index
     paired = partners >= 0
     predicted = modes.natural_frequencies[partners[paired]]
     off = np.log(np.abs(predicted) / measured.frequencies[paired])
     error = np.sqrt(np.square(off).sum() / max(off.size, 1))
-    return Nearness(int((~paired).sum()), float(error))
+    return int((~paired).sum()), float(error)
 
 
 def stretched_case(

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -13,47 +12,22 @@ from femubench.core.case.case import Case
 from femubench.core.errors import NotApplicable
 from femubench.core.twin.disguise import disguised
 from femubench.core.twin.similarity import Similarity, similar_case
-from femubench.core.twin.stretched_case import StretchedStructures
+from femubench.core.twin.stretched_case import draw_stretched_case
 
 MARK = "~"  # between the name of a case and the number of its twin
 AGAIN = f"{MARK}again"
 
 
-class TruthFamily(Protocol):
-    """What knows the truth of other structures than that of a case.
-
-    Attributes:
-        name: of the family, in one word.
-    """
-
-    name: str
-
-    def variant(self, case: Case, rng: np.random.Generator) -> Case:
-        """Return a case with another nominal model, and with what is measured on that structure.
-
-        Arguments:
-            case: name, used modes and modifications are kept; the digest too, unless the truth
-                follows from other files than those of the case.
-            rng: draws the structure.
-
-        Raises:
-            NotApplicable: where the family has no structure like that of the case.
-        """
-        ...
-
-
-class SimilarStructures:
-    """The family of similar structures, which every linear elastic case has."""
-
-    name = "similar"
-
-    def variant(self, case: Case, rng: np.random.Generator) -> Case:
-        """Return the case of a similar structure."""
-        return similar_case(case, Similarity.drawn(rng))
-
+# From a case to one with another nominal model, and with what is measured on that structure; name,
+# used modes and modifications are kept, the digest too, unless the truth follows from other files
+# than those of the case. NotApplicable where the family has no structure like that of the case.
+TruthFamily = Callable[[Case, np.random.Generator], Case]
 
 # A structure of its own geometry where its truth is known, and then a similar one.
-FAMILIES: tuple[TruthFamily, ...] = (StretchedStructures(), SimilarStructures())
+FAMILIES: Mapping[str, TruthFamily] = {
+    "stretched": draw_stretched_case,
+    "similar": lambda case, rng: similar_case(case, Similarity.drawn(rng)),
+}
 
 
 @dataclass(frozen=True, repr=False)
@@ -101,7 +75,9 @@ class Again(Case):
         return {"again": self.origin}
 
 
-def twin_of(case: Case, number: int, seed: int, families: Sequence[TruthFamily] = FAMILIES) -> Twin:
+def twin_of(
+    case: Case, number: int, seed: int, families: Mapping[str, TruthFamily] = FAMILIES
+) -> Twin:
     """Return a twin of a case.
 
     The first one keeps the order of joints, members and sensors: a strategy without chance answers
@@ -112,7 +88,8 @@ def twin_of(case: Case, number: int, seed: int, families: Sequence[TruthFamily] 
         case: of which the truth was computed.
         number: of the twin, from 1.
         seed: of the run's twins; the same one gives the same twins.
-        families: that change the structure one after another; those that have none like it do not.
+        families: by name, which change the structure one after another; those that have none like
+            it do not.
 
     Raises:
         NotApplicable: where no family changes it, or its model has no names to change.
@@ -120,10 +97,10 @@ def twin_of(case: Case, number: int, seed: int, families: Sequence[TruthFamily] 
     words = [seed, number, *case.name.encode()]
     rng = np.random.default_rng(np.random.SeedSequence(words))
     found, used, reasons = case, [], []
-    for family in families:
+    for name, draw in families.items():
         try:
-            found = family.variant(found, rng)
-            used.append(family.name)
+            found = draw(found, rng)
+            used.append(name)
         except NotApplicable as error:
             reasons.append(str(error))
     if found is case:
@@ -142,7 +119,7 @@ def twin_of(case: Case, number: int, seed: int, families: Sequence[TruthFamily] 
 
 
 def twins_of(
-    cases: Sequence[Case], number: int, seed: int, families: Sequence[TruthFamily] = FAMILIES
+    cases: Sequence[Case], number: int, seed: int, families: Mapping[str, TruthFamily] = FAMILIES
 ) -> Iterator[Twin]:
     """Yield twins of every case that can have some; arguments as for `twin_of`.
 

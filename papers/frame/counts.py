@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.fem import IntArray, Structure
+from femubench.fem import IntArray
 from femubench.papers.frame.common import (
     CASE,
     PAPER,
@@ -65,7 +65,8 @@ def count_cells(bench: Workbench) -> tuple[Cell, ...]:
     """Return the cells of what the text counts or claims in figures."""
     rigid = rigid_modes(bench, "nobari")
     case = bench.cases[CASE]
-    structure, types = case.model.frame_structure, Counter(_types(case.model.frame_structure))
+    structure = case.model.frame_structure
+    types = Counter(joint.type for joint in structure.frame.joints)
     at_joints = {
         structure.element_ends[e][0] for ends in structure.joint_ends.values() for e in ends
     }
@@ -108,10 +109,6 @@ def count_cells(bench: Workbench) -> tuple[Cell, ...]:
     off = 100.0 * float(np.abs(one / other - 1.0).max())
     key = "nobari_rigid_difference"
     return (*cells, page.cell(_NAMES[key], "difference", float(printed(PAPER)["text"][key]), off))
-
-
-def _types(structure: Structure) -> list[str]:
-    return [joint.type for joint in structure.frame.joints]
 
 
 def _only(values: IntArray) -> int:

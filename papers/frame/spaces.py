@@ -77,7 +77,9 @@ def compare_spaces(model: Model) -> Spaces:
     present = np.abs(_upper(model.stiffness.toarray(), size)) > 0.0
     ranks, structure = _Ranks(), model.frame_structure
 
-    kept = _kept(row[present], column[present], rigid, ranks)
+    # The entries whose matrix leaves rigid-body motion free of forces.
+    forces = _forces(np.eye(int(present.sum())), rigid, row[present], column[present])
+    kept = ranks.split(forces)[1]
     generic = generic_family(structure, plain="none", joint="none")
     chosen = [i for i, name in enumerate(generic.names) if name.startswith(_UNCOUPLED)]
     assembled = _assembled(generic, chosen, size)
@@ -152,11 +154,6 @@ def _assembled(family: ElementFamily, chosen: Sequence[int], size: FloatArray) -
     plan, unit = family.structure.plan, np.eye(len(family))
     parts = [_upper(plan.assemble(family.change(unit[i])).toarray(), size) for i in chosen]
     return np.column_stack(parts)
-
-
-def _kept(rows: IntArray, columns: IntArray, rigid: FloatArray, ranks: _Ranks) -> FloatArray:
-    """Return a basis of the entries whose matrix leaves rigid-body motion free of forces."""
-    return ranks.split(_forces(np.eye(len(rows)), rigid, rows, columns))[1]
 
 
 def _forces(

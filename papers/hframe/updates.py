@@ -102,7 +102,8 @@ def _parameter_cells(bench: Workbench, row: Update, theirs: dict[str, Any]) -> I
             f"the rule of section 7 on the elements of mesh C, {length:.5f} m long; the printed "
             f"value needs {needed.get(symbol, length):.4f} m",
         )
-        page = Page("hframe", row.table, (_initial_ground(symbol),), unit, LIMIT, digits, rule)
+        ground = _BY_RULE if symbol in RULED else _TAKEN
+        page = Page("hframe", row.table, (ground,), unit, LIMIT, digits, rule)
         yield page.cell(symbol, "initial", first, _springs_by_rule(bench).get(symbol, before))
         page = Page("hframe", row.table, (reading.told,), unit, LIMIT, digits, missed)
         yield page.cell(symbol, "updated", last, after)
@@ -112,10 +113,6 @@ def _parameter_cells(bench: Workbench, row: Update, theirs: dict[str, Any]) -> I
         wrong = Ground("misprint", f"the printed values, {first:g} and {last:g}, give {own:.4f}")
         page = Page("hframe", row.table, (_RATIO,), "", tolerance, None, wrong)
         yield page.cell(symbol, "ratio", ratio, own)
-
-
-def _initial_ground(symbol: str) -> Ground:
-    return _BY_RULE if symbol in RULED else _TAKEN
 
 
 def _springs_by_rule(bench: Workbench) -> dict[str, float]:
