@@ -13,7 +13,7 @@ from annotated_types import Ge, Le
 from click.core import ParameterSource
 
 from femubench.core.files import check_writable
-from femubench.core.schema.run_options import RunOptions, Where, split_keywords
+from femubench.core.schema.run_options import RunOptions, Where, describe_fields, split_keywords
 
 Option: TypeAlias = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -75,18 +75,17 @@ def of_fields(kind: type[RunOptions | Where], *names: str, **words: Any) -> Opti
     Arguments:
         words: that a verb has otherwise.
     """
-    hints = get_type_hints(kind, include_extras=True)
+    hints, texts = get_type_hints(kind, include_extras=True), describe_fields(kind)
 
     def with_all(command: Callable[..., Any]) -> Callable[..., Any]:
         for name in reversed(names):
-            *_, text = hints[name].__metadata__
-            own: dict[str, Any] = {} if text.parse else _read_type(hints[name])
-            own |= {"help": text.help, "metavar": text.metavar, "multiple": text.multiple}
-            if text.show_default:
+            *_, flag = hints[name].__metadata__
+            own = {"help": texts[name], "metavar": flag.metavar, "multiple": flag.multiple}
+            own |= {"callback": _callback_of(flag.parse)} if flag.parse else _read_type(hints[name])
+            if flag.show_default:
                 own |= {"default": getattr(kind(), name), "show_default": True}
-            if text.parse:
-                own["callback"] = _callback_of(text.parse)
-            command = click.option(*text.flags.split(), name, **{**own, **words})(command)
+            flags = flag.names.split() or [f"--{name}"]
+            command = click.option(*flags, name, **{**own, **words})(command)
         return command
 
     return with_all
