@@ -8,29 +8,23 @@ from typing import TYPE_CHECKING
 import click
 
 from femubench.core.cli import options
-from femubench.core.errors import InputError
 from femubench.core.files import write_atomically
 
 if TYPE_CHECKING:
     from femubench.core.score.comparison import Threshold
 
 
-def thresholds_of(
-    ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...]
-) -> tuple[Threshold, ...]:
+def parse_thresholds(texts: tuple[str, ...]) -> tuple[Threshold, ...]:
     """Return what ``--fail`` says.
 
     Raises:
-        BadParameter: for anything but METRIC>NUMBER.
+        InputError: for anything but METRIC>NUMBER.
     """
     if not texts:
         return ()
     from femubench.core.library.compare import threshold_of
 
-    try:
-        return tuple(map(threshold_of, texts))
-    except InputError as fault:
-        raise click.BadParameter(str(fault), ctx, parameter) from fault
+    return tuple(map(threshold_of, texts))
 
 
 @click.command("compare")
@@ -47,7 +41,7 @@ def thresholds_of(
     help="This one only; repeat.",
 )  # fmt: skip
 @click.option(
-    "--fail", "thresholds", multiple=True, metavar="METRIC>X", callback=thresholds_of,
+    "--fail", "thresholds", multiple=True, metavar="METRIC>X", callback=options.read_with(parse_thresholds),
     help="Exit with 1 if a ratio B/A exceeds X: unseen, used, higher, modified, seconds; or the "
     "number of lost results: failures. May be repeated. Default: unseen>1.01 and failures>0.",
 )  # fmt: skip

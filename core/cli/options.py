@@ -12,6 +12,7 @@ import click
 from annotated_types import Ge, Le
 from click.core import ParameterSource
 
+from femubench.core.errors import InputError
 from femubench.core.files import check_writable
 from femubench.core.schema.run_options import RunOptions, Where, describe_fields, split_keywords
 
@@ -69,7 +70,7 @@ def store(what: str) -> Option:
     return click.option("--store", type=FOLDER, metavar="DIR", help=text)
 
 
-def of_fields(kind: type[RunOptions | Where], *names: str, **words: Any) -> Option:  # noqa: ANN401 - as click has it
+def of_fields(kind: type[RunOptions | Where], *names: str, **words: object) -> Option:
     """Return the options for fields of `RunOptions` or of `Where`, as these say.
 
     Arguments:
@@ -80,8 +81,12 @@ def of_fields(kind: type[RunOptions | Where], *names: str, **words: Any) -> Opti
     def with_all(command: Callable[..., Any]) -> Callable[..., Any]:
         for name in reversed(names):
             *_, flag = hints[name].__metadata__
-            own = {"help": texts[name], "metavar": flag.metavar, "multiple": flag.multiple}
-            own |= {"callback": _callback_of(flag.parse)} if flag.parse else _read_type(hints[name])
+            own: dict[str, Any] = {
+                "help": texts[name],
+                "metavar": flag.metavar,
+                "multiple": flag.multiple,
+            }
+            own |= {"callback": read_with(flag.parse)} if flag.parse else _read_type(hints[name])
             if flag.show_default:
                 own |= {"default": getattr(kind(), name), "show_default": True}
             flags = flag.names.split() or [f"--{name}"]
@@ -105,11 +110,17 @@ def _read_type(hint: Any) -> dict[str, Any]:  # noqa: ANN401 - of any field
     return {"is_flag": True} if hint is bool else {"type": hint}
 
 
-def _callback_of(parse: Callable[[Any], Any]) -> Callable[..., Any]:
+def read_with(parse: Callable[[Any], Any]) -> Callable[..., Any]:
+    """Return a callback of click that turns a value into another.
+
+    Arguments:
+        parse: of any value but None; raises a ValueError or an InputError for a wrong one.
+    """
+
     def read(ctx: click.Context, parameter: click.Parameter, value: object) -> Any:  # noqa: ANN401
         try:
             return None if value is None else parse(value)
-        except ValueError as fault:
+        except (ValueError, InputError) as fault:
             raise click.BadParameter(str(fault), ctx, parameter) from fault
 
     return read
