@@ -14,17 +14,20 @@ if TYPE_CHECKING:
     from femubench.core.score.comparison import Threshold
 
 
-def parse_thresholds(texts: tuple[str, ...]) -> tuple[Threshold, ...]:
-    """Return what ``--fail`` says.
+def fail_option(what: str) -> options.Option:
+    """Return the option for what counts as worse."""
 
-    Raises:
-        InputError: for anything but METRIC>NUMBER.
-    """
-    if not texts:
-        return ()
-    from femubench.core.library.compare import threshold_of
+    def parse(texts: tuple[str, ...]) -> tuple[Threshold, ...]:
+        if not texts:
+            return ()
+        from femubench.core.library.compare import threshold_of
 
-    return tuple(map(threshold_of, texts))
+        return tuple(map(threshold_of, texts))
+
+    return click.option(
+        "--fail", "thresholds", multiple=True, metavar="METRIC>X",
+        callback=options.read_with(parse), help=what,
+    )  # fmt: skip
 
 
 @click.command("compare")
@@ -40,11 +43,10 @@ def parse_thresholds(texts: tuple[str, ...]) -> tuple[Threshold, ...]:
     "-s", "--strategy", "strategies", multiple=True, metavar="STRATEGY",
     help="This one only; repeat.",
 )  # fmt: skip
-@click.option(
-    "--fail", "thresholds", multiple=True, metavar="METRIC>X", callback=options.read_with(parse_thresholds),
-    help="Exit with 1 if a ratio B/A exceeds X: unseen, used, higher, modified, seconds; or the "
-    "number of lost results: failures. May be repeated. Default: unseen>1.01 and failures>0.",
-)  # fmt: skip
+@fail_option(
+    "Exit with 1 if a ratio B/A exceeds X: unseen, used, higher, modified, seconds; or the "
+    "number of lost results: failures. May be repeated. Default: unseen>1.01 and failures>0."
+)
 @options.style(
     "terminal", "markdown", "html", "json", dest="form", what="What is printed or written."
 )
