@@ -78,8 +78,8 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     def progress(result: JobResult, done: int, total: int) -> None:
         seen.append((result.strategy, done, total))
 
-    options = {"jobs": 2, "store": store, "run_seed": 11}
-    run = run_jobs([case], strategies, timeout=1.0, progress=progress, **options)
+    options = {"jobs": 2, "store": store, "seed": 11}
+    run = run_jobs([case], strategies, seeds=[0], timeout=1.0, progress=progress, **options)
     calm = run_jobs([case, plain], [toys.Softer(), toys.Spy(hashes)], seeds=(0, 1), **options)
     return {"case": case, "run": run, "calm": calm, "store": store, "seen": seen}
 

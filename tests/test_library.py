@@ -9,7 +9,7 @@ import subprocess
 import sys
 import textwrap
 import threading
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ import femubench.papers
 from femubench.core.cli.main import bench
 from femubench.core.display import LINES, WIDTH
 from femubench.core.plugin.variants import labelled
+from femubench.core.schema.run_options import RunKeywords, describe_fields, split_keywords
 from femubench.core.score.repeatability import result_differences
 from tests.frf_problems import frf_set, write_universal
 from tests.test_cli import put_case
@@ -416,6 +417,30 @@ class TestLooks:
         assert (
             repr(femubench.Run({}, ())) == "Run: 0 cases, 0 strategies, 0 seeds, 0 results (none)"
         )
+
+
+class TestOptionsOfARun:
+    def test_every_field_is_a_keyword_and_says_what_it_is(self) -> None:
+        kinds = femubench.RunOptions, femubench.Where
+        names = {field.name for kind in kinds for field in fields(kind)}
+        # A seed of twins goes with their number.
+        assert names - {"twin_seed"} == RunKeywords.__optional_keys__
+        assert {name for kind in kinds for name in describe_fields(kind)} == names
+
+    def test_a_keyword_overrules_what_is_given_for_several_calls(self) -> None:
+        options = femubench.RunOptions(seeds=2, timeout=60.0, timeouts={"local": 5.0})
+        keywords = {"seeds": [3, 4], "timeout": None, "twins": (2, 7), "jobs": 3}
+        given, where = split_keywords(keywords, options, femubench.Where(1, sandbox="off"))
+        assert where == femubench.Where(3, sandbox="off")
+        own = {"seeds": (3, 4), "timeout": 60.0, "timeouts": {"local": 5.0}}
+        assert given == {**own, "twins": 2, "twin_seed": 7}
+        assert femubench.RunOptions(**given).all_seeds == (3, 4)
+
+    def test_no_other_keyword(self) -> None:
+        with pytest.raises(TypeError, match="unexpected keyword argument 'sedes'"):
+            femubench.rank("rod", "unchanged", sedes=1)  # type: ignore[call-arg]
+        with pytest.raises(TypeError, match="unexpected keyword argument 'seeds'"):
+            femubench.study("study.toml", seeds=1)  # type: ignore[call-arg]
 
 
 def test_the_page_of_the_docs_runs() -> None:

@@ -8,29 +8,26 @@ from typing import TYPE_CHECKING
 import click
 
 from femubench.core.cli import options
-from femubench.core.errors import InputError
 from femubench.core.files import write_atomically
 
 if TYPE_CHECKING:
     from femubench.core.score.comparison import Threshold
 
 
-def thresholds_of(
-    ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...]
-) -> tuple[Threshold, ...]:
-    """Return what ``--fail`` says.
+def fail_option(what: str) -> options.Option:
+    """Return the option for what counts as worse."""
 
-    Raises:
-        BadParameter: for anything but METRIC>NUMBER.
-    """
-    if not texts:
-        return ()
-    from femubench.core.library.compare import threshold_of
+    def parse(texts: tuple[str, ...]) -> tuple[Threshold, ...]:
+        if not texts:
+            return ()
+        from femubench.core.library.compare import threshold_of
 
-    try:
         return tuple(map(threshold_of, texts))
-    except InputError as fault:
-        raise click.BadParameter(str(fault), ctx, parameter) from fault
+
+    return click.option(
+        "--fail", "thresholds", multiple=True, metavar="METRIC>X",
+        callback=options.read_with(parse), help=what,
+    )  # fmt: skip
 
 
 @click.command("compare")
@@ -46,11 +43,10 @@ def thresholds_of(
     "-s", "--strategy", "strategies", multiple=True, metavar="STRATEGY",
     help="This one only; repeat.",
 )  # fmt: skip
-@click.option(
-    "--fail", "thresholds", multiple=True, metavar="METRIC>X", callback=thresholds_of,
-    help="Exit with 1 if a ratio B/A exceeds X: unseen, used, higher, modified, seconds; or the "
-    "number of lost results: failures. May be repeated. Default: unseen>1.01 and failures>0.",
-)  # fmt: skip
+@fail_option(
+    "Exit with 1 if a ratio B/A exceeds X: unseen, used, higher, modified, seconds; or the "
+    "number of lost results: failures. May be repeated. Default: unseen>1.01 and failures>0."
+)
 @options.style(
     "terminal", "markdown", "html", "json", dest="form", what="What is printed or written."
 )

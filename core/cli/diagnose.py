@@ -23,17 +23,16 @@ if TYPE_CHECKING:
 _STYLES = {".html": "html", ".md": "markdown"}
 
 
-def _share(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
-    """Return the value; a callback of click, whose own range lets nan pass."""
-    if value is not None and not 0.0 <= value <= 0.2:
-        raise click.BadParameter(f"{value!r} is no number >= 0 and <= 0.2")
+# The ranges of click let nan pass.
+def _check_share(value: float) -> float:
+    if not 0.0 <= value <= 0.2:
+        raise ValueError(f"{value!r} is no number >= 0 and <= 0.2")
     return value
 
 
-def _seconds(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
-    """Return the value; a callback of click, whose own range lets nan pass."""
-    if value is not None and not value >= 0.0:
-        raise click.BadParameter(f"{value!r} is no number >= 0")
+def _check_seconds(value: float) -> float:
+    if not value >= 0.0:
+        raise ValueError(f"{value!r} is no number >= 0")
     return value
 
 
@@ -44,13 +43,13 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: float | None) ->
     "Write the extended model as a case folder, which must be new or empty.", metavar="FOLDER"
 )
 @click.option(
-    "--tolerance", type=float, callback=_share, metavar="X",
+    "--tolerance", type=float, callback=options.read_with(_check_share), metavar="X",
     help="Ordinary relative scatter of every element; 0 for none. Default: the case's.",
 )  # fmt: skip
 @click.option("--no-pairs", is_flag=True, help="Look for single effects only, which is quicker.")
 @click.option("--no-faults", is_flag=True, help="Take data and input as they are.")
 @click.option(
-    "--budget", type=float, callback=_seconds, metavar="SECONDS",
+    "--budget", type=float, callback=options.read_with(_check_seconds), metavar="SECONDS",
     help="End the search for several causes after so long; a note says so. Default: no end.",
 )  # fmt: skip
 @click.option(

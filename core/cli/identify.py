@@ -13,19 +13,14 @@ from femubench.core.files import check_new
 from femubench.core.library.cases import way_of
 
 
-def _band(
-    ctx: click.Context, param: click.Parameter, value: str | None
-) -> tuple[float, float] | None:
-    """Return two numbers of a text; a callback of click."""
-    if value is None:
-        return None
-    parts = value.split(",")
+def _parse_band(text: str) -> tuple[float, float]:
+    """Return two numbers of a text."""
     try:
-        low, high = (float(part) for part in parts)
+        low, high = map(float, text.split(","))
     except ValueError:
         low = high = 0.0
     if not 0.0 <= low < high < float("inf"):
-        raise click.BadParameter(f"{value!r} is no LOW,HIGH in Hz with LOW < HIGH")
+        raise ValueError(f"{text!r} is no LOW,HIGH in Hz with LOW < HIGH")
     return low, high
 
 
@@ -37,7 +32,7 @@ def _band(
     metavar="FOLDER",
 )
 @click.option(
-    "--band", callback=_band, metavar="LOW,HIGH",
+    "--band", callback=options.read_with(_parse_band), metavar="LOW,HIGH",
     help="Frequencies in Hz between which modes are sought. Default: all.",
 )  # fmt: skip
 @click.option(

@@ -12,8 +12,9 @@ import click
 from annotated_types import Ge, Le
 from click.core import ParameterSource
 
+from femubench.core.errors import InputError
 from femubench.core.files import check_writable
-from femubench.core.schema.run_options import RunOptions, Where, split_keywords
+from femubench.core.schema.run_options import RunOptions, Where, describe_fields, split_keywords
 
 Option: TypeAlias = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -69,24 +70,27 @@ def store(what: str) -> Option:
     return click.option("--store", type=FOLDER, metavar="DIR", help=text)
 
 
-def of_fields(kind: type[RunOptions | Where], *names: str, **words: Any) -> Option:  # noqa: ANN401 - as click has it
+def of_fields(kind: type[RunOptions | Where], *names: str, **words: object) -> Option:
     """Return the options for fields of `RunOptions` or of `Where`, as these say.
 
     Arguments:
         words: that a verb has otherwise.
     """
-    hints = get_type_hints(kind, include_extras=True)
+    hints, texts = get_type_hints(kind, include_extras=True), describe_fields(kind)
 
     def with_all(command: Callable[..., Any]) -> Callable[..., Any]:
         for name in reversed(names):
-            *_, text = hints[name].__metadata__
-            own: dict[str, Any] = {} if text.parse else _read_type(hints[name])
-            own |= {"help": text.help, "metavar": text.metavar, "multiple": text.multiple}
-            if text.show_default:
+            *_, flag = hints[name].__metadata__
+            own: dict[str, Any] = {
+                "help": texts[name],
+                "metavar": flag.metavar,
+                "multiple": flag.multiple,
+            }
+            own |= {"callback": read_with(flag.parse)} if flag.parse else _read_type(hints[name])
+            if flag.show_default:
                 own |= {"default": getattr(kind(), name), "show_default": True}
-            if text.parse:
-                own["callback"] = _callback_of(text.parse)
-            command = click.option(*text.flags.split(), name, **{**own, **words})(command)
+            flags = flag.names.split() or [f"--{name}"]
+            command = click.option(*flags, name, **{**own, **words})(command)
         return command
 
     return with_all
@@ -106,11 +110,17 @@ def _read_type(hint: Any) -> dict[str, Any]:  # noqa: ANN401 - of any field
     return {"is_flag": True} if hint is bool else {"type": hint}
 
 
-def _callback_of(parse: Callable[[Any], Any]) -> Callable[..., Any]:
+def read_with(parse: Callable[[Any], Any]) -> Callable[..., Any]:
+    """Return a callback of click that turns a value into another.
+
+    Arguments:
+        parse: of any value but None; raises a ValueError or an InputError for a wrong one.
+    """
+
     def read(ctx: click.Context, parameter: click.Parameter, value: object) -> Any:  # noqa: ANN401
         try:
             return None if value is None else parse(value)
-        except ValueError as fault:
+        except (ValueError, InputError) as fault:
             raise click.BadParameter(str(fault), ctx, parameter) from fault
 
     return read

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,99 +24,103 @@ if TYPE_CHECKING:
     from femubench.core.schema.results import Run
 
 
-def outputs_of(ctx: click.Context, plugins: Plugins) -> dict[Path, Reporter]:
-    """Return the reporter that writes each file which the user named."""
-    from femubench.core.library.report import reporter, reporter_for
-
-    outputs: dict[Path, Reporter] = {}
-    for key, name in (("json_file", "json"), ("csv_file", "csv"), ("report_file", None)):
-        path = ctx.params[key]
-        if path is None:
-            continue
-        if path in outputs:
-            raise InputError("is to hold two outputs", file=path, expected="a file for each")
-        outputs[path] = reporter(plugins, name) if name else reporter_for(plugins, path)
-    return outputs
-
-
-def run_and_report(
-    ctx: click.Context,
-    plan: Plan,
-    header: Callable[[str], str],
-    store: Store,
-    plugins: Plugins,
-    outputs: dict[Path, Reporter],
-    *,
-    exhibits: object = None,
-    resumed_with: tuple[Sequence[str], Sequence[str]] = ((), ()),
-) -> tuple[Run, int]:
-    """Run what is planned where the user wants it, and report; return the run and the exit code.
+@dataclass(frozen=True)
+class RunOutput:
+    """What becomes of a run: its store, the files that the user named, and what is shown.
 
     Arguments:
-        header: returns what is shown first, from a clause on where the jobs run.
-        outputs: from `outputs_of`.
-        exhibits: what reports show of single jobs.
-        resumed_with: words that make the same command go on with the run, and those that do not.
+        ctx: of the verb.
+        plugins: where reporters come from.
+        store: keeps the results.
+        files: by their path what writes them.
     """
-    from femubench.core.library.report import reporter
-    from femubench.core.run.executor import open_executor
-    from femubench.core.run.runner import Receivers
 
-    quiet = ctx.params["quiet"]
-    screen = None if quiet else reporter(plugins, "terminal")
-    with (
-        telling(store, plan.jobs, screen, *resumed_with),
-        open_executor(options.read_given(ctx)[1]) as executor,
-    ):
-        if not quiet:
-            found = executor.enclosure()
-            if found.sandbox == "none" and executor.sandbox != "off":
-                click.echo(f"strategies run without a sandbox: {found.reason}", err=True)
-            click.echo(wrapped(header(executor.spoken), hanging=2))
-        with progress(quiet=quiet) as advance:
-            run = plan.run(executor, Receivers(store, advance=advance))
-    return run, finish(ctx, run, outputs, plugins, store, screen, exhibits)
+    ctx: click.Context
+    plugins: Plugins
+    store: Store
+    files: dict[Path, Reporter]
 
+    @classmethod
+    def of(cls, ctx: click.Context, plugins: Plugins) -> RunOutput:
+        """Return the output that the options of a verb say.
 
-def finish(
-    ctx: click.Context,
-    run: Run,
-    outputs: dict[Path, Reporter],
-    plugins: Plugins,
-    store: Store,
-    screen: Reporter | None,
-    exhibits: object = None,
-) -> int:
-    """Write the files, then show the ranking and where the files are.
+        Raises:
+            InputError: for two outputs in one file, or a file of no known format.
+        """
+        from femubench.core.library.rank import store_in
+        from femubench.core.library.report import reporter, reporter_for
 
-    A file that cannot be written keeps nobody from the ranking and the other files.
-    Returns the exit code: 1 where some job has no result.
+        files: dict[Path, Reporter] = {}
+        for key, name in (("json_file", "json"), ("csv_file", "csv"), ("report_file", None)):
+            path = ctx.params[key]
+            if path is None:
+                continue
+            if path in files:
+                raise InputError("is to hold two outputs", file=path, expected="a file for each")
+            files[path] = reporter(plugins, name) if name else reporter_for(plugins, path)
+        return cls(ctx, plugins, store_in(ctx.params["store"]), files)
 
-    Arguments:
-        screen: shows the ranking; None shows none.
+    def run(
+        self,
+        plan: Plan,
+        header: Callable[[str], str],
+        exhibits: object = None,
+        *resumed_with: Sequence[str],
+    ) -> tuple[Run, int]:
+        """Run what is planned and report; return the run and the exit code.
 
-    Raises:
-        OutputError: for the last such file, when all else is done.
-        PluginError: for the last reporter that failed.
-    """
-    from femubench.core.library.report import rendered, reporter, run_name, text_of
-    from femubench.core.schema.results import DONE
+        Arguments:
+            header: returns what is shown first, from a clause on where the jobs run.
+            exhibits: what reports show of single jobs.
+            resumed_with: words that make the same command go on, and those that do not.
+        """
+        from femubench.core.library.report import reporter
+        from femubench.core.run.executor import open_executor
+        from femubench.core.run.runner import Receivers
 
-    files, written = dict(outputs), list[str]()
-    broken: OutputError | PluginError | None = None
-    if ctx.params["report_file"] is None:
-        for own in (reporter(plugins, name) for name in ("html", "markdown")):
-            files[store.folder / f"{run_name(run)}{own.suffix}"] = own
-    for path, writer in files.items():
-        try:
-            write_atomically(path, rendered(writer, run, exhibits))
-            written.append(f"{writer.name}: {path}")
-        except (OutputError, PluginError) as fault:
-            if broken is not None:
-                click.echo(f"bench: {broken}", err=True)
-            broken = fault
-    if screen is not None:
-        click.echo("\n".join(["", text_of(screen, rendered(screen, run)), *written]))
-    if broken is not None:
-        raise broken
-    return int(any(result.status not in DONE for result in run.results))
+        quiet = self.ctx.params["quiet"]
+        screen = None if quiet else reporter(self.plugins, "terminal")
+        with (
+            telling(self.store, plan.jobs, screen, *resumed_with),
+            open_executor(options.read_given(self.ctx)[1]) as executor,
+        ):
+            if not quiet:
+                found = executor.enclosure()
+                if found.sandbox == "none" and executor.sandbox != "off":
+                    click.echo(f"strategies run without a sandbox: {found.reason}", err=True)
+                click.echo(wrapped(header(executor.spoken), hanging=2))
+            with progress(quiet=quiet) as advance:
+                run = plan.run(executor, Receivers(self.store, advance=advance))
+        return run, self._report(run, screen, exhibits)
+
+    def _report(self, run: Run, screen: Reporter | None, exhibits: object) -> int:
+        """Write the files, then show the ranking and where the files are.
+
+        A file that cannot be written keeps nobody from the ranking and the other files.
+        Returns the exit code: 1 where some job has no result.
+
+        Raises:
+            OutputError: for the last such file, when all else is done.
+            PluginError: for the last reporter that failed.
+        """
+        from femubench.core.library.report import rendered, reporter, run_name, text_of
+        from femubench.core.schema.results import DONE
+
+        files, written = dict(self.files), list[str]()
+        broken: OutputError | PluginError | None = None
+        if self.ctx.params["report_file"] is None:
+            for own in (reporter(self.plugins, name) for name in ("html", "markdown")):
+                files[self.store.folder / f"{run_name(run)}{own.suffix}"] = own
+        for path, writer in files.items():
+            try:
+                write_atomically(path, rendered(writer, run, exhibits))
+                written.append(f"{writer.name}: {path}")
+            except (OutputError, PluginError) as fault:
+                if broken is not None:
+                    click.echo(f"bench: {broken}", err=True)
+                broken = fault
+        if screen is not None:
+            click.echo("\n".join(["", text_of(screen, rendered(screen, run)), *written]))
+        if broken is not None:
+            raise broken
+        return int(any(result.status not in DONE for result in run.results))

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from femubench.core.cli import options
-from femubench.core.cli.outputs import outputs_of, run_and_report
+from femubench.core.cli.outputs import RunOutput
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
 from femubench.core.errors import InputError, PluginError
@@ -54,7 +53,6 @@ def run(
     cases: tuple[str, ...],
     strategies: tuple[str, ...],
     locked: str | None,
-    store: Path | None,
     **asked: object,
 ) -> int:
     """Run strategies on cases and rank them.
@@ -64,22 +62,17 @@ def run(
     """
     del asked  # taken from the context
     plugins = _checked(ctx, cases, strategies)
-    from femubench.core.library.rank import plan_again, plan_run, request_of, store_in
+    from femubench.core.library.rank import plan_again, plan_run, request_of
 
-    outputs = outputs_of(ctx, plugins)
-    kept = store_in(store)
-    old = None if locked is None else kept.load(locked)
+    output = RunOutput.of(ctx, plugins)
+    old = None if locked is None else output.store.load(locked)
     given, _ = options.read_given(ctx)
     plan = (
-        plan_run(cases, strategies, plugins, given, kept)
+        plan_run(cases, strategies, plugins, given, output.store)
         if old is None
         else plan_again(request_of(old), plugins)
     )
-    outcome, code = run_and_report(
-        *(ctx, plan, partial(_header, plan), kept, plugins, outputs),
-        exhibits=kept.exhibits,
-        resumed_with=_going_on(ctx),
-    )
+    outcome, code = output.run(plan, partial(_header, plan), output.store.exhibits, *_going_on(ctx))
     return code if old is None else _compare(old, outcome)
 
 

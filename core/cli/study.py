@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from femubench.core.cli import options
-from femubench.core.cli.outputs import outputs_of, run_and_report
+from femubench.core.cli.outputs import RunOutput
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
 from femubench.core.schema.run_options import RunOptions
@@ -31,9 +31,7 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @options.of_jobs("Write the results and the skill of every cell as JSON.")
 @click.pass_context
-def study(
-    ctx: click.Context, /, file: Path, dry_run: bool, store: Path | None, **asked: object
-) -> int:
+def study(ctx: click.Context, /, file: Path, dry_run: bool, **asked: object) -> int:
     """Run strategies under conditions that vary: noise, sensors, options.
 
     FILE names cases, strategies with grids of options, seeds, noise and numbers of sensors left
@@ -42,21 +40,17 @@ def study(
     """
     del asked  # taken from the context
     plugins = plugins_for(ctx)
-    from femubench.core.library.rank import store_in
     from femubench.core.library.study import study_plan
     from femubench.core.run.executor import count_workers
     from femubench.core.study.study_file import read_study
 
-    outputs = outputs_of(ctx, plugins)
-    kept, plan = store_in(store), study_plan(read_study(file), plugins)
+    output, plan = RunOutput.of(ctx, plugins), study_plan(read_study(file), plugins)
     given, where = options.read_given(ctx)
     if dry_run:
-        click.echo("\n".join(_forecast(plan, kept, count_workers(where.jobs))))
+        click.echo("\n".join(_forecast(plan, output.store, count_workers(where.jobs))))
         return 0
     plan = plan.limited(given)
-    _, code = run_and_report(
-        ctx, plan, lambda place: f"{_title(plan)}, {place}", kept, plugins, outputs
-    )
+    _, code = output.run(plan, lambda place: f"{_title(plan)}, {place}")
     return code
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from femubench.core.cli import options
-from femubench.core.cli.compare import thresholds_of
+from femubench.core.cli.compare import fail_option
 from femubench.core.cli.progress import progress
 from femubench.core.cli.registry import plugins_for
 from femubench.core.plugin.validation import chosen
@@ -33,10 +33,7 @@ if TYPE_CHECKING:
     "--baseline", type=options.PATH, metavar="FILE",
     help="The result file of an earlier run; exit with 1 if this one is worse.",
 )  # fmt: skip
-@click.option(
-    "--fail", "thresholds", multiple=True, metavar="METRIC>X", callback=thresholds_of,
-    help="What is worse, as in bench compare. Default: unseen>1.01 and failures>0.",
-)  # fmt: skip
+@fail_option("What is worse, as in bench compare. Default: unseen>1.01 and failures>0.")
 @click.option(
     "--summary", type=options.OUTPUT, metavar="FILE", envvar="GITHUB_STEP_SUMMARY",
     help="Append what came out as Markdown. Default: $GITHUB_STEP_SUMMARY.",

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, TypeAlias
 
 from femubench.core.display import counted
 from femubench.core.errors import InputError, require
@@ -17,51 +17,16 @@ from femubench.core.run.schedule import Workload, compute_jobs
 from femubench.core.schema.results import JobResult
 from femubench.core.schema.run_options import Sandbox, Where
 
+if TYPE_CHECKING:
+    from femubench.core.run.cluster import DaskWorkers
 
-class Executor(Protocol):
-    """What runs jobs, each in a process of its own, and judges what they hand back in another."""
 
-    @property
-    def workers(self) -> int:
-        """Return how many jobs run at a time, as far as is known now."""
-
-    @property
-    def spoken(self) -> str:
-        """Return what a user reads of it, such as ``2 workers``."""
-
-    @property
-    def share(self) -> int | None:
-        """Return the bytes that a job may take; None where each machine has its own answer."""
-
-    @property
-    def sandbox(self) -> Sandbox:
-        """Return whether strategies run in a sandbox."""
-
-    def enclosure(self) -> Enclosure:
-        """Return how strategies run: in a sandbox, or why not.
-
-        Raises:
-            InputError: where one is required and is not possible.
-        """
-
-    def admit(self, strategies: Sequence[Strategy], memory: int | None) -> None:
-        """Make sure that jobs of these strategies with so much memory each can run.
-
-        Raises:
-            InputError: saying where they cannot, and why.
-        """
-
-    def compute(self, workload: Workload, wanted: Iterable[int]) -> Iterator[tuple[int, JobResult]]:
-        """Yield the result of every wanted job as it comes.
-
-        Arguments:
-            wanted: places of jobs; the next is asked for when there is room for it.
-        """
+Executor: TypeAlias = "LocalProcesses | DaskWorkers"
 
 
 @dataclass(frozen=True)
 class LocalProcesses:
-    """Worker processes of this machine.
+    """Worker processes of this machine, each job in one of its own, and judged in another.
 
     Arguments:
         workers: number of them.
@@ -82,14 +47,22 @@ class LocalProcesses:
         return memory_share(self.workers)
 
     def enclosure(self) -> Enclosure:
-        """Return how strategies run on this machine."""
+        """Return how strategies run: in a sandbox, or why not.
+
+        Raises:
+            InputError: where one is required and is not possible.
+        """
         return enclosure(self.sandbox)
 
     def admit(self, strategies: Sequence[Strategy], memory: int | None) -> None:
         """Find nothing to object to: the workers are copies of this process."""
 
     def compute(self, workload: Workload, wanted: Iterable[int]) -> Iterator[tuple[int, JobResult]]:
-        """Yield the result of every wanted job as it comes."""
+        """Yield the result of every wanted job as it comes.
+
+        Arguments:
+            wanted: places of jobs; the next is asked for when there is room for it.
+        """
         yield from compute_jobs(workload, wanted, self.workers)
 
 

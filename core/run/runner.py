@@ -105,9 +105,9 @@ class Plan:
             meta, known = recorded(stack, store, slots.meta, options.overwrite, options.resume)
             ending = stack.enter_context(ended(store, meta["run"]))
             results = Results(slots, store, meta["run"], receivers.progress, receivers.advance)
-            missing = results.keep(known, executor.workers)
+            wanted = stack.enter_context(stopping()).until(results.keep(known, executor.workers))
             workload = Workload(slots, references, limits, results.shelf)
-            for one in executor.compute(workload, stack.enter_context(stopping()).until(missing)):
+            for one in executor.compute(workload, wanted):
                 results.add(*one)
             others, done = origins_of(meta), results.in_order()
             ranked = rank_results([r for r in done if r.case not in others], meta["reference"])

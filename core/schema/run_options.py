@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Annotated, Any, Literal, TypedDict
@@ -23,23 +25,29 @@ Count = Annotated[int, Ge(1)]
 
 
 @dataclass(frozen=True)
-class OptionText:
-    """What the command line says of a field.
+class Flag:
+    """What the command line has for a field, whose help is what the docstring of its class says.
 
     Arguments:
-        flags: separated by blanks.
-        help, metavar: of the option.
-        parse: returns the value of its text, or raises a ValueError; None where the type says it.
-        multiple: whether the option may be repeated; `parse` has all texts.
+        names: separated by blanks; the name of the field where there is none.
+        metavar: what stands for the value in the help.
+        parse: returns the value of a text, or raises a ValueError; None where the type says it.
+        multiple: whether it may be repeated; `parse` has all texts.
         show_default: whether the help names the default.
     """
 
-    flags: str
-    help: str
+    names: str = ""
     metavar: str | None = None
     parse: Callable[[Any], Any] | None = None
     multiple: bool = False
     show_default: bool = False
+
+
+def describe_fields(kind: type) -> dict[str, str]:
+    """Return what the docstring of a dataclass says of its fields, each on one line."""
+    listed = inspect.cleandoc(kind.__doc__ or "").partition("Arguments:\n")[2]
+    entries = re.findall(r"^    (\w+): ((?:.|\n(?!    \w))*)", listed, re.MULTILINE)
+    return {name: " ".join(text.split()) for name, text in entries}
 
 
 @dataclass(frozen=True)
@@ -47,46 +55,18 @@ class Where:
     """Where the jobs of a run are computed: in processes of this machine, or on a cluster.
 
     Arguments:
-        jobs: number of worker processes, or of Slurm jobs; None for one a processor.
-        scheduler: address of a Dask scheduler that runs, ``tcp://HOST:PORT``.
-        cluster: one to start, ``local:N`` or ``slurm:QUEUE``.
-        sandbox: of strategies: ``auto``, where that is possible; ``require``; ``off``.
+        jobs: Number of worker processes. Default: one per core. With --cluster slurm:QUEUE the
+            number of Slurm jobs.
+        scheduler: Run the jobs on the workers of the Dask scheduler there, e.g. tcp://host:8786.
+        cluster: Start a Dask cluster for the run: local:N workers here, or slurm:QUEUE.
+        sandbox: Run strategies where they see no case, no file of yours, no other process and no
+            network (Linux): where that is possible, or not at all, or without.
     """
 
-    jobs: Annotated[
-        Count | None,
-        OptionText(
-            "-j --jobs",
-            "Number of worker processes. Default: one per core. With --cluster slurm:QUEUE the "
-            "number of Slurm jobs.",
-            "N",
-        ),
-    ] = None
-    scheduler: Annotated[
-        str | None,
-        OptionText(
-            "--scheduler",
-            "Run the jobs on the workers of the Dask scheduler there, e.g. tcp://host:8786.",
-            "ADDRESS",
-        ),
-    ] = None
-    cluster: Annotated[
-        str | None,
-        OptionText(
-            "--cluster",
-            "Start a Dask cluster for the run: local:N workers here, or slurm:QUEUE.",
-            "CLUSTER",
-        ),
-    ] = None
-    sandbox: Annotated[
-        Sandbox,
-        OptionText(
-            "--sandbox",
-            "Run strategies where they see no case, no file of yours, no other process and no "
-            "network (Linux): where that is possible, or not at all, or without.",
-            show_default=True,
-        ),
-    ] = "auto"
+    jobs: Annotated[Count | None, Flag("-j --jobs", "N")] = None
+    scheduler: Annotated[str | None, Flag(metavar="ADDRESS")] = None
+    cluster: Annotated[str | None, Flag(metavar="CLUSTER")] = None
+    sandbox: Annotated[Sandbox, Flag(show_default=True)] = "auto"
 
 
 @dataclass(frozen=True)
@@ -94,86 +74,36 @@ class RunOptions:
     """What a run computes, within which limits, and which stored results it takes.
 
     Arguments:
-        seeds: number of draws of noise, or the seeds themselves; None for the data as recorded.
-        seed: the first one, and that of the statistics.
-        nominal: the models that strategies start from: as drawn, with the values of handbooks
-            (``textbook``), or both.
-        twins, twin_seed: number of twins of every case whose truth was computed; what they are
-            drawn from, None for a seed by chance.
-        resume: goes on with the last run of these jobs in the store.
-        overwrite: computes stored results anew: ``always`` all, ``missing`` none, ``failed`` the
-            failures, which is usual with `resume`; without it all are.
-        timeout, timeouts: seconds that a job may take, None for no limit; of single strategies.
-        memory: bytes that a job may take; None for an even share of the machine's.
+        seeds: Run N draws of measurement noise, seeds S+1 .. S+N, instead of the data as recorded.
+        seed: The first seed.
+        nominal: The model that all strategies start from: as drawn, or with what handbooks give
+            for torsion, shear and rotary inertia, from which the ranks are.
+        twins: Draw N twins of every case whose truth was computed, other structures under other
+            names, and say who is good on the cases but not on them; run one job of each strategy
+            twice.
+        twin_seed: What twins are drawn from. Default: a seed by chance.
+        resume: Continue the last run of these jobs: run what is missing, and failed jobs again.
+            Without CASE and -s, continue the last run in the store.
+        overwrite: Which stored results of the same jobs are computed again: all, none, or the
+            failures. Default: always; with --resume: failed.
+        timeout: Seconds that a job may take; None for no limit.
+        timeouts: Give up on a job after this time, e.g. 90s, 10m, 1h. STRATEGY=DURATION is for one
+            strategy; may be repeated. Default: 10m.
+        memory: Stop a job that takes more, e.g. 512M, 4G. Default: an even share of the machine's.
     """
 
-    seeds: Annotated[
-        Count | tuple[Seed, ...] | None,
-        OptionText(
-            "--seeds",
-            "Run N draws of measurement noise, seeds S+1 .. S+N, instead of the data as recorded.",
-            "N",
-        ),
-    ] = None
-    seed: Annotated[Seed, OptionText("--seed", "The first seed.", "S", show_default=True)] = 0
-    nominal: Annotated[
-        StartModels,
-        OptionText(
-            "--nominal",
-            "The model that all strategies start from: as drawn, or with what handbooks give for "
-            "torsion, shear and rotary inertia, from which the ranks are.",
-            show_default=True,
-        ),
-    ] = "both"
-    twins: Annotated[
-        Annotated[int, Ge(0), Le(MOST_TWINS)],
-        OptionText(
-            "--twins",
-            "Draw N twins of every case whose truth was computed, other structures under other "
-            "names, and say who is good on the cases but not on them; run one job of each strategy "
-            "twice.",
-            "N[:SEED]",
-            parse_twins,
-        ),
-    ] = 0
+    seeds: Annotated[Count | tuple[Seed, ...] | None, Flag(metavar="N")] = None
+    seed: Annotated[Seed, Flag(metavar="S", show_default=True)] = 0
+    nominal: Annotated[StartModels, Flag(show_default=True)] = "both"
+    twins: Annotated[int, Ge(0), Le(MOST_TWINS), Flag("", "N[:SEED]", parse_twins)] = 0
     twin_seed: Annotated[int, Ge(0)] | None = None
-    resume: Annotated[
-        bool,
-        OptionText(
-            "--resume",
-            "Continue the last run of these jobs: run what is missing, and failed jobs again. "
-            "Without CASE and -s, continue the last run in the store.",
-        ),
-    ] = False
-    overwrite: Annotated[
-        Overwrite | None,
-        OptionText(
-            "--overwrite",
-            "Which stored results of the same jobs are computed again: all, none, or the "
-            "failures. Default: always; with --resume: failed.",
-        ),
-    ] = None
+    resume: Annotated[bool, Flag()] = False
+    overwrite: Annotated[Overwrite | None, Flag()] = None
     timeout: Seconds | None = DEFAULT_TIMEOUT
     timeouts: Annotated[
-        Mapping[str, Seconds],
-        OptionText(
-            "--timeout",
-            "Give up on a job after this time, e.g. 90s, 10m, 1h. STRATEGY=DURATION is for one "
-            "strategy; may be repeated. Default: 10m.",
-            "DURATION",
-            parse_timeouts,
-            multiple=True,
-        ),
+        Mapping[str, Seconds], Flag("--timeout", "DURATION", parse_timeouts, multiple=True)
     ] = field(default_factory=dict)
-    memory: Annotated[
-        Count | None,
-        OptionText(
-            "--memory",
-            "Stop a job that takes more, e.g. 512M, 4G. Default: an even share of the machine's.",
-            "SIZE",
-            parse_size,
-        ),
-    ] = None
+    memory: Annotated[Count | None, Flag("", "SIZE", parse_size)] = None
 
     @property
     def all_seeds(self) -> Sequence[int]:
