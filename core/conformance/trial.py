@@ -24,7 +24,7 @@ from femubench.core.fem.model import Model
 from femubench.core.plugin.foreign import imported
 from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Result, Strategy, declared
-from femubench.core.run.answers import packed
+from femubench.core.run.answers import pack_outcome
 from femubench.core.run.jobs import JobOutcome, one_line, plain_outcome
 from femubench.core.run.workers import Ending
 
@@ -159,7 +159,7 @@ def _observe(trial: Trial) -> tuple[Observation, bytes]:
         outcome = plain_outcome(result)
     except Exception as error:
         outcome = JobOutcome("failed", one_line(error))
-    return found, packed(outcome, problem.model)
+    return found, pack_outcome(outcome, problem.model)
 
 
 def brought(subject: Any) -> Any:  # noqa: ANN401 - any role
