@@ -84,9 +84,8 @@ def hostile() -> Iterator[bytes]:
     wide = LowRank(np.ones((size, 50)), np.eye(50))
     for changes in ({"stiffness": spoilt}, {"mass": wild}, {"mass_change": wide}):
         yield pack_outcome(JobOutcome("ok", model=replace(model, **changes)), model)
-    yield pack_outcome(
-        JobOutcome("ok", model=replace(model, stiffness=-1.0 * model.stiffness)), model
-    )
+    turned = replace(model, stiffness=-1.0 * model.stiffness)
+    yield pack_outcome(JobOutcome("ok", model=turned), model)
     yield from (GOOD[:n] for n in range(1, len(GOOD), 997))
     yield b"o" + pickle.dumps(os.system)
     yield b"o\0\0\0\0\0\1\0\0" + b"[" * 65536
@@ -143,9 +142,8 @@ def test_a_judge_that_hangs_is_ended_in_time_and_replaced(judges: Judges[int]) -
 def test_an_answer_is_judged_within_its_memory(judges: Judges[int]) -> None:
     size = CASE.model.size
     large = LowRank(np.zeros((size, 30 * MIB // (8 * size))), np.eye(2))
-    answer = pack_outcome(
-        JobOutcome("ok", model=replace(CASE.model, mass_change=large)), CASE.model
-    )
+    model = replace(CASE.model, mass_change=large)
+    answer = pack_outcome(JobOutcome("ok", model=model), CASE.model)
     fresh = result(judges, GOOD)
     refused = result(judges, answer, replace(LIMITS, memory=20 * MIB))
     assert (refused["status"], refused["reason"][:10]) == ("failed", "the update")
@@ -160,9 +158,8 @@ def test_a_judge_that_has_grown_is_replaced(
 ) -> None:
     size = CASE.model.size
     large = LowRank(np.ones((size, 120 * MIB // (8 * size))), np.eye(2))
-    answer = pack_outcome(
-        JobOutcome("ok", model=replace(CASE.model, mass_change=large)), CASE.model
-    )
+    model = replace(CASE.model, mass_change=large)
+    answer = pack_outcome(JobOutcome("ok", model=model), CASE.model)
     fresh = result(judges, GOOD)
     before = process(judges)
     assert "core has shape" in result(judges, answer, replace(LIMITS, memory=None))["reason"]

@@ -10,11 +10,10 @@ import tracemalloc
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, cast
 
+import msgspec
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
 
 from femubench.core.conformance.fingerprints import fingerprint, first_difference, global_state
 from femubench.core.conformance.problems import UpdatingProblem
@@ -105,13 +104,8 @@ def run_trial(trial: Trial) -> bytes:
         found, answer = _observe(trial)
     except Exception as error:
         found = Observation(trial.problem.name, "error", one_line(error))
-    head = _told().dump_json(found)
+    head = msgspec.json.encode(found)
     return len(head).to_bytes(_LENGTH, "big") + head + answer
-
-
-@cache
-def _told() -> TypeAdapter[Observation]:
-    return TypeAdapter(Observation)
 
 
 def told_by(problem: str, ending: Ending) -> tuple[Observation, bytes]:
@@ -120,8 +114,9 @@ def told_by(problem: str, ending: Ending) -> tuple[Observation, bytes]:
         return Observation(problem, "stopped", ending.reason, ending.seconds), b""
     size = int.from_bytes(ending.answer[:_LENGTH], "big")
     try:
-        found = _told().validate_json(ending.answer[_LENGTH : _LENGTH + min(size, _LONGEST)])
-    except (ValidationError, RecursionError):
+        text = ending.answer[_LENGTH : _LENGTH + min(size, _LONGEST)]
+        found = msgspec.json.decode(text, type=Observation)
+    except (msgspec.DecodeError, UnicodeError):
         found = None
     if found is None or found.kind == "lacking":  # what a problem lacks is not for it to say
         return Observation(problem, "error", "what its process told is no observation"), b""

@@ -132,8 +132,8 @@ def parse_json(
         expected: what it should have been, for the message.
 
     Raises:
-        InputError: when it is no JSON, has NaN, infinity or half a character in it, or is nested too
-            deeply.
+        InputError: when it is no JSON, has NaN, infinity or half a character in it, or is nested
+            too deeply.
     """
     what = "nested too deeply"
     try:
@@ -142,7 +142,7 @@ def parse_json(
         what = f"not JSON: {error}"
         try:
             json.loads(text, parse_constant=_not_json)
-        except ValueError as named:  # with line and column
+        except (ValueError, RecursionError) as named:  # with line and column
             what = f"not JSON: {named}"
     except RecursionError:
         pass
