@@ -42,7 +42,7 @@ def read_plain(
         return msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
         path, what, expected = find_fault(kind, data, error)
-    path = (key + path.replace(f".{hidden}.", ".", 1)).lstrip(".")
+    path = (key + (path.replace(f".{hidden}.", ".", 1) if hidden else path)).lstrip(".")
     raise InputError(what, file=file, line=line, key=path or None, expected=expected)
 
 
@@ -77,22 +77,25 @@ def find_fault(
     if not words.startswith("Expected "):
         return path, words.replace("Invalid enum value", "unknown value"), None
     if where.startswith("key") or not got:
-        return path, "out of bounds", expected
+        return path, "of another form" if "regex" in expected else "out of bounds", expected
     return path, what, expected
 
 
 def _culprit(kind: Any, data: object, steps: Sequence[Any], message: str) -> str:  # noqa: ANN401
-    """Return the key of a mapping at which the same error is raised again."""
+    """Return the key of a mapping at which the same error is raised again, by halves of it."""
     table: Any = data
     for step in steps:
         table = table and table[step]
-    for name, value in (table or {}).items():
+    names = list(table or {})
+    while len(names) > 1:
+        first = names[: len(names) // 2]
         try:
-            msgspec.convert(_put(data, steps, {name: value}), kind)
+            msgspec.convert(_put(data, steps, {name: table[name] for name in first}), kind)
+            found = ""
         except msgspec.ValidationError as error:
-            if str(error) == message:
-                return str(name)
-    return "..."
+            found = str(error)
+        names = first if found == message else names[len(first) :]
+    return str(*names) or "..."
 
 
 def _put(data: Any, steps: Sequence[Any], value: object) -> object:  # noqa: ANN401
