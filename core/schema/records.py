@@ -124,7 +124,7 @@ def check_extent(
 def parse_json(
     text: str | bytes, *, file: Path | str | None = None, line: int | None = None, expected: str
 ) -> Any:  # noqa: ANN401 - JSON data of any form
-    """Return the data of a JSON text from a stranger.
+    """Return the data of a JSON text that anybody may have written.
 
     Arguments:
         text: not longer than the caller can bear.
@@ -166,10 +166,8 @@ def decode_result(data: bytes) -> JobResult:
     """
     try:
         return _DECODER.decode(data)
-    except msgspec.ValidationError:
-        return read_plain(JobResult, msgspec.json.decode(data))
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"not JSON: {error}", expected="a result") from None
+    except (msgspec.DecodeError, UnicodeError, RecursionError):
+        return read_plain(JobResult, parse_json(data, expected="a result"))
 
 
 _DECODER = msgspec.json.Decoder(JobResult)
