@@ -28,7 +28,7 @@ from threadpoolctl import threadpool_limits
 from femubench.core.library.cases import usable_plugins
 from femubench.core.library.rank import plan_run
 from femubench.core.modal import eigen
-from femubench.core.run.answers import packed, unpacked
+from femubench.core.run.answers import pack_outcome, unpack_outcome
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.jobs import Job, performed
 from femubench.core.run.judging import judged
@@ -128,7 +128,7 @@ def solutions(plan: Plan) -> Solutions:
             if isinstance(slot.job, Job):
                 # By way of its bytes: the strategy's model has modes that the judge's has not.
                 outcome, given = performed(slot.job)
-                outcome = unpacked(packed(outcome, given), slot.case.model)
+                outcome = unpack_outcome(pack_outcome(outcome, given), slot.case.model)
                 names = slot.strategy, slot.seed, slot.nominal
                 judged(slot.case, references[slot.case.name], names, outcome)
     return found

@@ -16,7 +16,7 @@ import femubench
 from femubench import InputError, Model, Sensors
 from femubench.core.case.units import from_si, in_si
 from femubench.core.cli.main import bench
-from femubench.core.run.answers import packed, unpacked
+from femubench.core.run.answers import pack_outcome, unpack_outcome
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.typing import FloatArray
 from femubench.fem import Coupling, Eccentricity, GroundSpring, LowRank, Place, PointMass, Property
@@ -819,6 +819,6 @@ def test_a_run_takes_over_what_a_strategy_makes_of_the_model(
 ) -> None:
     nominal = model(cards)
     wanted = changed(nominal, {("E", "all"): 1.1})
-    found = unpacked(packed(JobOutcome("ok", model=wanted), nominal), nominal).model
+    found = unpack_outcome(pack_outcome(JobOutcome("ok", model=wanted), nominal), nominal).model
     assert found is not None
     assert near(found, wanted, 0.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import pickle
 import random
 import re
@@ -17,6 +16,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from hypothesis import HealthCheck, given, settings, strategies as st
+from msgspec import msgpack
 
 from femubench.core.fem import frame as frames
 from femubench.core.fem.frame import Frame
@@ -24,7 +24,7 @@ from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import constant_kappa
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.run.answers import AnswerError, head_of, packed, unpacked
+from femubench.core.run.answers import AnswerError, pack_outcome, read_report, unpack_outcome
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.judging import judged
 from femubench.core.run.plain_frame import frame_from_plain, frame_to_plain
@@ -44,12 +44,17 @@ HEAD = {
 
 
 def sent(head: Any, rest: bytes = b"", status: bytes = b"o") -> bytes:
-    text = head if isinstance(head, bytes) else json.dumps(head).encode()
+    text = head if isinstance(head, bytes) else msgpack.encode(head)
+    if isinstance(head, dict):
+        model = {name: head[name] for name in ("model", "samples", "structure") if name in head}
+        answer = {"report": {"status": "ok", **head}, "model": model or None}
+        text = msgpack.encode([answer, head.get("arrays", [])])
     return status + len(text).to_bytes(8, "big") + text + rest
 
 
 def through(model: Model, nominal: Model = NOMINAL, *samples: Model) -> JobOutcome:
-    return unpacked(packed(JobOutcome("ok", model=model, samples=samples), nominal), nominal)
+    outcome = JobOutcome("ok", model=model, samples=samples)
+    return unpack_outcome(pack_outcome(outcome, nominal), nominal)
 
 
 def same(first: Any, second: Any) -> bool:
@@ -148,7 +153,8 @@ def test_figures_get_through_to_the_last_bit() -> None:
         history=({"residual": 1e-300},),
         diagnostics={"nan": float("inf")},
     )
-    assert head_of(packed(outcome)) == unpacked(packed(outcome), NOMINAL) == outcome
+    answer = pack_outcome(outcome)
+    assert read_report(answer) == unpack_outcome(answer, NOMINAL) == outcome
 
 
 # --- frames with every list filled --------------------------------------------------------------
@@ -222,8 +228,8 @@ def test_every_list_of_a_frame_is_tried() -> None:
 @settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
 def test_frames_with_every_list_filled_get_through(frame: Frame) -> None:
     nominal = NOMINAL.frame_structure.frame
-    text = json.dumps(frame_to_plain(frame, nominal))
-    found = frame_from_plain(json.loads(text), nominal, 10_000)
+    text = msgpack.encode(frame_to_plain(frame, nominal))
+    found = frame_from_plain(msgpack.decode(text), nominal, 10_000)
     for name in [f.name for f in fields(Frame) if f.name != "members"]:
         assert getattr(found, name) == getattr(frame, name)
         assert type(getattr(found, name)) is type(getattr(frame, name))
@@ -257,7 +263,7 @@ def test_a_pickle_does_nothing(
     monkeypatch.syspath_prepend(str(tmp_path))
     for data in (sent(head, code), sent(head, code)[1:], b"o" + code, code):
         with pytest.raises(AnswerError):
-            unpacked(data, NOMINAL)
+            unpack_outcome(data, NOMINAL)
     assert not hasattr(Model, "planted")
     assert "numpy_evil" not in sys.modules
 
@@ -272,10 +278,10 @@ def test_the_pickles_of_the_test_would_do_harm() -> None:
         pickle.loads(_Build.module)
 
 
-HUGE = json.dumps(HEAD).replace('"evaluations": 3', '"evaluations": 1' + "0" * 5000).encode()
-TWICE = json.dumps(HEAD).replace('"seconds"', '"seconds": 1, "seconds"').encode()
 LONG_PARAMETER = {"name": "n" * 500, "before": 1.0, "after": 1.0, "unit": "", "std": None}
 PAIR = [["<f8", [1], "C"]]
+DEEP = b"\x81\xa9structure\x81\xa6fields\x81\xa1x" + b"\x91" * 100_000
+BARE = {"properties": [0], "springs": 0, "parameters": [], "changes": [0, 0]}
 
 
 @pytest.mark.parametrize(
@@ -284,39 +290,43 @@ PAIR = [["<f8", [1], "C"]]
         (b"", "does not say how the job ended"),
         (b"x" + sent(HEAD)[1:], "does not say how the job ended"),
         (b"o\xff" * 20, "a head of"),
-        (sent({}), "cannot be read"),
-        (sent([]), "the head is list"),
-        (sent({**HEAD, "seconds": "0"}), "'0' is no number"),
-        (sent({**HEAD, "seconds": 10**400}), "too large"),
-        (sent({**HEAD, "seconds": float("inf")}), "inf is no time"),
+        (sent({}), "cannot be read: there is no model"),
+        (sent([]), r"cannot be read: the head: 0, expected a list of length 2"),
+        (sent({**HEAD, "seconds": "0"}), "report.seconds: a text, expected a number"),
+        (sent({**HEAD, "seconds": float("inf")}), "report.seconds: out of bounds"),
         # A result without a time is one that no report of the run reads.
-        (sent({**HEAD, "seconds": float("nan")}, status=b"f"), "nan is no time"),
-        (sent({**HEAD, "evaluations": -1}), "-1 is no count"),
-        (sent({**HEAD, "parameters": [LONG_PARAMETER] * 10_000}), "characters of figures"),
-        (sent({**HEAD, "samples": [HEAD["model"]] * 65}), "65 samples, allowed 64"),
-        (sent({**HEAD, "history": [1]}), "updated model|cannot be read"),
-        (sent({**HEAD, "diagnostics": {"x": None}}), "None is no number"),
-        (sent({**HEAD, "reason": 3}), "3 is no text"),
-        (sent({**HEAD, "history": [{str(i): 0.0 for i in range(200_001)}]}), "more figures"),
-        (sent(b"[" * 100_000), "the head is no JSON"),
-        (sent(b"[" + b"0," * 4_100_000 + b"0]"), "more figures"),
-        (sent(HUGE), "the head is no JSON"),
-        (sent(TWICE), "the key 'seconds' comes twice"),
+        (sent({**HEAD, "seconds": float("nan")}, status=b"f"), "report.seconds: out of bounds"),
+        (sent({**HEAD, "evaluations": -1}), "evaluations: out of bounds, expected a whole"),
+        (sent({**HEAD, "evaluations": 2**64 - 1}), "evaluations: out of bounds, expected a whole"),
+        (sent({**HEAD, "evaluations": True}), "evaluations: true or false, expected a whole"),
+        (sent({**HEAD, "discrepancy_std": -0.1}), "discrepancy_std: out of bounds, expected a n"),
+        (sent({**HEAD, "parameters": [LONG_PARAMETER] * 10_000}), "bytes of figures, allowed"),
+        (sent({**HEAD, "parameters": [{"name": "E"}]}), r"parameters\[0\].before: missing"),
+        (sent({**HEAD, "samples": [HEAD["model"]] * 65}), "samples: .* a list of length <= 64"),
+        (sent({**HEAD, "history": [1]}), r"history\[0\]: a whole number, expected a table"),
+        (sent({**HEAD, "diagnostics": {"x": None}}), "diagnostics.*nothing, expected a number"),
+        (sent({**HEAD, "reason": 3}), "reason: a whole number, expected a text"),
+        (sent({**HEAD, "history": [{str(i): 0.0 for i in range(200_001)}]}), "length <= 200000"),
+        (sent({**HEAD, "history": [{}] * 200_001}), "history: .* a list of length <= 200000"),
+        (sent(b"\x91" * 100_000), "the head"),
+        (sent(b"\xdd\xff\xff\xff\xff"), "the head"),
+        (sent(b"\x92\x82\xa6report\x81\xa6status\xa2ok\xa5model" + DEEP), "recursion depth"),
+        (sent(b"\xc6" + bytes(33 * 2**20)), "a head of 34603009 bytes"),
         (sent({**HEAD, "arrays": [["<f8", [10**9], "C"]]}), "arrays of 8000000000 bytes in 0"),
         (sent({**HEAD, "arrays": [["<f8", [2**39, 2**39], "C"]]}), "arrays of"),
-        (sent({**HEAD, "arrays": [["|O", [1], "C"]]}, b"x" * 8), "no array of real numbers"),
-        (sent({**HEAD, "arrays": [["<f8", [-1], "C"]]}), "no array of real numbers"),
+        (sent({**HEAD, "arrays": [["|O", [1], "C"]]}, b"x" * 8), "value '|O'"),
+        (sent({**HEAD, "arrays": [["<f8", [-1], "C"]]}), "out of bounds, expected a whole number"),
         (sent({**HEAD, "arrays": PAIR}, b"x" * 9), "arrays of 8 bytes in 9"),
         (sent(HEAD, pickle.dumps(3)), "arrays of 0 bytes"),
-        (sent({**HEAD, "model": 3}), "no mass and stiffness"),
-        (sent({**HEAD, "model": {**HEAD["model"], "mass": 0}}), "mass is no sparse array"),  # type: ignore[dict-item]
-        (sent({**HEAD, "structure": {}}), "no structure"),
-        (sent({**HEAD, "structure": {"properties": [0]}}), "there is no array 0"),
+        (sent({**HEAD, "model": 3}), "model.model: a whole number, expected a table"),
+        (sent({**HEAD, "model": {**HEAD["model"], "mass": 0}}), "model.mass: a whole number"),  # type: ignore[dict-item]
+        (sent({**HEAD, "structure": {}}), "structure.properties: missing"),
+        (sent({**HEAD, "structure": BARE}), "there is no array 0"),
     ],
 )  # fmt: skip
 def test_what_is_no_outcome_is_refused_in_one_line(data: bytes, says: str) -> None:
     with pytest.raises(AnswerError, match=says) as caught:
-        unpacked(data, NOMINAL)
+        unpack_outcome(data, NOMINAL)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 3000
 
@@ -326,7 +336,7 @@ def test_no_word_of_a_strategy_is_obeyed_by_a_terminal(status: bytes) -> None:
     evil = "\x1b[2J\x07 and\nmore \u202e"
     estimate = {**LONG_PARAMETER, "name": evil, "unit": evil}
     said = {"reason": evil, "traceback": evil, "parameters": [estimate], "diagnostics": {evil: 1.0}}
-    found = unpacked(sent({**HEAD, **said, "history": [{evil: 1.0}]}, status=status), NOMINAL)
+    found = unpack_outcome(sent({**HEAD, **said, "history": [{evil: 1.0}]}, status=status), NOMINAL)
     (parameter,), (figures,) = found.parameters, found.history
     texts = [found.reason, parameter["name"], parameter["unit"], *figures, *found.diagnostics]
     assert texts == ["\\x1b[2J\\x07 and more \\u202e"] * 5
@@ -335,9 +345,12 @@ def test_no_word_of_a_strategy_is_obeyed_by_a_terminal(status: bytes) -> None:
 
 def test_words_of_another_encoding_arrive_in_one_that_can_be_written() -> None:
     outcome = JobOutcome("failed", "\ud800 why", "\udfff")
-    assert head_of(packed(outcome)).reason == "? why"
-    forged = sent({**HEAD, "reason": "\ud800"}, status=b"f")
-    head_of(forged).reason.encode()
+    assert read_report(pack_outcome(outcome)).reason == "? why"
+    found = read_report(pack_outcome(JobOutcome("failed", diagnostics={"\udfff": 1.0})))
+    assert list(found.diagnostics) == ["?"]
+    forged = sent({**HEAD, "reason": "???"}, status=b"f").replace(b"???", b"\xed\xa0\x80")
+    with pytest.raises(AnswerError, match="cannot be read: the head cannot be read: 'utf-8' codec"):
+        read_report(forged)
 
 
 def forged(change: Callable[[dict[str, Any], list[Any]], None]) -> bytes:
@@ -347,13 +360,14 @@ def forged(change: Callable[[dict[str, Any], list[Any]], None]) -> bytes:
     spring = frames.JointSpring(member.ends[0], member.name, {"ry": 1e4, "rx": 1e4})
     frame = replace(structure.frame, joint_springs=(spring,))
     factor = Property("E", "E", (f"{member.name}/1",))
-    data = packed(
+    data = pack_outcome(
         JobOutcome("ok", model=Model.of(structure.rebuilt(frame).with_values([factor], [0.9]))),
         NOMINAL,
     )
     size = int.from_bytes(data[1:9], "big")
-    head, rest, arrays = json.loads(data[9 : 9 + size]), data[9 + size :], []
-    for entries, shape, order in head.pop("arrays"):
+    (answer, tables), rest, arrays = msgpack.decode(data[9 : 9 + size]), data[9 + size :], []
+    head = answer["report"] | answer["model"]
+    for entries, shape, order in tables:
         count = np.dtype(entries).itemsize * int(np.prod(shape))
         arrays.append(np.frombuffer(rest[:count], entries).reshape(shape, order=order).copy())
         rest = rest[count:]
@@ -402,7 +416,7 @@ FRAME_OF = ("structure", "fields")
         (_set("structure", "parameters", 0, "quantity", "magic"), "unknown quantity"),
         (_set("structure", "parameters", 0, "places", ["nowhere/1"]), "there is no place"),
         (_set(*FRAME_OF, "joint_springs", []), "its degrees of freedom are not those"),
-        (_set(*FRAME_OF, "joint_springs", 0, "arm", "long"), "joint_springs.0.arm"),
+        (_set(*FRAME_OF, "joint_springs", 0, "arm", "long"), r"joint_springs\[0\].arm: a text"),
         (_set(*FRAME_OF, "joint_springs", 0, "member", "nobody"), "updated model: "),
         (
             _set(*FRAME_OF, "joint_springs", 0, "arm", float("nan")),
@@ -415,7 +429,7 @@ FRAME_OF = ("structure", "fields")
         (_set("structure", "properties", []), "the properties of its elements"),
         (_set("structure", None), "has shape"),
         (_set("model", "mass", "shape", [3, 3]), "mass is not a valid sparse array"),
-        (_set("model", "mass", "form", "dia"), "mass is no sparse array"),
+        (_set("model", "mass", "form", "dia"), "mass.form: unknown value 'dia'"),
         (_fill("stiffness", 1, 2**30), "stiffness is not a valid sparse array"),
         (_fill("stiffness", 1, -1), "stiffness is not a valid sparse array"),
         (_fill("stiffness", 2, 2**30), "stiffness is not a valid sparse array"),
@@ -443,14 +457,14 @@ def test_parts_of_an_entry_that_cancel_hide_nothing() -> None:
     place = np.argsort(hidden[2], kind="stable")
     matrix = sp.csc_array((hidden[0][place], hidden[1][place], starts), shape=(NOMINAL.size,) * 2)
     forged_model = replace(NOMINAL, stiffness=matrix)
-    result = verdict_on(packed(JobOutcome("ok", model=forged_model), NOMINAL))
+    result = verdict_on(pack_outcome(JobOutcome("ok", model=forged_model), NOMINAL))
     assert (result["status"], result["reason"][:26]) == ("failed", "stiffness is not symmetric")
 
 
 def verdict_on(data: bytes) -> dict[str, Any]:
     """Return what the judge makes of an answer."""
     try:
-        outcome = unpacked(data, NOMINAL)
+        outcome = unpack_outcome(data, NOMINAL)
     except AnswerError as error:
         outcome = JobOutcome("failed", str(error))
     return result_to_json(judged(CASE, reference_of(CASE), ("s", 0, "drawn"), outcome))
@@ -461,7 +475,7 @@ def test_members_in_billions_of_elements_are_not_meshed() -> None:
         frame = replace(NOMINAL.frame_structure.frame)
         members = tuple(replace(member, elements=10**9) for member in frame.members)
         plain = frame_to_plain(replace(frame, members=members), frame)
-        head["structure"]["fields"]["members"] = json.loads(json.dumps(plain))["members"]
+        head["structure"]["fields"]["members"] = msgpack.decode(msgpack.encode(plain))["members"]
 
     assert "more than the" in verdict_on(forged(many))["reason"]
 
@@ -491,7 +505,7 @@ def test_broken_answers_are_read_or_refused_in_one_line(count: int) -> None:
             length = len(data) - (len(whole) - size) - 9
             data[1:9] = max(length, 0).to_bytes(8, "big")
         try:
-            unpacked(bytes(data), NOMINAL)
+            unpack_outcome(bytes(data), NOMINAL)
             read += 1
         except AnswerError as error:
             said.append(str(error))

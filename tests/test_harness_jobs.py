@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from femubench.core.errors import StrategyFailure
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.measurement import Measurement
-from femubench.core.run.answers import head_of
+from femubench.core.run.answers import read_report
 from femubench.core.run.jobs import Job, execute, missing_capability, seed_words
 from femubench.core.run.judging import run_strategy
 from femubench.core.run.model_checks import check_model
@@ -76,7 +76,7 @@ def test_a_strategy_that_cannot_be_unpickled_has_failed() -> None:
 
 
 def test_an_outcome_that_cannot_be_sent_has_failed() -> None:
-    outcome = head_of(run_strategy(job(toys.Unsendable())))
+    outcome = read_report(run_strategy(job(toys.Unsendable())))
     assert outcome.status == "failed"
     assert outcome.reason == "mass is ndarray, expected a sparse array"
 

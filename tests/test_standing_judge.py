@@ -20,7 +20,7 @@ import pytest
 
 from femubench.core.fem.model import LowRank
 from femubench.core.run import schedule, standing_judge
-from femubench.core.run.answers import packed
+from femubench.core.run.answers import pack_outcome
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.judging import Dossier
 from femubench.core.run.limits import MIB, Limits
@@ -35,7 +35,7 @@ import harness_toys as toys
 CASE = toys.tiny_case()
 PICKLED = pickle.dumps((CASE, reference_of(CASE)))
 SOFTER = replace(CASE.model, stiffness=0.9 * CASE.model.stiffness)
-GOOD = packed(JobOutcome("ok", model=SOFTER, parameter_count=1), CASE.model)
+GOOD = pack_outcome(JobOutcome("ok", model=SOFTER, parameter_count=1), CASE.model)
 LIMITS = Limits(60.0, 512 * MIB)
 
 
@@ -83,8 +83,9 @@ def hostile() -> Iterator[bytes]:
     wild.indices = np.full_like(wild.indices, 2**30)
     wide = LowRank(np.ones((size, 50)), np.eye(50))
     for changes in ({"stiffness": spoilt}, {"mass": wild}, {"mass_change": wide}):
-        yield packed(JobOutcome("ok", model=replace(model, **changes)), model)
-    yield packed(JobOutcome("ok", model=replace(model, stiffness=-1.0 * model.stiffness)), model)
+        yield pack_outcome(JobOutcome("ok", model=replace(model, **changes)), model)
+    turned = replace(model, stiffness=-1.0 * model.stiffness)
+    yield pack_outcome(JobOutcome("ok", model=turned), model)
     yield from (GOOD[:n] for n in range(1, len(GOOD), 997))
     yield b"o" + pickle.dumps(os.system)
     yield b"o\0\0\0\0\0\1\0\0" + b"[" * 65536
@@ -141,7 +142,8 @@ def test_a_judge_that_hangs_is_ended_in_time_and_replaced(judges: Judges[int]) -
 def test_an_answer_is_judged_within_its_memory(judges: Judges[int]) -> None:
     size = CASE.model.size
     large = LowRank(np.zeros((size, 30 * MIB // (8 * size))), np.eye(2))
-    answer = packed(JobOutcome("ok", model=replace(CASE.model, mass_change=large)), CASE.model)
+    model = replace(CASE.model, mass_change=large)
+    answer = pack_outcome(JobOutcome("ok", model=model), CASE.model)
     fresh = result(judges, GOOD)
     refused = result(judges, answer, replace(LIMITS, memory=20 * MIB))
     assert (refused["status"], refused["reason"][:10]) == ("failed", "the update")
@@ -156,7 +158,8 @@ def test_a_judge_that_has_grown_is_replaced(
 ) -> None:
     size = CASE.model.size
     large = LowRank(np.ones((size, 120 * MIB // (8 * size))), np.eye(2))
-    answer = packed(JobOutcome("ok", model=replace(CASE.model, mass_change=large)), CASE.model)
+    model = replace(CASE.model, mass_change=large)
+    answer = pack_outcome(JobOutcome("ok", model=model), CASE.model)
     fresh = result(judges, GOOD)
     before = process(judges)
     assert "core has shape" in result(judges, answer, replace(LIMITS, memory=None))["reason"]

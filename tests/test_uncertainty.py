@@ -16,7 +16,7 @@ from scipy.stats import norm
 
 import femubench
 from femubench import Measurement, Model, Strategy, StrategyFailure, UpdateResult, solve_modes
-from femubench.core.run.answers import head_of, packed, unpacked
+from femubench.core.run.answers import pack_outcome, read_report, unpack_outcome
 from femubench.core.run.jobs import Job, JobOutcome, execute, seed_words
 from femubench.core.run.judging import judged
 from femubench.core.schema.paired_modes import PairedMode
@@ -240,7 +240,7 @@ def other_size() -> Model:
 def test_an_uncertainty_that_is_none_fails_in_one_line(stated: object, says: str) -> None:
     outcome = outcome_of(stated)
     if outcome.status == "ok":  # what only the judge looks into
-        outcome = unpacked(packed(outcome, CASE.model), CASE.model)
+        outcome = unpack_outcome(pack_outcome(outcome, CASE.model), CASE.model)
     result = judged(CASE, reference_of(CASE), ("stating", 0, "drawn"), outcome)
     assert result.status == "failed"
     assert says in result.reason
@@ -249,7 +249,7 @@ def test_an_uncertainty_that_is_none_fails_in_one_line(stated: object, says: str
 
 def test_samples_that_are_no_models_do_not_get_out_of_a_worker() -> None:
     forged = JobOutcome("ok", model=CASE.model, samples=(object(),), discrepancy_std=0.0)  # type: ignore[arg-type]
-    sent = head_of(packed(forged, CASE.model))
+    sent = read_report(pack_outcome(forged, CASE.model))
     assert (sent.status, sent.reason[:31]) == ("failed", "the result cannot be sent back:")
 
 

@@ -16,11 +16,10 @@ from femubench.core.conformance.fingerprints import fingerprint
 from femubench.core.conformance.problems import UpdatingProblem
 from femubench.core.conformance.results import Given, faults_of
 from femubench.core.conformance.trial import Observation
-from femubench.core.run.answers import AnswerError, unpacked
+from femubench.core.run.answers import AnswerError, unpack_outcome
 from femubench.core.run.workers import Ending
 from femubench.core.update.strategy import ParameterEstimate, UpdateResult
 
-_ESTIMATE = ("name", "before", "after", "unit", "std")
 _TRAVELLED = "picklable"  # the check that a result has arrived
 
 
@@ -42,7 +41,7 @@ class Handed:
 def judge_handed(handed: Handed) -> bytes:
     """Return faults and fingerprint of what was handed back as JSON; runs in a worker."""
     try:
-        outcome = unpacked(handed.answer, handed.problem.model)
+        outcome = unpack_outcome(handed.answer, handed.problem.model)
     except AnswerError as error:
         return json.dumps([{_TRAVELLED: str(error)}, {}]).encode()
     if outcome.model is None:
@@ -50,7 +49,8 @@ def judge_handed(handed: Handed) -> bytes:
     result = UpdateResult(
         model=outcome.model,
         parameters=tuple(
-            ParameterEstimate(*(item[name] for name in _ESTIMATE)) for item in outcome.parameters
+            ParameterEstimate(p["name"], p["before"], p["after"], p["unit"], p["std"])
+            for p in outcome.parameters
         ),
         history=outcome.history,
         diagnostics=outcome.diagnostics,

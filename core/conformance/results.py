@@ -15,7 +15,7 @@ from femubench.core.errors import FemubenchError
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.eigen import enough_modes, solve_modes, zero_tolerance
 from femubench.core.modal.rigid import rigid_modes_of
-from femubench.core.run.answers import head_of, packed, unpacked
+from femubench.core.run.answers import pack_outcome, read_report, unpack_outcome
 from femubench.core.run.jobs import JobOutcome, one_line
 from femubench.core.run.model_checks import check_model
 from femubench.core.schema.paired_modes import PairedMode
@@ -124,12 +124,12 @@ def sendable(given: Given) -> str | None:
     nominal = given.problem.model
     if sizes(given):
         return None
-    data = packed(JobOutcome("ok", model=model), nominal)
-    head = head_of(data)
+    data = pack_outcome(JobOutcome("ok", model=model), nominal)
+    head = read_report(data)
     if head.status != "ok":
         return f"{head.reason}, expected a model of the structure that was given"
     try:
-        arrived = unpacked(data, nominal).model
+        arrived = unpack_outcome(data, nominal).model
     except FemubenchError as error:
         return str(error)
     path = first_difference(_sent(model), _sent(arrived))

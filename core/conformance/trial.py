@@ -10,11 +10,10 @@ import tracemalloc
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, cast
 
+import msgspec
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
 
 from femubench.core.conformance.fingerprints import fingerprint, first_difference, global_state
 from femubench.core.conformance.problems import UpdatingProblem
@@ -24,7 +23,7 @@ from femubench.core.fem.model import Model
 from femubench.core.plugin.foreign import imported
 from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Result, Strategy, declared
-from femubench.core.run.answers import packed
+from femubench.core.run.answers import pack_outcome
 from femubench.core.run.jobs import JobOutcome, one_line, plain_outcome
 from femubench.core.run.workers import Ending
 
@@ -105,13 +104,8 @@ def run_trial(trial: Trial) -> bytes:
         found, answer = _observe(trial)
     except Exception as error:
         found = Observation(trial.problem.name, "error", one_line(error))
-    head = _adapter().dump_json(found)
+    head = msgspec.json.encode(found)
     return len(head).to_bytes(_LENGTH, "big") + head + answer
-
-
-@cache
-def _adapter() -> TypeAdapter[Observation]:
-    return TypeAdapter(Observation)
 
 
 def read_observation(problem: str, ending: Ending) -> tuple[Observation, bytes]:
@@ -120,8 +114,9 @@ def read_observation(problem: str, ending: Ending) -> tuple[Observation, bytes]:
         return Observation(problem, "stopped", ending.reason, ending.seconds), b""
     size = int.from_bytes(ending.answer[:_LENGTH], "big")
     try:
-        found = _adapter().validate_json(ending.answer[_LENGTH : _LENGTH + min(size, _LONGEST)])
-    except (ValidationError, RecursionError):
+        text = ending.answer[_LENGTH : _LENGTH + min(size, _LONGEST)]
+        found = msgspec.json.decode(text, type=Observation)
+    except (msgspec.DecodeError, UnicodeError):
         found = None
     if found is None or found.kind == "lacking":  # what a problem lacks is not for it to say
         return Observation(problem, "error", "what its process sent is no observation"), b""
@@ -159,7 +154,7 @@ def _observe(trial: Trial) -> tuple[Observation, bytes]:
         outcome = plain_outcome(result)
     except Exception as error:
         outcome = JobOutcome("failed", one_line(error))
-    return found, packed(outcome, problem.model)
+    return found, pack_outcome(outcome, problem.model)
 
 
 def import_subject(subject: Any) -> Any:  # noqa: ANN401 - any role

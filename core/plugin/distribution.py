@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from email.message import Message
 
 LONGEST_LINE = 500  # characters
-HOMEPAGE = r"^(https?://[^\s\"'<>\\]+)?$"
-DOI = r"^(10\.\d{4,9}/[^\s\"'<>\\]+)?$"
+HOMEPAGE = r"^(https?://[^\s\"'<>\\]+)?\Z"
+DOI = r"^(10\.\d{4,9}/[^\s\"'<>\\]+)?\Z"
 # Labels of addresses, the best first, as packaging.python.org lists them.
 _LABELS = ("homepage", "repository", "source", "sourcecode", "github", "documentation", "docs")
 

@@ -29,7 +29,7 @@ from femubench.core.score.ranking import rank_results
 from femubench.core.score.scoring import frequency_error
 
 SCHEMA = 1
-_MOMENT = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,9})?(\+00:00|Z)$"
+_MOMENT = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,9})?(\+00:00|Z)\Z"
 _LONGEST = 1e9  # s
 _ROUNDING = 1e-6  # relative, of an rms that is computed again from its modes
 _Word = Annotated[str, Meta(max_length=200)]

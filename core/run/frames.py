@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from msgspec import to_builtins
+
 from femubench.core.schema.records import run_from_json, run_to_json
 from femubench.core.schema.results import BLOCKS, Run
 from femubench.core.score.scoring import frequency_error
@@ -68,16 +70,11 @@ def modes_frame(run: Run) -> pd.DataFrame:
             "seed": result.seed,
             "nominal": result.nominal,
             "block": name,
-            "modification": mode.modification,
-            "mode": mode.number,
-            "measured_hz": mode.measured_hz,
-            "predicted_hz": mode.predicted_hz,
+            **to_builtins(mode),
             "error_percent": None
             if mode.predicted_hz is None or mode.predicted_hz <= 0.0
             else 100.0 * (mode.predicted_hz / mode.measured_hz - 1.0),
             "counted_percent": 100.0 * frequency_error(mode),
-            "mac": mode.mac,
-            "predicted_std_hz": mode.predicted_std_hz,
         }
         for result in run.results
         for name, block in result.blocks.items()

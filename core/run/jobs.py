@@ -9,9 +9,10 @@ import traceback
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Annotated, Any, NotRequired, TypedDict
 
 import numpy as np
+from msgspec import Meta
 
 from femubench.core.errors import Diverged, NotApplicable, StrategyFailure
 from femubench.core.fem.joints import place_words
@@ -19,10 +20,12 @@ from femubench.core.fem.model import Model, differ
 from femubench.core.modal.eigen import counted_evaluations
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import CAPABILITIES, Result, declared
+from femubench.core.schema.bounds import Seconds, Whole
 from femubench.core.schema.results import Status
 from femubench.core.update.uncertainty import MOST_SAMPLES
 
 _LONGEST_TEXT = 100_000  # characters of a message or a traceback
+_MOST_FIGURES = 200_000
 _MOST_LINKS = 20  # of a chain of exceptions
 
 
@@ -42,33 +45,56 @@ class Job:
     words: tuple[int, ...]
 
 
+class Estimate(TypedDict):
+    """A parameter before and after an update, and what it says where it sits."""
+
+    name: str
+    before: float
+    after: float
+    unit: str
+    std: float | None
+    places: NotRequired[str]
+
+
+_Figures = Annotated[Mapping[str, float], Meta(max_length=_MOST_FIGURES)]
+
+
 @dataclass(frozen=True)
-class JobOutcome:
-    """What a strategy left behind, before anybody has judged it.
+class Report:
+    """What a strategy says of its update, in plain data.
 
     Arguments:
         status, reason, traceback: how it ended.
         seconds: wall time of the strategy alone.
         evaluations: eigenvalue solutions it made.
-        model: the updated model; None unless the status is ``ok``.
-        samples: models that are as probable as each other, their matrices on its dofs.
-        discrepancy_std: relative standard deviation of a frequency beside the samples; None where
-            the strategy says nothing of its uncertainty.
-        parameter_count, parameters, history, diagnostics: its own report in plain data.
+        discrepancy_std: relative standard deviation of a frequency that the samples do not show;
+            None where the strategy says nothing of its uncertainty.
+        parameter_count, parameters, history, diagnostics: as it gave them.
     """
 
     status: Status
     reason: str = ""
     traceback: str = ""
-    seconds: float = 0.0
-    evaluations: int | None = None
+    seconds: Seconds = 0.0
+    evaluations: Whole | None = None
+    discrepancy_std: Seconds | None = None
+    parameter_count: Whole | None = None
+    parameters: Annotated[tuple[Estimate, ...], Meta(max_length=_MOST_FIGURES)] = ()
+    history: Annotated[tuple[_Figures, ...], Meta(max_length=_MOST_FIGURES)] = ()
+    diagnostics: _Figures = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class JobOutcome(Report):
+    """What a strategy left behind, before anybody has judged it.
+
+    Arguments:
+        model: the updated model; None unless the status is ``ok``.
+        samples: models that are as probable as each other, their matrices on its dofs.
+    """
+
     model: Model | None = None
     samples: tuple[Model, ...] = ()
-    discrepancy_std: float | None = None
-    parameter_count: int | None = None
-    parameters: tuple[Mapping[str, Any], ...] = ()
-    history: tuple[Mapping[str, float], ...] = ()
-    diagnostics: Mapping[str, float] = field(default_factory=dict)
 
 
 def sent(thing: object) -> bytes:
@@ -254,16 +280,16 @@ def _uncertainty(result: Result, model: Model) -> tuple[tuple[Model, ...], float
     return tuple(replace(sample, **own, groups={}) for sample in samples), discrepancy
 
 
-def _parameter(item: Any, model: Model) -> dict[str, Any]:  # noqa: ANN401 - a `ParameterEstimate`
+def _parameter(item: Any, model: Model) -> Estimate:  # noqa: ANN401 - a `ParameterEstimate`
     places = place_words(model.structure, getattr(item, "places", ()))
-    return {
-        "name": str(item.name),
-        "before": float(item.before),
-        "after": float(item.after),
-        "unit": str(item.unit),
-        "std": None if item.std is None else float(item.std),
-        **({"places": places} if places else {}),
-    }
+    found = Estimate(
+        name=str(item.name),
+        before=float(item.before),
+        after=float(item.after),
+        unit=str(item.unit),
+        std=None if item.std is None else float(item.std),
+    )
+    return {**found, "places": places} if places else found
 
 
 def _figures(item: Mapping[str, float]) -> dict[str, float]:

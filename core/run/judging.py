@@ -8,12 +8,14 @@ import warnings
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+from msgspec import Struct
+
 from femubench.core.case.case import Case
 from femubench.core.errors import FemubenchError, StrategyFailure
-from femubench.core.run.answers import AnswerError, packed, unpacked
+from femubench.core.run.answers import AnswerError, pack_outcome, unpack_outcome
 from femubench.core.run.jobs import Job, JobOutcome, one_line, performed
 from femubench.core.run.model_checks import check_model
-from femubench.core.schema.records import result_to_json
+from femubench.core.schema.records import encode
 from femubench.core.schema.results import JobResult, Nominal
 from femubench.core.score.predicted_spread import Spread
 from femubench.core.score.scoring import Reference, given_errors, judge, score_of
@@ -27,7 +29,7 @@ class Dossier:
 
     Arguments:
         case: the case and its `Reference`, pickled by this program; empty where the judge has it.
-        answer: of the strategy's worker, from `packed`; nobody has looked into it yet.
+        answer: of the strategy's worker, from `pack_outcome`; nobody has looked into it yet.
         strategy, seed, nominal: of the job.
         exhibited: whether its exhibit is wanted too.
     """
@@ -40,21 +42,28 @@ class Dossier:
     exhibited: bool = False
 
 
+class Judgement(Struct):
+    """The result of a job, and its exhibit where one was wanted."""
+
+    result: JobResult
+    exhibit: dict[str, Any] | None = None
+
+
 def run_strategy(job: Job) -> bytes:
-    """Return the packed outcome of a job; runs in a worker."""
-    return packed(*performed(job))
+    """Return the pack_outcome outcome of a job; runs in a worker."""
+    return pack_outcome(*performed(job))
 
 
 def run_judge(verdict: Dossier, case: Case, reference: Reference) -> bytes:
     """Return the result of a job and its exhibit as JSON; runs in a judge's process."""
     try:
-        outcome = unpacked(verdict.answer, case.model)
+        outcome = unpack_outcome(verdict.answer, case.model)
     except AnswerError as error:
         outcome = JobOutcome("failed", str(error), traceback.format_exc())
     job = verdict.strategy, verdict.seed, verdict.nominal
     result = judged(case, reference, job, outcome)
     exhibit = _exhibit(case, outcome, result) if verdict.exhibited else None
-    return json.dumps({"result": result_to_json(result), "exhibit": exhibit}).encode()
+    return encode(Judgement(result, exhibit))
 
 
 def _exhibit(case: Case, outcome: JobOutcome, result: JobResult) -> dict[str, Any] | None:

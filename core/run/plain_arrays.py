@@ -1,31 +1,44 @@
-"""Bytes that hold a head of JSON and arrays of numbers, and cannot hold anything else.
+"""Bytes that hold a head of plain data and arrays of numbers, and cannot hold anything else.
 
 Of the formats at hand safetensors 0.8 scrambles arrays in Fortran's order, on which the last bit of
-a product depends, and the members of an NPZ are inflated before their sizes are known.
+a product depends, and the members of an NPZ are inflated before their sizes are known. The head is
+MessagePack, read as the classes that it is to hold: unlike JSON it knows nan and infinity.
 """
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_type_hints
 
+import msgspec
 import numpy as np
+from msgspec import Meta, Struct
 
 from femubench.core.errors import FemubenchError
+from femubench.core.schema.records import encodable, to_builtin
+from femubench.core.schema.validation import find_fault
 from femubench.core.typing import AnyArray
 
 _LENGTH = 8  # bytes that hold the length of the head
-_LONGEST_HEAD = 64 * 2**20  # bytes
-_MOST_VALUES = 4_000_000  # in a head: each takes a hundred bytes of memory once it is read
-_MOST_ARRAYS = 10_000
-_ENTRIES = {name: np.dtype(name) for name in ("<f8", "<f4", "<f2", "<i8", "<i4", "<i2", "|i1")}
-_BEFORE_VALUES = b",:[{"
+_LONGEST_HEAD = 32 * 2**20  # bytes: each may take a hundred of memory once it is read
+_Size = Annotated[int, Meta(ge=0, lt=2**40)]
+_T = TypeVar("_T")
 
 
 class BytesError(FemubenchError):
     """Bytes are no head with arrays; the text says why."""
+
+
+class _Table(Struct, array_like=True):
+    """Form of an array whose numbers follow the head."""
+
+    entries: Literal["<f8", "<f4", "<f2", "<i8", "<i4", "<i2", "|i1"]
+    shape: Annotated[list[_Size], Meta(max_length=2)]
+    order: Literal["C", "F"]
+
+
+_Tables = Annotated[list[_Table], Meta(max_length=10_000)]
+_ENTRIES = get_args(get_type_hints(_Table)["entries"])
 
 
 class Shelf:
@@ -53,89 +66,69 @@ class Shelf:
             self._arrays.append(array.astype(entries, copy=False))
         return place
 
-    def sealed(self, head: Mapping[str, Any]) -> bytes:
+    def seal(self, head: object) -> bytes:
         """Return a head and all arrays as bytes.
 
         Raises:
-            TypeError, ValueError: when the head is no JSON.
+            TypeError, ValueError, OverflowError: when the head is no plain data.
         """
-        tables, parts = [], []
+        tables, parts = list[_Table](), list[bytes]()
         for array in self._arrays:
             order = "F" if array.flags.f_contiguous and not array.flags.c_contiguous else "C"
-            tables.append([array.dtype.str, list(array.shape), order])
+            tables.append(_Table(array.dtype.str, list(array.shape), order))  # type: ignore[arg-type]
             parts.append(array.tobytes(order))  # type: ignore[arg-type]
-        text = json.dumps({**head, "arrays": tables}, default=_number).encode()
+        try:
+            text = _ENCODER.encode((head, tables))
+        except UnicodeEncodeError:
+            plain = msgspec.to_builtins((head, tables), enc_hook=to_builtin)
+            text = _ENCODER.encode(encodable(plain))
         return b"".join([len(text).to_bytes(_LENGTH, "big"), text, *parts])
 
 
-def _number(value: object) -> object:
-    if isinstance(value, np.generic):
-        return value.item()
-    raise TypeError(f"{type(value).__name__} is no plain data")
+_ENCODER = msgspec.msgpack.Encoder(enc_hook=to_builtin)
 
 
-def opened(
-    data: bytes | memoryview, longest_head: int = _LONGEST_HEAD
-) -> tuple[dict[str, Any], list[AnyArray]]:
-    """Return the head and the arrays of `Shelf.sealed`.
+def open_bytes(kind: type[_T], data: bytes | memoryview) -> tuple[_T, list[AnyArray]]:
+    """Return the head and the arrays of `Shelf.seal`.
 
-    Nothing is allocated before its size is known to be that of the bytes.
+    No array is allocated before its size is known to be that of the bytes.
 
     Arguments:
+        kind: of the head.
         data: from anybody.
-        longest_head: bytes of the JSON.
 
     Raises:
         BytesError: when they are something else.
     """
     view = memoryview(data)
     size = int.from_bytes(view[:_LENGTH], "big")
-    if len(view) < _LENGTH or size > min(longest_head, len(view) - _LENGTH):
-        raise BytesError(f"a head of {size} bytes in {len(view)}, allowed {longest_head}")
-    text = bytes(view[_LENGTH : _LENGTH + size])
-    if sum(text.count(bytes([mark])) for mark in _BEFORE_VALUES) > _MOST_VALUES:
-        raise BytesError("more figures than anybody reads")
+    if len(view) < _LENGTH or size > min(_LONGEST_HEAD, len(view) - _LENGTH):
+        raise BytesError(f"a head of {size} bytes in {len(view)}, allowed {_LONGEST_HEAD}")
+    form: Any = tuple[kind, _Tables]  # type: ignore[valid-type]
     try:
-        head = json.loads(text, object_pairs_hook=_once)
-    except BytesError:
-        raise
-    except (ValueError, RecursionError) as error:
-        raise BytesError(f"the head is no JSON: {' '.join(str(error).split())[:200]}") from error
-    if not isinstance(head, dict):
-        raise BytesError(f"the head is {type(head).__name__}, expected an object")
-    return head, _arrays(head.pop("arrays", None), view[_LENGTH + size :])
+        head, tables = msgspec.msgpack.decode(view[_LENGTH : _LENGTH + size], type=form)
+    except msgspec.ValidationError as error:
+        raise BytesError(f"the head{say_fault(form, None, error).removeprefix('[0]')}") from None
+    except (msgspec.DecodeError, ValueError, RecursionError) as error:
+        raise BytesError(f"the head cannot be read: {error}") from error
+    return head, _arrays(tables, view[_LENGTH + size :])
 
 
-def _once(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for name, value in pairs:
-        if name in found:
-            raise BytesError(f"the key {name[:100]!r} comes twice")
-        found[name] = value
+def say_fault(kind: object, data: object, error: msgspec.ValidationError) -> str:
+    """Return path, fault and expectation of an error of `msgspec`, in one line."""
+    path, what, expected = find_fault(kind, data, error)
+    return f"{path}: {what}" + (f", expected {expected}" if expected else "")
+
+
+def _arrays(tables: list[_Table], rest: memoryview) -> list[AnyArray]:
+    kinds = [np.dtype(table.entries) for table in tables]
+    counts = [math.prod(table.shape) for table in tables]
+    whole = sum(kind.itemsize * count for kind, count in zip(kinds, counts, strict=True))
+    if whole != len(rest):
+        raise BytesError(f"arrays of {str(whole)[:30]} bytes in {len(rest)}")
+    found, start = list[AnyArray](), 0
+    for table, kind, count in zip(tables, kinds, counts, strict=True):
+        flat = np.frombuffer(rest, dtype=kind, count=count, offset=start).copy()
+        found.append(flat.reshape(table.shape, order=table.order))
+        start += kind.itemsize * count
     return found
-
-
-def _arrays(tables: object, rest: memoryview) -> list[AnyArray]:
-    if not isinstance(tables, list) or len(tables) > _MOST_ARRAYS:
-        raise BytesError("no table of arrays")
-    kinds = [_kind(table) for table in tables]
-    sizes = [kind.itemsize * math.prod(shape) for kind, shape, _ in kinds]
-    if sum(sizes) != len(rest):
-        raise BytesError(f"arrays of {str(sum(sizes))[:30]} bytes in {len(rest)}")
-    found, start = [], 0
-    for (kind, shape, order), size in zip(kinds, sizes, strict=True):
-        flat = np.frombuffer(rest[start : start + size], dtype=kind).copy()
-        found.append(flat.reshape(shape, order=order))
-        start += size
-    return found
-
-
-def _kind(table: object) -> tuple[np.dtype[Any], tuple[int, ...], Any]:
-    match table:
-        case [str(entries), list(shape), "C" | "F" as order] if (
-            entries in _ENTRIES
-            and len(shape) <= 2
-            and all(type(count) is int and 0 <= count < 2**40 for count in shape)
-        ):
-            return _ENTRIES[entries], tuple(shape), order
-    raise BytesError(f"{str(table)[:100]} is no array of real numbers")

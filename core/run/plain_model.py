@@ -6,12 +6,13 @@ model, or of the frame with its changes meshed anew; nobody asks an answer for t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, fields, replace
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
+from msgspec import UNSET, Meta, Struct, UnsetType, structs
 
 from femubench.core.errors import StrategyFailure
 from femubench.core.fem.beam import BeamProperties
@@ -20,11 +21,7 @@ from femubench.core.fem.parameters import Property
 from femubench.core.fem.structure import Structure
 from femubench.core.run.model_checks import check_change, check_entries, check_indices
 from femubench.core.run.plain_arrays import BytesError, Shelf
-from femubench.core.run.plain_frame import (
-    frame_from_plain,
-    frame_to_plain,
-    read_plain,
-)
+from femubench.core.run.plain_frame import frame_from_plain, frame_to_plain
 from femubench.core.typing import AnyArray, IntArray, SparseArray
 from femubench.core.update.uncertainty import MOST_SAMPLES
 
@@ -35,10 +32,53 @@ _SAME = 1e-9  # relative: what is computed in another order
 Kept = tuple[Model, tuple[Model, ...]]
 
 
+class SparseParts(Struct, frozen=True):
+    """A sparse array; numbers of the arrays of its data, indices and starts."""
+
+    form: Literal["csc", "csr"]
+    shape: tuple[int, int]
+    parts: tuple[int, int, int]
+
+
+class Matrices(Struct, frozen=True):
+    """The matrices of a model; None for one that the reader has, numbers of arrays for changes."""
+
+    mass: SparseParts | None
+    stiffness: SparseParts | None
+    mass_change: tuple[int, int] | None = None
+    stiffness_change: tuple[int, int] | None = None
+
+
+class PlainStructure(Struct, frozen=True):
+    """A structure by its parameters and values, in numbers of arrays.
+
+    Arguments:
+        changes: arrays of the parameters that were set in turn, and of their values.
+        fields: what differs in its frame; None where that is the nominal one.
+        node, direction: of its dofs, where the frame is another.
+    """
+
+    properties: tuple[int, ...]
+    springs: int
+    parameters: tuple[Property, ...]
+    changes: tuple[int, int]
+    fields: dict[str, Any] | None = None
+    node: int = -1
+    direction: str = ""
+
+
+class PlainModel(Struct, frozen=True):
+    """A model and samples of it; a structure that is unset is that of the nominal model."""
+
+    model: Matrices
+    samples: Annotated[tuple[Matrices, ...], Meta(max_length=MOST_SAMPLES)] = ()
+    structure: PlainStructure | UnsetType | None = UNSET
+
+
 def model_to_plain(
     model: Model, samples: Sequence[Model], nominal: Model, shelf: Shelf
-) -> dict[str, Any]:
-    """Return a model and samples of it for `json.dumps`, their arrays on a shelf.
+) -> PlainModel:
+    """Return a model and samples of it as plain data, their arrays on a shelf.
 
     Raises:
         StrategyFailure: when it is no model of the structure that the nominal model is of.
@@ -47,26 +87,28 @@ def model_to_plain(
     structure = model.structure
     frame = None if nominal.structure is None else nominal.structure.frame
     if structure is None or structure.frame is frame:
-        own, given = model.dofs, nominal.dofs
-        if len(own) != len(given):
+        dofs, given = model.dofs, nominal.dofs
+        if len(dofs) != len(given):
             raise StrategyFailure(
-                f"the updated model has {len(own)} degrees of freedom, expected {len(given)}"
+                f"the updated model has {len(dofs)} degrees of freedom, expected {len(given)}"
             )
-        if own is not given and not (
-            own.direction == given.direction and np.array_equal(own.node, given.node)
+        if dofs is not given and not (
+            dofs.direction == given.direction and np.array_equal(dofs.node, given.node)
         ):
             raise StrategyFailure(
                 "the updated model has other degrees of freedom than the nominal model, expected "
                 "those of the nominal model in its order"
             )
-    plain = {"model": _matrices(model, nominal, shelf)}
-    plain["samples"] = [_matrices(sample, model, shelf) for sample in samples]  # type: ignore[assignment]
+    own = _matrices(model, nominal, shelf)
+    others = tuple(_matrices(sample, model, shelf) for sample in samples)
     if structure is nominal.structure:
-        return plain
-    return {**plain, "structure": None if structure is None else _plain(structure, nominal, shelf)}
+        return PlainModel(own, others)
+    if structure is None:
+        return PlainModel(own, others, None)
+    return PlainModel(own, others, _structure_to_plain(structure, nominal, shelf))
 
 
-def model_from_plain(data: Mapping[str, Any], arrays: Sequence[AnyArray], nominal: Model) -> Kept:
+def model_from_plain(data: PlainModel, arrays: Sequence[AnyArray], nominal: Model) -> Kept:
     """Return a model and samples of it.
 
     Raises:
@@ -74,25 +116,22 @@ def model_from_plain(data: Mapping[str, Any], arrays: Sequence[AnyArray], nomina
         StrategyFailure: for matrices that are none.
     """
     base = nominal
-    if "structure" in data:
+    if data.structure is not UNSET:
         base = replace(nominal, structure=None)
-        if data["structure"] is not None:
-            structure = _structure(data["structure"], arrays, nominal)
+        if data.structure is not None:
+            structure = _structure_from_plain(data.structure, arrays, nominal)
             base = replace(nominal, geometry=structure, structure=structure)
             assert nominal.structure is not None
             if structure.mesh is not nominal.structure.mesh:
                 base = replace(base, dofs=dofs_of(structure), groups={}, mass_groups={})
-    if len(data["samples"]) > MOST_SAMPLES:
-        raise BytesError(f"{len(data['samples'])} samples, allowed {MOST_SAMPLES}")
-    model = replace(base, **_read(data["model"], arrays, nominal))
-    return model, tuple(replace(model, **_read(item, arrays, model)) for item in data["samples"])
+    model = replace(base, **_read(data.model, arrays, nominal))
+    return model, tuple(replace(model, **_read(item, arrays, model)) for item in data.samples)
 
 
 # --- matrices ---------------------------------------------------------------------------------
 
 
-def _matrices(model: Model, known: Model, shelf: Shelf) -> dict[str, Any]:
-    """Return the matrices of a model; None for one that is that of a model known to the reader."""
+def _matrices(model: Model, known: Model, shelf: Shelf) -> Matrices:
     found: dict[str, Any] = {}
     for name in _MATRICES:
         matrix = getattr(model, name)
@@ -102,56 +141,37 @@ def _matrices(model: Model, known: Model, shelf: Shelf) -> dict[str, Any]:
         if change is not None:
             check_change(name, change)
             pair = np.asarray(change.basis), np.asarray(change.core)
-            found[name] = [shelf.put(array) for array in pair]
-    return found
+            found[name] = tuple(map(shelf.put, pair))
+    return Matrices(**found)
 
 
-def _entries(name: str, matrix: SparseArray, shelf: Shelf) -> dict[str, Any]:
+def _entries(name: str, matrix: SparseArray, shelf: Shelf) -> SparseParts:
     check_entries(name, matrix)
     if matrix.format not in _FORMS:
         matrix = sp.csc_array(matrix)
-    parts = (matrix.data, matrix.indices, matrix.indptr)
-    numbers = [shelf.put(part) for part in parts]
-    return {"form": matrix.format, "shape": list(matrix.shape), "parts": numbers}
+    data, indices, starts = map(shelf.put, (matrix.data, matrix.indices, matrix.indptr))
+    return SparseParts(matrix.format, matrix.shape, (data, indices, starts))
 
 
-def _read(data: object, arrays: Sequence[AnyArray], known: Model) -> dict[str, Any]:
-    match data:
-        case {"mass": mass, "stiffness": stiffness, **changes} if set(changes) <= set(_CHANGES):
-            pairs = zip(_MATRICES, (mass, stiffness), strict=True)
-        case _:
-            raise BytesError("no mass and stiffness")
-    found: dict[str, Any] = {
-        name: getattr(known, name) if entry is None else _sparse(name, entry, arrays)
-        for name, entry in pairs
-    }
+def _read(data: Matrices, arrays: Sequence[AnyArray], known: Model) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name in _MATRICES:
+        entry = getattr(data, name)
+        found[name] = getattr(known, name) if entry is None else _sparse(name, entry, arrays)
     for name in _CHANGES:
-        match changes.get(name):
-            case None:
-                found[name] = None
-            case [int(basis), int(core)]:
-                found[name] = LowRank(_taken(arrays, basis), _taken(arrays, core))
-            case _:
-                raise BytesError(f"{name} is no change of low rank")
+        pair = getattr(data, name)
+        found[name] = pair and LowRank(*(_taken(arrays, number) for number in pair))
     return found
 
 
-def _sparse(name: str, entry: object, arrays: Sequence[AnyArray]) -> SparseArray:
-    match entry:
-        case {
-            "form": "csc" | "csr" as form,
-            "shape": [int(rows), int(columns)],
-            "parts": [int(), int(), int()] as parts,
-        }:
-            data, indices, starts = (_taken(arrays, part) for part in parts)
-        case _:
-            raise BytesError(f"{name} is no sparse array")
+def _sparse(name: str, entry: SparseParts, arrays: Sequence[AnyArray]) -> SparseArray:
+    data, indices, starts = (_taken(arrays, part) for part in entry.parts)
     if not all(array.ndim == 1 and array.dtype.kind == "i" for array in (indices, starts)):
         raise BytesError(f"{name} is no sparse array: its indices are no whole numbers")
-    if len(starts) != (columns if form == "csc" else rows) + 1:
+    if len(starts) != entry.shape[entry.form == "csc"] + 1:
         raise BytesError(f"{name} is not a valid sparse array: {len(starts)} starts")
     try:
-        found = _FORMS[form]((data, indices, starts), shape=(rows, columns))
+        found = _FORMS[entry.form]((data, indices, starts), shape=entry.shape)
     except (ValueError, TypeError, IndexError, OverflowError) as error:
         raise BytesError(f"{name} is not a valid sparse array: {error}") from error
     check_indices(name, found)
@@ -164,8 +184,8 @@ def _sparse(name: str, entry: object, arrays: Sequence[AnyArray]) -> SparseArray
     return found
 
 
-def _taken(arrays: Sequence[AnyArray], number: object) -> AnyArray:
-    if type(number) is not int or not 0 <= number < len(arrays):
+def _taken(arrays: Sequence[AnyArray], number: int) -> AnyArray:
+    if not 0 <= number < len(arrays):
         raise BytesError(f"there is no array {str(number)[:30]}")
     return arrays[number]
 
@@ -173,29 +193,32 @@ def _taken(arrays: Sequence[AnyArray], number: object) -> AnyArray:
 # --- frames -----------------------------------------------------------------------------------
 
 
-def _plain(structure: Structure, nominal: Model, shelf: Shelf) -> dict[str, Any]:
+def _structure_to_plain(structure: Structure, nominal: Model, shelf: Shelf) -> PlainStructure:
     if nominal.structure is None:
         raise StrategyFailure("the updated model holds a frame, and the nominal model has none")
-    properties = [shelf.put(getattr(structure.properties, f.name)) for f in fields(BeamProperties)]
     numbers: dict[Property, int] = {}
     each = [numbers.setdefault(parameter, len(numbers)) for parameter, _ in structure.changes]
-    found: dict[str, Any] = {
-        "properties": properties,
-        "springs": shelf.put(structure.springs),
-        "parameters": [asdict(parameter) for parameter in numbers],
-        "changes": [shelf.put(np.array(each, dtype=np.int64))],
-    }
     values = np.array([value for _, value in structure.changes], dtype=float)
-    found["changes"].append(shelf.put(values))
-    if structure.frame is not nominal.structure.frame:
-        kinematics = structure.kinematics
-        found["fields"] = frame_to_plain(structure.frame, nominal.structure.frame)
-        found["node"] = shelf.put(kinematics.node)
-        found["direction"] = "".join(name.ljust(2) for name in kinematics.direction)
-    return found
+    found = PlainStructure(
+        tuple(shelf.put(getattr(structure.properties, f.name)) for f in fields(BeamProperties)),
+        shelf.put(structure.springs),
+        tuple(numbers),
+        (shelf.put(np.array(each, dtype=np.int64)), shelf.put(values)),
+    )
+    if structure.frame is nominal.structure.frame:
+        return found
+    kinematics = structure.kinematics
+    return structs.replace(
+        found,
+        fields=frame_to_plain(structure.frame, nominal.structure.frame),
+        node=shelf.put(kinematics.node),
+        direction="".join(name.ljust(2) for name in kinematics.direction),
+    )
 
 
-def _structure(data: object, arrays: Sequence[AnyArray], nominal: Model) -> Structure:
+def _structure_from_plain(
+    data: PlainStructure, arrays: Sequence[AnyArray], nominal: Model
+) -> Structure:
     """Return a structure whose present properties follow from its frame and its parameters.
 
     Were they others, a modified structure would not follow from the model that was scored: what
@@ -203,21 +226,19 @@ def _structure(data: object, arrays: Sequence[AnyArray], nominal: Model) -> Stru
     """
     if nominal.structure is None:
         raise BytesError("the updated model holds a frame, and the nominal model has none")
-    if not isinstance(data, dict) or not isinstance(data.get("properties"), list):
-        raise BytesError("no structure")
     names = [f.name for f in fields(BeamProperties)]
-    columns = [_taken(arrays, number) for number in data["properties"]]
+    columns = [_taken(arrays, number) for number in data.properties]
     count = columns[0].size if columns else 0
     if len(columns) != len(names) or any(array.shape != (count,) for array in columns):
         raise BytesError("the properties of its elements are not one a property and element")
-    springs = _taken(arrays, data.get("springs"))
+    springs = _taken(arrays, data.springs)
     plain = nominal.structure
-    if "fields" in data:
-        plain = Structure.build(frame_from_plain(data["fields"], plain.frame, count))
+    if data.fields is not None:
+        plain = Structure.build(frame_from_plain(data.fields, plain.frame, count))
         kinematics = plain.kinematics
         direction = "".join(name.ljust(2) for name in kinematics.direction)
-        same = direction == data.get("direction")
-        if not same or not np.array_equal(kinematics.node, _taken(arrays, data.get("node"))):
+        same = direction == data.direction
+        if not same or not np.array_equal(kinematics.node, _taken(arrays, data.node)):
             raise BytesError("its degrees of freedom are not those of its frame, meshed anew")
     elif plain.changes:
         plain = Structure.build(plain.frame)
@@ -239,21 +260,14 @@ def _structure(data: object, arrays: Sequence[AnyArray], nominal: Model) -> Stru
     return replace(expected, properties=properties, springs=springs)
 
 
-def _changes(
-    data: Mapping[str, Any], arrays: Sequence[AnyArray]
-) -> list[tuple[int, Property, float]]:
+def _changes(data: PlainStructure, arrays: Sequence[AnyArray]) -> list[tuple[int, Property, float]]:
     """Return every parameter that was set, with its number and value, in turn."""
-    parameters = read_plain(tuple[Property, ...], data.get("parameters"), "parameters")
-    match data.get("changes"):
-        case [int(numbers), int(values)]:
-            each, given = _taken(arrays, numbers), _taken(arrays, values)
-        case _:
-            raise BytesError("no changes of parameters")
-    known = each.dtype.kind == "i" and np.all((each >= 0) & (each < len(parameters)))
+    each, given = (_taken(arrays, number) for number in data.changes)
+    known = each.dtype.kind == "i" and np.all((each >= 0) & (each < len(data.parameters)))
     if not (known and each.ndim == 1 and given.shape == each.shape):
         raise BytesError("the changes are not one value a parameter")
     pairs = zip(each.tolist(), given.tolist(), strict=True)
-    return [(number, parameters[number], value) for number, value in pairs]
+    return [(number, data.parameters[number], value) for number, value in pairs]
 
 
 def _turns(

@@ -13,15 +13,15 @@ from itertools import islice
 from typing import Any
 
 from femubench.core.errors import InputError
-from femubench.core.run.answers import AnswerError, head_of
+from femubench.core.run.answers import AnswerError, read_report
 from femubench.core.run.jobs import JobOutcome
-from femubench.core.run.judging import Dossier, judged, run_strategy
+from femubench.core.run.judging import Dossier, Judgement, judged, run_strategy
 from femubench.core.run.limits import Limits
 from femubench.core.run.slots import Slot, Start, first_seed
 from femubench.core.run.standing_judge import Judges
 from femubench.core.run.workers import Ending, Workers
-from femubench.core.schema.records import result_from_json
 from femubench.core.schema.results import JobResult, Status
+from femubench.core.schema.validation import read_plain
 from femubench.core.score.scoring import Reference
 
 _Task = tuple[int, bytes]  # place of a job, and its answer once it is there to be judged
@@ -171,7 +171,7 @@ class _Bench:
                 outcome = JobOutcome(status, ending.reason, seconds=ending.seconds)
             else:
                 try:
-                    outcome = head_of(ending.answer)
+                    outcome = read_report(ending.answer)
                 except AnswerError as error:
                     outcome = JobOutcome("failed", str(error), seconds=ending.seconds)
             if outcome.status == "ok":
@@ -182,14 +182,13 @@ class _Bench:
     def _judgement(self, slot: Slot, ending: Ending) -> JobResult | JobOutcome:
         if ending.how != "answer":
             return JobOutcome("failed", f"its model could not be judged: {ending.reason}")
-        data = json.loads(ending.answer)
         try:
-            result = result_from_json(data["result"])
+            found = read_plain(Judgement, json.loads(ending.answer))
         except InputError as error:
             return JobOutcome("failed", f"its result is out of bounds: {error}")
-        if self._load.show is not None and data["exhibit"] is not None:
-            self._load.show(slot, data["exhibit"])
-        return result
+        if self._load.show is not None and found.exhibit is not None:
+            self._load.show(slot, found.exhibit)
+        return found.result
 
     def _pickled(self, start: Start) -> tuple[bytes, bytes]:
         """Return a case and its reference as the judge reads them, after their digest."""

@@ -124,7 +124,7 @@ def check_extent(
 def parse_json(
     text: str | bytes, *, file: Path | str | None = None, line: int | None = None, expected: str
 ) -> Any:  # noqa: ANN401 - JSON data of any form
-    """Return the data of a JSON text from a stranger.
+    """Return the data of a JSON text that anybody may have written.
 
     Arguments:
         text: not longer than the caller can bear.
@@ -132,15 +132,21 @@ def parse_json(
         expected: what it should have been, for the message.
 
     Raises:
-        InputError: when it is no JSON, has NaN or infinity in it, or is nested too deeply.
+        InputError: when it is no JSON, has NaN, infinity or half a character in it, or is nested
+            too deeply.
     """
+    what = "nested too deeply"
     try:
-        return json.loads(text, parse_constant=_not_json)
-    except RecursionError:
-        raise InputError("nested too deeply", file=file, line=line, expected=expected) from None
-    except ValueError as error:
+        return msgspec.json.decode(text)
+    except (msgspec.DecodeError, UnicodeError) as error:
         what = f"not JSON: {error}"
-        raise InputError(what, file=file, line=line, expected=expected) from None
+        try:
+            json.loads(text, parse_constant=_not_json)
+        except (ValueError, RecursionError) as named:  # with line and column
+            what = f"not JSON: {named}"
+    except RecursionError:
+        pass
+    raise InputError(what, file=file, line=line, expected=expected)
 
 
 def _not_json(word: str) -> NoReturn:
@@ -160,10 +166,8 @@ def decode_result(data: bytes) -> JobResult:
     """
     try:
         return _DECODER.decode(data)
-    except msgspec.ValidationError:
-        return read_plain(JobResult, msgspec.json.decode(data))
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"not JSON: {error}", expected="a result") from None
+    except (msgspec.DecodeError, UnicodeError, RecursionError):
+        return read_plain(JobResult, parse_json(data, expected="a result"))
 
 
 _DECODER = msgspec.json.Decoder(JobResult)
@@ -174,10 +178,11 @@ def encode(data: object) -> bytes:
     try:
         return _ENCODER.encode(data)
     except UnicodeEncodeError:
-        return _ENCODER.encode(_encodable(msgspec.to_builtins(data, enc_hook=_to_builtin)))
+        return _ENCODER.encode(encodable(msgspec.to_builtins(data, enc_hook=to_builtin)))
 
 
-def _to_builtin(value: object) -> object:
+def to_builtin(value: object) -> object:
+    """Return a number of numpy or a mapping as msgspec knows it; raises TypeError for others."""
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, Mapping):
@@ -185,7 +190,7 @@ def _to_builtin(value: object) -> object:
     raise TypeError(f"{type(value).__name__} is no plain data")
 
 
-_ENCODER = msgspec.json.Encoder(enc_hook=_to_builtin)
+_ENCODER = msgspec.json.Encoder(enc_hook=to_builtin)
 
 
 def to_plain(data: object) -> Any:  # noqa: ANN401 - JSON data of any form
@@ -198,13 +203,13 @@ def compact(data: Mapping[str, Any]) -> str:
     return json.dumps(to_plain(data), separators=(",", ":"))
 
 
-def _encodable(data: Any) -> Any:  # noqa: ANN401 - JSON data of any form
+def encodable(data: Any) -> Any:  # noqa: ANN401 - JSON data of any form
     """Return plain data with a question mark for every character that UTF-8 does not know."""
     if isinstance(data, str):
         return data.encode("utf-8", "replace").decode()
     if isinstance(data, dict):
-        return {_encodable(key): _encodable(value) for key, value in data.items()}
-    return [_encodable(value) for value in data] if isinstance(data, list | tuple) else data
+        return {encodable(key): encodable(value) for key, value in data.items()}
+    return [encodable(value) for value in data] if isinstance(data, list | tuple) else data
 
 
 def result_to_json(result: JobResult) -> dict[str, Any]:

@@ -13,8 +13,8 @@ from femubench.core.errors import InputError
 
 _T = TypeVar("_T")
 _WORDS = {
-    **{"int": "a whole number", "float": "a number", "str": "a text", "null": "nothing"},
-    **{"object": "a table", "array": "a list", "bool": "true or false"},
+    **{"int": "a whole number", "float": "a number", "str": "a text", "bool": "true or false"},
+    **{"object": "a table", "array": "a list", "null": "nothing", "None": "nothing"},
 }
 
 
@@ -42,7 +42,7 @@ def read_plain(
         return msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
         path, what, expected = find_fault(kind, data, error)
-    path = (key + path.replace(f".{hidden}.", ".", 1)).lstrip(".")
+    path = (key + (path.replace(f".{hidden}.", ".", 1) if hidden else path)).lstrip(".")
     raise InputError(what, file=file, line=line, key=path or None, expected=expected)
 
 
@@ -54,7 +54,7 @@ def find_fault(
     """Return path, fault and expectation of an error that `msgspec.convert` raised.
 
     Arguments:
-        kind, data: that it was given.
+        kind, data: that it was given; without data a key of a mapping is not named.
     """
     # Behind " - at " stand names of fields alone, and dots for a key of a mapping.
     text, _, where = str(error).rpartition(" - at `")
@@ -66,33 +66,36 @@ def find_fault(
         steps.append(_culprit(kind, data, steps, str(error)) if step == "..." else step)
         if step.isdigit():
             steps[-1] = int(step)
-    path = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps)
+    path = "".join(f"[{s}]" if isinstance(s, int) or s == "..." else f".{s}" for s in steps)
     missing = re.fullmatch(r"Object missing required field `(\w+)`", text)
     if missing:
         return f"{path}.{missing[1]}", "missing", None
     words = re.sub(
-        r"`([a-z| ]+)`", lambda m: " or ".join(_WORDS.get(w, w) for w in m[1].split(" | ")), text
+        r"`([A-Za-z| ]+)`", lambda m: " or ".join(_WORDS.get(w, w) for w in m[1].split(" | ")), text
     )
     expected, got, what = words.removeprefix("Expected ").partition(", got ")
     if not words.startswith("Expected "):
-        return path, words, None
+        return path, words.replace("Invalid enum value", "unknown value"), None
     if where.startswith("key") or not got:
-        return path, "out of bounds", expected
+        return path, "of another form" if "regex" in expected else "out of bounds", expected
     return path, what, expected
 
 
 def _culprit(kind: Any, data: object, steps: Sequence[Any], message: str) -> str:  # noqa: ANN401
-    """Return the key of a mapping at which the same error is raised again."""
+    """Return the key of a mapping at which the same error is raised again, by halves of it."""
     table: Any = data
     for step in steps:
-        table = table[step]
-    for name, value in table.items():
+        table = table and table[step]
+    names = list(table or {})
+    while len(names) > 1:
+        first = names[: len(names) // 2]
         try:
-            msgspec.convert(_put(data, steps, {name: value}), kind)
+            msgspec.convert(_put(data, steps, {name: table[name] for name in first}), kind)
+            found = ""
         except msgspec.ValidationError as error:
-            if str(error) == message:
-                return str(name)
-    return "..."
+            found = str(error)
+        names = first if found == message else names[len(first) :]
+    return str(*names) or "..."
 
 
 def _put(data: Any, steps: Sequence[Any], value: object) -> object:  # noqa: ANN401
