@@ -22,10 +22,10 @@ from femubench.core.plugin.validation import chosen
 from femubench.core.version import __version__
 
 if TYPE_CHECKING:
+    from femubench.core.child.sandbox import Sandbox
     from femubench.core.library.rank import Plan
     from femubench.core.plugin.loader import Plugins
     from femubench.core.run.recording import Overwrite
-    from femubench.core.run.sandbox import Sandbox
     from femubench.core.run.store import Store
     from femubench.core.schema.results import Run
 

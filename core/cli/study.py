@@ -16,9 +16,9 @@ from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
 
 if TYPE_CHECKING:
+    from femubench.core.child.sandbox import Sandbox
     from femubench.core.library.study import StudyPlan
     from femubench.core.run.recording import Overwrite
-    from femubench.core.run.sandbox import Sandbox
     from femubench.core.run.store import Store
 
 

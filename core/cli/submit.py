@@ -16,8 +16,8 @@ from femubench.core.cli.registry import plugins_for
 from femubench.core.plugin.validation import chosen
 
 if TYPE_CHECKING:
+    from femubench.core.child.sandbox import Sandbox
     from femubench.core.library.rank import Twins
-    from femubench.core.run.sandbox import Sandbox
     from femubench.core.score.comparison import Threshold
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field, TypeAdapter, ValidationError
 
 from femubench.core.case.case import Case
+from femubench.core.child.sandbox import Sandbox
 from femubench.core.errors import InputError, NotApplicable
 from femubench.core.fem.model import differ
 from femubench.core.files import make_folder
@@ -29,7 +30,6 @@ from femubench.core.run.executor import Executor, executor_of
 from femubench.core.run.frames import modes_frame, results_frame
 from femubench.core.run.recording import Overwrite, Progress
 from femubench.core.run.runner import run_jobs
-from femubench.core.run.sandbox import Sandbox
 from femubench.core.run.starts import Start, Starts
 from femubench.core.run.store import Store
 from femubench.core.schema import records as serial, results

@@ -10,6 +10,7 @@ from os import PathLike
 from pathlib import Path
 
 from femubench.core.case.case import Case
+from femubench.core.child.sandbox import Sandbox
 from femubench.core.errors import InputError
 from femubench.core.files import make_folder
 from femubench.core.library.cases import case_names, read_cases, usable_plugins
@@ -28,7 +29,6 @@ from femubench.core.roles import Strategy
 from femubench.core.run.executor import Executor, executor_of
 from femubench.core.run.recording import Overwrite, Progress
 from femubench.core.run.runner import run_jobs
-from femubench.core.run.sandbox import Sandbox
 from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Start, Starts
 from femubench.core.run.store import Store

@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from femubench.core.child.sandbox import Sandbox
 from femubench.core.display import counted
 from femubench.core.errors import InputError
 from femubench.core.files import check_writable
@@ -19,7 +20,6 @@ from femubench.core.library.rank import Run, Twins, plan_of, read_run
 from femubench.core.library.report import rendered, rendering, report, reporter
 from femubench.core.pace import Told
 from femubench.core.run.executor import executor_of
-from femubench.core.run.sandbox import Sandbox
 
 if TYPE_CHECKING:
     from femubench.core.score.comparison import Comparison, Threshold

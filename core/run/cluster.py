@@ -7,6 +7,8 @@ import pickle
 import re
 import secrets
 import shutil
+import sys
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -14,8 +16,11 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
 from itertools import islice
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from femubench.core.child.limits import Limits
+from femubench.core.child.sandbox import OFF, Enclosure, Sandbox, enclosure
 from femubench.core.display import counted
 from femubench.core.errors import FemubenchError, InputError, require
 from femubench.core.roles import Strategy
@@ -29,13 +34,10 @@ from femubench.core.run.cluster_worker import (
     unfit,
 )
 from femubench.core.run.jobs import JobOutcome, one_line
-from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import home_of
-from femubench.core.run.sandbox import OFF, Enclosure, Sandbox, enclosure
 from femubench.core.run.schedule import Show, unjudged
 from femubench.core.run.slots import Slot, Start, first_seed
 from femubench.core.run.stopping import interrupts_kept
-from femubench.core.run.workers import no_script, repeating
 from femubench.core.schema.results import JobResult
 from femubench.core.score.scoring import Reference
 
@@ -330,9 +332,47 @@ def started(
         scale = partial(cluster.scale, **size)
         scale()
         # A nanny gives up a worker that dies as it starts.
-        stack.enter_context(repeating(scale, _COUNTED))
+        stack.enter_context(_repeat(scale, _COUNTED))
         client = stack.enter_context(_client(cluster))
         yield DaskWorkers(client, words, waits=queued, sandbox=sandbox)
+
+
+@contextmanager
+def _repeat(action: Callable[[], object], seconds: float) -> Iterator[None]:
+    """Call a function every so many seconds, in another thread, while the block runs."""
+    done = threading.Event()
+
+    def watch() -> None:
+        while not done.wait(seconds):
+            action()
+
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        done.set()
+        watcher.join()
+
+
+_hiding = threading.Lock()
+_hidden: list[ModuleType] = []
+
+
+@contextmanager
+def _no_script() -> Iterator[None]:
+    """Hide the script or notebook from a worker that starts, which would run it once more."""
+    with _hiding:
+        _hidden.append(sys.modules["__main__"])
+        sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        with _hiding:
+            # Blocks of several threads overlap; what the first of them found comes back last.
+            script = _hidden.pop()
+            if not _hidden:
+                sys.modules["__main__"] = script
 
 
 def _local(count: int) -> Cluster:
@@ -347,7 +387,7 @@ def _local(count: int) -> Cluster:
         """Starts its worker, also in place of one that died, without the user's script."""
 
         async def instantiate(self) -> Any:  # noqa: ANN401 - a distributed.Status
-            with no_script():
+            with _no_script():
                 return await super().instantiate()
 
     return LocalCluster(

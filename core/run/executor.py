@@ -8,11 +8,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
+from femubench.core.child.limits import Limits, memory_share
+from femubench.core.child.sandbox import Enclosure, Sandbox, enclosure
 from femubench.core.display import counted
 from femubench.core.errors import InputError, require
 from femubench.core.roles import Strategy
-from femubench.core.run.limits import Limits, memory_share
-from femubench.core.run.sandbox import Enclosure, Sandbox, enclosure
 from femubench.core.run.schedule import Show, computed
 from femubench.core.run.slots import Slot
 from femubench.core.schema.results import JobResult

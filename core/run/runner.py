@@ -13,11 +13,11 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from femubench.core.case.case import Case
+from femubench.core.child.limits import Limits
 from femubench.core.errors import InputError
 from femubench.core.pace import Told
 from femubench.core.roles import Strategy
 from femubench.core.run.executor import Executor, LocalProcesses, worker_count
-from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import home_of, plan_digest, run_meta
 from femubench.core.run.recording import Overwrite, Progress, Results, ended, recorded
 from femubench.core.run.slots import Slots
