@@ -17,7 +17,7 @@ import psutil
 from femubench.core.child.confinement import LENGTH_BYTES, READY, Confinement, object_frames
 from femubench.core.child.limits import Limits, spoken_bytes
 from femubench.core.child.namespaces import FOLDER
-from femubench.core.child.server import NUMBER, end_group, fork_server
+from femubench.core.child.server import NUMBER, end_group, end_server, fork_server
 
 How = Literal[
     "answer", "timeout", "memory", "output", "answer-size", "died", "no-start", "orphaned"
@@ -85,17 +85,17 @@ class GuardedChild:
         pipes = [os.pipe() for _ in range(4)]
         ours = [pipes[0][1], *(end for end, _ in pipes[1:])]
         theirs = [pipes[0][0], *(end for _, end in pipes[1:])]
+        server = fork_server()
         try:
-            fork_server().ask(module, theirs)
-        except OSError:
-            _close(ours)
-            raise
-        finally:
-            _close(theirs)
-        try:
+            try:
+                server.ask(module, theirs)
+            finally:
+                _close(theirs)
             pid = _number(ours[-1])
-        except BaseException:
+        except BaseException as error:
             _close(ours)  # where there is a child, it ends for want of a request
+            if isinstance(error, OSError):
+                end_server(server)
             raise
         for end in ours:
             os.set_blocking(end, False)

@@ -124,19 +124,26 @@ def fork_server() -> ForkServer:
     """Return the fork server of this process; a job may have ended the one before."""
     global _server
     with _starting:
-        if _server is None or not _server.alive:
+        if _server is not None and not _server.alive:
+            _server.end()
+            _server = None
+        if _server is None:
             _server = ForkServer()
         return _server
 
 
 @atexit.register
-def end_server() -> None:
-    """End the fork server of this process where there is one."""
+def end_server(which: ForkServer | None = None) -> None:
+    """End the fork server of this process where there is one.
+
+    Arguments:
+        which: the one that is meant; None for whichever runs.
+    """
     global _server
     with _starting:
-        if _server is not None:
+        if _server is not None and which in (None, _server):
             _server.end()
-        _server = None
+            _server = None
 
 
 def search_path() -> list[str]:
