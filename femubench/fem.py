@@ -4,6 +4,7 @@ from femubench.core.case.case import Modification
 from femubench.core.case.matrix_files import write_matrices
 from femubench.core.case.nodes import MatrixGeometry, matrix_model
 from femubench.core.case.opensees import from_opensees
+from femubench.core.child.workers import call_apart
 from femubench.core.errors import ModelError
 from femubench.core.fem.beam import (
     BeamProperties,
@@ -97,6 +98,7 @@ __all__ = [
     "Structure",
     "Support",
     "bredt",
+    "call_apart",
     "constant_kappa",
     "coupling_matrices",
     "eccentric_mass_parts",

@@ -244,3 +244,19 @@ def run_apart(
     for key in orphaned:
         found |= run_apart({key: tasks[key]}, limits, 1, module)
     return found
+
+
+def call_apart(
+    function: Callable[[Any], bytes], argument: object, seconds: float, memory: int, module: str
+) -> Ending:
+    """Return how a call of a function ended in a process of its own, from which it reads files.
+
+    Arguments:
+        function: importable by name; returns bytes.
+        argument: its argument; pickled.
+        seconds: that it may take.
+        memory: bytes that it may take, libraries and answer among them.
+        module: of femubench, which is loaded once for all calls.
+    """
+    limits = Limits(seconds, memory, answer=memory, sandbox="processes")
+    return run_apart({0: (function, argument)}, limits, 1, module)[0]
