@@ -23,6 +23,7 @@ BUDGETS = {
     "core/case": 6_100,
     "core/challenge": 2_035,
     "core/change": 1_300,
+    "core/child": 1_840,
     "core/cli": 2_540,
     "core/conformance": 2_400,
     "core/diagnosis": 2_120,

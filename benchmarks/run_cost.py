@@ -18,13 +18,14 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from multiprocessing import forkserver
 from typing import Any
 from unittest.mock import patch
 
 import psutil
 from threadpoolctl import threadpool_limits
 
+from femubench.core.child.sandbox import Sandbox
+from femubench.core.child.server import fork_server
 from femubench.core.library.cases import usable_plugins
 from femubench.core.library.rank import plan_run
 from femubench.core.modal import eigen
@@ -33,7 +34,6 @@ from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.jobs import Job, performed
 from femubench.core.run.judging import judged
 from femubench.core.run.runner import Plan, Receivers
-from femubench.core.run.sandbox import Sandbox
 from femubench.core.run.slots import Slots
 from femubench.core.run.store import Store
 from femubench.core.score.scoring import reference_of
@@ -79,7 +79,7 @@ def run_cost(plan: Plan, workers: int = 1, sandbox: Sandbox = "auto") -> Cost:
 
 def _times() -> tuple[float, float, float]:
     """Return the processor time of this process, the server and its workers so far."""
-    found = psutil.Process(forkserver._forkserver._forkserver_pid).cpu_times()  # type: ignore[attr-defined]
+    found = psutil.Process(fork_server().process.pid).cpu_times()
     below = found.children_user + found.children_system
     return time.process_time(), found.user + found.system, below
 

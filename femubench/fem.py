@@ -4,6 +4,7 @@ from femubench.core.case.case import Modification as Modification
 from femubench.core.case.matrix_files import write_matrices as write_matrices
 from femubench.core.case.nodes import MatrixGeometry as MatrixGeometry, matrix_model as matrix_model
 from femubench.core.case.opensees import from_opensees as from_opensees
+from femubench.core.child.workers import call_apart as call_apart
 from femubench.core.errors import ModelError as ModelError
 from femubench.core.fem.beam import (
     BeamProperties as BeamProperties,

@@ -35,6 +35,8 @@ ROOMS = (
         "pace",
         "roles",
         "schema",
+        "source_files",
+        "child",
     ),
     *("plugin", "fem", "modal", "identify", "change", "fit", "case", "twin", "update"),
     *("effect", "inference", "look", "advise"),

@@ -22,6 +22,9 @@ sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import conformance_toys as toys
 
 from femubench import Scenario, Strategy
+from femubench.core.child import sandbox
+from femubench.core.child.guarded_child import Ending
+from femubench.core.child.limits import MIB
 from femubench.core.cli.main import bench
 from femubench.core.conformance import kit
 from femubench.core.conformance.checking import Subject, checks_of, findings, subjects
@@ -30,9 +33,6 @@ from femubench.core.conformance.place_words import known_place
 from femubench.core.conformance.problems import PROBLEMS, problem
 from femubench.core.errors import InputError
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.run import sandbox
-from femubench.core.run.limits import MIB
-from femubench.core.run.workers import Ending
 
 ROOT = Path(__file__).parents[1]
 DANGEROUS = (

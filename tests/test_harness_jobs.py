@@ -19,7 +19,6 @@ from femubench.core.run.answers import read_report
 from femubench.core.run.jobs import Job, execute, missing_capability, seed_words
 from femubench.core.run.judging import run_strategy
 from femubench.core.run.model_checks import check_model
-from femubench.core.run.worker import environment
 from femubench.core.typing import SparseArray
 from femubench.core.update.strategy import Strategy
 
@@ -123,19 +122,6 @@ def test_the_search_for_held_out_data_would_find_it() -> None:
     assert found["words"] >= 2
     given = toys.search([job(toys.Spy(hashes)), case.model, case.used_measurement()], hashes)
     assert (given["numbers"], given["words"]) == (0, 0)
-
-
-def test_thread_counts_are_restored(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("OMP_NUM_THREADS", "3")
-    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
-    import os
-
-    with environment(FEMUBENCH_TEST="7"):
-        assert os.environ["FEMUBENCH_TEST"] == "7"
-        assert os.environ["OMP_NUM_THREADS"] == os.environ["MKL_NUM_THREADS"] == "1"
-    assert os.environ["OMP_NUM_THREADS"] == "3"
-    assert "MKL_NUM_THREADS" not in os.environ
-    assert "FEMUBENCH_TEST" not in os.environ
 
 
 def skewed(matrix: SparseArray, gap: float) -> SparseArray:

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
+from femubench.core.child import workers
 from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
 from femubench.core.modal.measurement import Measurement
 from femubench.core.pace import Advance
-from femubench.core.run import workers
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.judging import judged
@@ -260,7 +260,7 @@ def test_an_interrupt_stops_the_workers_and_keeps_what_is_done(
 def test_workers_that_cannot_start_end_the_run(
     everything: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(workers, "serve", toys.cannot_start)
+    monkeypatch.setattr(workers, "Confinement", toys.NoStart)
     run = run_jobs([everything["case"]], [toys.Unchanged(), toys.Softer()], jobs=1)
     assert {item.status for item in run.results} == {"crashed"}
     reasons = {item.reason for item in run.results}

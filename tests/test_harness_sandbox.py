@@ -20,14 +20,16 @@ import pytest
 from click.testing import CliRunner
 
 import femubench
+from femubench.core.child import guarded_child, sandbox, server, syscall_filter
+from femubench.core.child.guarded_child import Ending
+from femubench.core.child.limits import MIB, Limits
+from femubench.core.child.sandbox import Enclosure, Sandbox, enclosure, walls_around
+from femubench.core.child.workers import Workers
 from femubench.core.cli.main import bench
 from femubench.core.errors import InputError
-from femubench.core.run import cluster_worker, sandbox, syscall_filter, workers
+from femubench.core.run import cluster_worker
 from femubench.core.run.executor import LocalProcesses
-from femubench.core.run.limits import MIB, Limits
 from femubench.core.run.runner import run_jobs
-from femubench.core.run.sandbox import Enclosure, Sandbox, enclosure, walls_around
-from femubench.core.run.workers import Ending, Workers
 from femubench.core.schema.results import JobResult
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
@@ -47,7 +49,7 @@ def scanned(mode: Sandbox, folder: Path, monkeypatch: pytest.MonkeyPatch) -> tup
     (case / "modes.csv").write_text(f"mode,frequency\n1,{word}\n")
     monkeypatch.setenv("FEMUBENCH_PLANTED", word)
     held = [word.encode() * 1000]
-    workers._end_server()  # it has the environment from when it was started
+    server.end_server()  # it has the environment from when it was started
     with Served(word) as port:
         strategy = scanner.Scanner(port, os.getpid(), scanner.digest_of(word))
         run = run_jobs(
@@ -57,7 +59,7 @@ def scanned(mode: Sandbox, folder: Path, monkeypatch: pytest.MonkeyPatch) -> tup
             executor=LocalProcesses(1, mode),
         )
     assert held
-    workers._end_server()
+    server.end_server()
     assert run.meta["sandbox"] == ("none" if mode == "off" else "namespaces")
     return run.results[0], word
 
@@ -186,7 +188,7 @@ class TestWalls:
     def test_code_is_there_and_data_is_not(self) -> None:
         walls = walls_around(())
         package = Path(femubench.__file__).parent
-        assert _sees(walls, package / "core" / "run" / "worker.py")
+        assert _sees(walls, package / "core" / "run" / "jobs.py")
         assert _sees(walls, (package / "core").resolve() / "errors.py")
         for data in ("scenarios", "papers"):
             for folder in (package / data, (package / data).resolve()):
@@ -246,11 +248,11 @@ def test_the_first_process_leads_to_nothing_outside() -> None:
     with Workers[int](1).open() as pool:
         limits = Limits(60.0, 400 * MIB, sandbox="require")
         assert pool.start(1, scanner.ready_and_waiting, None, limits) is None
-        (task,) = pool._running
+        ((_, child),) = pool._running
         until = time.monotonic() + 30.0
-        while not (task.printed or time.monotonic() > until):
+        while not (child._printed or time.monotonic() > until):
             pool.wait()
-        inside = workers.processes_of(task.process.pid, walled=True)
+        inside = guarded_child.processes_of(child.pid, walled=True)
         assert len(inside) == 2
         for process in inside:
             home = Path(f"/proc/{process.pid}")

@@ -5,23 +5,26 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from femubench.core.run import workers
-from femubench.core.run.limits import Limits
+from femubench.core.child import server, workers
+from femubench.core.child.guarded_child import Ending
+from femubench.core.child.limits import Limits
 from femubench.core.run.preload import own_plugins
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
-from loaded_modules import loaded
+from loaded_modules import loaded, variables
 
 
-def answer(pool: workers.Workers[int]) -> list[str]:
+def answer(pool: workers.Workers[int], ask: Callable[[Any], bytes] = loaded) -> list[str]:
     """Return the modules that a worker has before it imports any for its task."""
-    assert pool.start(1, loaded, None, Limits(60.0)) is None
-    ended: list[tuple[int, workers.Ending]] = []
+    assert pool.start(1, ask, None, Limits(60.0)) is None
+    ended: list[tuple[int, Ending]] = []
     while not ended:
         ended = pool.wait()
     return ended[0][1].answer.decode().split()
@@ -39,32 +42,30 @@ def test_workers_start_with_what_comes_along_and_with_nothing_of_strangers() -> 
 
 def test_a_server_of_an_older_source_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     with workers.Workers[int](1).open():
-        first = workers._server()
+        first = server.fork_server()
     with workers.Workers[int](1).open():
-        assert workers._server() == first
-    monkeypatch.setattr(workers, "_source", "as it was before")
+        assert server.fork_server() is first
+    monkeypatch.setattr(first, "source", "as it was before")
     with workers.Workers[int](1).open() as pool:
-        assert workers._server() != first
+        assert server.fork_server() is not first
+        assert not first.alive
         assert "femubench.core.run.judging" in answer(pool)
 
 
 def test_a_server_that_starts_does_not_hear_ctrl_c() -> None:
     """A terminal sends it to all; its imports would end in a traceback."""
-    workers._end_server()
-    workers._server_mark()
-    server = workers._server()
-    assert server is not None
+    server.end_server()
+    fork = server.fork_server()
     for _ in range(20):
-        os.kill(server, signal.SIGINT)
-    process = workers.forked(_nothing)
-    process.join(60.0)
-    assert process.exitcode == 0
-    assert workers._server() == server
+        os.kill(fork.process.pid, signal.SIGINT)
+    (ending,) = workers.run_apart({1: (bytes, b"here")}, Limits(60.0), 1).values()
+    assert ending.answer == b"here"
+    assert server.fork_server() is fork
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
     mask = (
         next(
             line
-            for line in Path(f"/proc/{server}/status").read_text().splitlines()
+            for line in Path(f"/proc/{fork.process.pid}/status").read_text().splitlines()
             if "SigBlk" in line
         )
         if sys.platform == "linux"
@@ -77,5 +78,15 @@ def test_whoever_imports_what_the_server_loads_hears_ctrl_c() -> None:
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def _nothing() -> None:
-    pass
+def test_children_have_one_thread_and_their_parent_keeps_its_own(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    monkeypatch.setenv("FEMUBENCH_TEST", "7")
+    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
+    with workers.Workers[int](1).open() as pool:
+        found = dict(line.split("=", 1) for line in answer(pool, variables))
+    assert found["FEMUBENCH_TEST"] == "7"
+    assert found["OMP_NUM_THREADS"] == found["MKL_NUM_THREADS"] == "1"
+    assert os.environ["OMP_NUM_THREADS"] == "3"
+    assert "MKL_NUM_THREADS" not in os.environ

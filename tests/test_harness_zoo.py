@@ -15,13 +15,14 @@ from typing import Any
 
 import pytest
 
-from femubench.core.run import runner, sandbox, workers
+from femubench.core.child import sandbox, server, workers
+from femubench.core.child.guarded_child import Ending
+from femubench.core.child.limits import MIB, Limits
+from femubench.core.run import runner
 from femubench.core.run.jobs import JobOutcome
-from femubench.core.run.limits import MIB, Limits
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.schedule import Workload, _Bench
 from femubench.core.run.slots import Slot, Start
-from femubench.core.run.workers import Ending
 from femubench.core.schema.records import result_from_json, result_to_json
 from femubench.core.schema.results import JobResult, Run
 
@@ -48,7 +49,7 @@ def runs(request: pytest.FixtureRequest) -> Iterator[dict[str, Run]]:
         elif sandbox.missing() is not None:
             pytest.skip(f"no sandbox here: {sandbox.missing()}")
         patch.setenv("FEMUBENCH_ZOO", WORD)
-        workers._end_server()
+        server.end_server()
         patch.setattr(zoo, "TARGET", targets(stack))
         yield both(request.param)
 
@@ -135,17 +136,14 @@ def test_a_server_that_is_stopped_while_a_worker_starts_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A job may stop the server between the last look at it and the start of the next job."""
-    running = workers._server_mark
+    asked = server.ForkServer.ask
 
-    def stopped() -> str:
-        mark = running()
-        server = workers._server()
-        assert server is not None
-        os.kill(server, signal.SIGSTOP)
-        return mark
+    def stopped(fork: server.ForkServer, *what: Any) -> None:
+        os.kill(fork.process.pid, signal.SIGSTOP)
+        asked(fork, *what)
 
     with workers.Workers[int](1).open() as pool:
-        monkeypatch.setattr(workers, "_server_mark", stopped)
+        monkeypatch.setattr(server.ForkServer, "ask", stopped)
         assert pool.start(1, bytes, b"still here", Limits(60.0)) is None
         ended: list[tuple[int, Ending]] = []
         while not ended:

@@ -19,6 +19,10 @@ import pytest
 
 from femubench import InputError, PluginError, strategies
 from femubench.core.case.reader import read_case
+from femubench.core.child import workers
+from femubench.core.child.guarded_child import Ending
+from femubench.core.child.limits import Limits
+from femubench.core.child.namespaces import Walls
 from femubench.core.plugin import apart, loader
 from femubench.core.plugin.foreign import ForeignStrategy, doc_of
 from femubench.core.plugin.loader import Plugins, load_plugins
@@ -62,7 +66,7 @@ HOSTILE: Mapping[str, tuple[str, str | None]] = {
     "base-exception": ("class Odd(BaseException): pass\nraise Odd('no')", "Odd: no"),
     "keyboard-interrupt": ("raise KeyboardInterrupt", "KeyboardInterrupt"),
     "recursion": ("import sys\nsys.setrecursionlimit(80)", None),
-    "endless": ("while True: pass", "no answer within 12 s"),
+    "endless": ("while True: pass", "no result within 12 s"),
     "daemon": (
         "import os, time\n"
         "if os.fork() == 0:\n"
@@ -84,7 +88,7 @@ HOSTILE: Mapping[str, tuple[str, str | None]] = {
     ),
     "builtins": (
         "import builtins\nbuiltins.len = builtins.sorted = lambda *a, **k: 3",
-        "what it told is no JSON",
+        "its answer is no JSON",
     ),
     "sys-modules": (
         "import sys\n"
@@ -444,11 +448,11 @@ def test_an_effect_and_a_reader_are_imported_by_who_uses_them(fine: Path) -> Non
 
 HOOKED = ("strategies", "scenarios", "effects", "faults", "readers", "reporters", "papers")
 FORGED: Mapping[str, tuple[object, str]] = {
-    "no object": ([1], "what it told is no JSON object"),
+    "no object": ([1], "its answer is no JSON object"),
     "no offers": ({"broken": [], "loaded": True}, "its description is none: 'offers'"),
     "numbers": ({"broken": 3, "offers": {}}, "its description is none: faults was told as int"),
-    "no fault": ({"fault": 3}, "what it told is no fault"),
-    "half a fault": ({"fault": ["ValueError"]}, "what it told is no fault"),
+    "no fault": ({"fault": 3}, "its answer is no fault"),
+    "half a fault": ({"fault": ["ValueError"]}, "its answer is no fault"),
 }
 
 
@@ -457,7 +461,7 @@ def test_a_forged_description_is_one_line(
     name: str, fine: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told, says = FORGED[name]
-    forged = apart._read({"said": json.dumps(told)})
+    forged = apart._read(Ending("answer", json.dumps(told).encode()))
     monkeypatch.setattr(apart, "ask", lambda questions: [forged for _ in questions])
     loader._known.clear()
     (fault,) = [one for one in load_plugins().broken if one.plugin == "fine"]
@@ -509,13 +513,11 @@ def test_a_terminal_does_not_obey_what_a_plugin_says(tmp_path: Path) -> None:
 def test_where_there_are_no_namespaces_nothing_is_left_either(
     hostile: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    start = apart._START.replace("keeper.main", "keeper._unshared = lambda: False\nkeeper.main")
-    assert start != apart._START
-    monkeypatch.setattr(apart, "_START", start)
     monkeypatch.syspath_prepend(hostile)
     question = {"do": loader.DESCRIBE, "origin": ["daemon", "daemon_hostile", "daemon 1.0"]}
-    (answer,) = apart.ask([question], 10.0)
-    assert answer["loaded"] is True
+    task = (apart.answer_question, question)
+    (ending,) = workers.run_apart({1: task}, Limits(10.0, sandbox="off"), 1).values()
+    assert json.loads(ending.answer)["loaded"] is True
     time.sleep(0.2)
     assert daemons() == []
 
@@ -595,9 +597,7 @@ def test_a_description_is_made_in_a_sandbox(
 def test_where_the_sandbox_cannot_be_entered_the_question_is_asked_without(
     hostile: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    start = apart._START.replace(", way_in,", ", lambda *_: lambda at: 1 / 0,")
-    assert start != apart._START
-    monkeypatch.setattr(apart, "_START", start)
+    monkeypatch.setattr(workers, "walls_around", lambda *_: Walls(("/no/such/folder",)))
     monkeypatch.syspath_prepend(hostile)
     question = {"do": loader.DESCRIBE, "origin": ["chdir", "chdir_hostile", "chdir 1.0"]}
     (answer,) = apart.ask([{**question, "walled": True}], 10.0)
@@ -607,7 +607,7 @@ def test_where_the_sandbox_cannot_be_entered_the_question_is_asked_without(
 def test_many_bytes_are_not_taken(hostile: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(hostile)
     question = {"do": loader.DESCRIBE, "origin": ["chdir", "chdir_hostile", "chdir 1.0"]}
-    assert apart.ask([question], 10.0, 20) == ["what it told was larger than 20 bytes"]
+    assert apart.ask([question], 10.0, 20) == ["its result is larger than 20 B"]
     with pytest.raises(PluginError, match=r"plugin 'x' \(x 1\.0\): its process"):
         apart.Origin("x", "os_exit_hostile", "x 1.0").ask(loader.DESCRIBE, seconds=10.0, most=99)
 

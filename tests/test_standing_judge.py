@@ -6,7 +6,6 @@ import json
 import os
 import pickle
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -18,15 +17,16 @@ import numpy as np
 import psutil
 import pytest
 
+from femubench.core.child.guarded_child import Ending, wait_for
+from femubench.core.child.limits import MIB, Limits
+from femubench.core.child.workers import Workers
 from femubench.core.fem.model import LowRank
 from femubench.core.run import schedule, standing_judge
 from femubench.core.run.answers import pack_outcome
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.judging import Dossier
-from femubench.core.run.limits import MIB, Limits
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.standing_judge import Judges
-from femubench.core.run.workers import Ending, Workers
 from femubench.core.score.scoring import reference_of
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
@@ -71,7 +71,7 @@ def result(
 def process(judges: Judges[int]) -> int:
     """Return the one judge there is."""
     (judge,) = judges._idle
-    return int(judge.process.pid)
+    return judge.process.pid
 
 
 def hostile() -> Iterator[bytes]:
@@ -121,7 +121,7 @@ def test_a_judge_that_dies_is_replaced(judges: Judges[int]) -> None:
     fresh = result(judges, GOOD)
     dead = process(judges)
     os.kill(dead, signal.SIGKILL)
-    judges._idle[0].process.join()
+    judges._idle[0].process.bury()
     assert result(judges, GOOD) == fresh
     assert process(judges) != dead
 
@@ -170,22 +170,13 @@ def test_a_judge_that_has_grown_is_replaced(
 
 def test_a_judge_stands_apart() -> None:
     """No strategy reads its memory, and it holds nothing open but what it is asked through."""
-    code = """if True:
-    import ctypes, os
-    from multiprocessing.connection import Connection
-    from femubench.core.run import standing_judge
-    ends = [Connection(end) for end in (*os.pipe(), os.dup(1))]
-    kept = sorted(end.fileno() for end in ends[:2])
-    def peak():
-        there = sorted(int(name) for name in os.listdir("/proc/self/fd"))
-        print(ctypes.CDLL(None).prctl(3, 0, 0, 0, 0), there[:5] == [0, 1, 2, *kept])
-        print(len(there), os.getsid(0) == os.getpid(), flush=True)
-        os._exit(0)
-    standing_judge._peak = peak
-    standing_judge.serve(*ends)
-    """
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert ran.stdout.split() == ["0", "True", "6", "True"]  # one lists the folder
+    with Workers[int](1).open(), Judges[int]() as judges:
+        judge = judges._free(b"").process
+        judge.ask(toys.standing, None, LIMITS)
+        while (ending := judge.progress(look=False)) is None:
+            wait_for([judge], 0.1)
+        judge.kill()
+    assert ending.answer.split() == [b"0", b"6", b"True"]  # one lists the folder
 
 
 def test_a_run_in_which_somebody_kills_judges_has_the_results_of_one_without(

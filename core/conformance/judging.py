@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from femubench.core.child.guarded_child import Ending
 from femubench.core.conformance.fingerprints import fingerprint
 from femubench.core.conformance.problems import UpdatingProblem
 from femubench.core.conformance.results import Given, faults_of
 from femubench.core.conformance.trial import Observation
 from femubench.core.run.answers import AnswerError, unpack_outcome
-from femubench.core.run.workers import Ending
 from femubench.core.update.strategy import ParameterEstimate, UpdateResult
 
 _TRAVELLED = "picklable"  # the check that a result has arrived

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import os
 import pickle
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, TypeAlias, get_args
 
+from femubench.core.child.limits import MIB, Limits
+from femubench.core.child.workers import run_apart
 from femubench.core.conformance import SECONDS
 from femubench.core.conformance.judging import Handed, confirm_observation, judge_handed
 from femubench.core.conformance.problems import PLAIN, UpdatingProblem, problem
@@ -27,14 +29,11 @@ from femubench.core.plugin.foreign import is_foreign
 from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Strategy, declared
 from femubench.core.run.jobs import missing_capability, one_line, sent
-from femubench.core.run.limits import MIB, Limits
-from femubench.core.run.workers import Ending, Workers
 
 Status = Literal["pass", "fail", "warn", "not-applicable"]
 Role = Literal["strategy", "effect", "reader", "scenario"]
 MEMORY = 1024 * MIB
 UNSENT = "not looked at: it cannot be sent to a worker"
-_ATTEMPTS = 3  # to start a process
 _LONGEST = 2_000  # characters of a message
 
 
@@ -243,36 +242,6 @@ class Bench:
         except (ValueError, TypeError, RecursionError):
             pass
         return failed("what its process sent is no verdict")
-
-
-def run_apart(
-    tasks: Mapping[Any, tuple[Callable[[Any], bytes], object]], limits: Limits, count: int
-) -> dict[Any, Ending]:
-    """Return how every task ended, each in a worker of its own.
-
-    Arguments:
-        tasks: by key, a function that is importable by name and its argument.
-        limits: what each may take.
-        count: number of workers.
-    """
-    found: dict[Any, Ending] = {}
-    waiting, attempts = list(tasks), dict.fromkeys(tasks, 0)
-    if not waiting:
-        return found
-    with Workers[Any](count).open() as workers:
-        while waiting or workers.busy:
-            while workers.free and waiting:
-                key = waiting.pop(0)
-                attempts[key] += 1
-                ending = workers.start(key, *tasks[key], limits)
-                if ending is not None:
-                    found[key] = ending
-            for key, ending in workers.wait() if workers.busy else ():
-                if ending.how == "no-start" and attempts[key] < _ATTEMPTS:
-                    waiting.append(key)
-                else:
-                    found[key] = ending
-    return found
 
 
 def _judged(task: tuple[Callable[..., Verdict], bytes]) -> bytes:

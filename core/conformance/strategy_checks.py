@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
+from femubench.core.child.limits import spoken_bytes
 from femubench.core.conformance import kit
 from femubench.core.conformance.fingerprints import first_difference
 from femubench.core.conformance.kit import Bench, Verdict, check, failed, passed
@@ -17,7 +18,6 @@ from femubench.core.conformance.results import PROMISES
 from femubench.core.conformance.trial import Observation, Want, promises_of
 from femubench.core.plugin.variants import Variant
 from femubench.core.roles import CAPABILITIES, Strategy, declared
-from femubench.core.run.limits import spoken_bytes
 
 _MUCH = 100.0  # times what the reference takes
 _LEAST_SECONDS, _LEAST_BYTES = 1e-3, 1e4  # below which a ratio says nothing

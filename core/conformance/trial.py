@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import msgspec
 import numpy as np
 
+from femubench.core.child.guarded_child import Ending
 from femubench.core.conformance.fingerprints import fingerprint, first_difference, global_state
 from femubench.core.conformance.problems import UpdatingProblem
 from femubench.core.conformance.results import Given, faults_of
@@ -25,7 +26,6 @@ from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Result, Strategy, declared
 from femubench.core.run.answers import pack_outcome
 from femubench.core.run.jobs import JobOutcome, one_line, plain_outcome
-from femubench.core.run.workers import Ending
 
 if TYPE_CHECKING:
     from femubench.core.update.strategy import UpdateResult

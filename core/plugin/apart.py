@@ -8,23 +8,24 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from importlib.metadata import EntryPoint
+from typing import TYPE_CHECKING, Any
 
 from femubench.core.errors import InputError, PluginError, harmless
 
+if TYPE_CHECKING:
+    from femubench.core.child.guarded_child import Ending
+    from femubench.core.child.limits import Limits
+
 SECONDS = 20.0  # that a plugin may take to be imported and to say what it offers
 MOST = 4 * 2**20  # bytes of an answer
-_SPARE = 20.0  # s for the start of processes, beside what questions take
-_START = """
-import json, sys
-sys.path[:] = json.loads(sys.argv[1])
-from femubench.core.plugin import describing, keeper
-from femubench.core.run.sandbox import way_in
-keeper.main(describing.answer, way_in, sys.argv[2])
-"""
+_ANSWERS = "femubench.core.plugin.describing"
+_LEAST_MEMORY = 4 * 2**30  # bytes of address space that every question may take
+_ROOM, _LARGEST_FILE = 2**28, 2**30  # bytes that it may write, in a sandbox and without
+_ENDLESS = 2**62  # bytes that it may print
+_MOST_PROCESSES = 256
 
 
 @dataclass(frozen=True)
@@ -84,67 +85,64 @@ def ask(
             plugin; every one is answered in a process of its own, with ``walled`` in a sandbox
             where that is possible.
         seconds, most: what each may take, `SECONDS` by default, and the bytes of its answer.
+
+    Without the sandbox a question is answered in a namespace of processes where that is possible:
+    it can signal or look into none outside, and nothing of it is left afterwards.
     """
     if not questions:
         return []
-    seconds = SECONDS if seconds is None else seconds
-    limited = [{**question, "seconds": seconds, "most": most} for question in questions]
-    rounds = -(-len(limited) // (os.cpu_count() or 1))
-    found = _kept(limited, seconds * rounds + _SPARE)
-    if found is None and len(limited) > 1:
-        # One of them has ended the process that asks; alone it does so to itself.
-        return [ask([question], seconds, most)[0] for question in questions]
-    if found is None:
-        return ["it ended the process that asked it"]
-    return [_read(item) for item in found]
+    from femubench.core.child.limits import Limits
+    from femubench.core.child.workers import run_apart
+
+    physical = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    limits = Limits(
+        SECONDS if seconds is None else seconds,
+        max(_LEAST_MEMORY, physical // 2),
+        output=_ENDLESS,
+        answer=most,
+        processes=_MOST_PROCESSES,
+    )
+    walled = replace(limits, file=_ROOM, sandbox="auto")
+    plain = replace(limits, file=_LARGEST_FILE, sandbox="processes")
+
+    def put(asked: Iterable[int], limits: Limits) -> dict[int, Ending]:
+        tasks = {number: (answer_question, questions[number]) for number in asked}
+        return run_apart(tasks, limits, os.cpu_count() or 1, _ANSWERS)
+
+    found = put((i for i, one in enumerate(questions) if one.get("walled")), walled)
+    # Where the sandbox was not entered no plugin has been imported yet.
+    rest = {i for i in range(len(questions)) if i not in found or found[i].how == "no-start"}
+    found |= put(rest, plain)
+    return [_read(found[i]) for i in range(len(questions))]
 
 
-def _kept(questions: Iterable[Mapping[str, Any]], seconds: float) -> list[Any] | None:
-    """Return what the process that asks writes; None where it does not come to an end."""
-    import subprocess
-    import tempfile
+def answer_question(question: dict[str, Any]) -> bytes:
+    """Return what a question asks for as JSON, or under ``fault`` what was raised.
 
-    paths = json.dumps([os.path.abspath(path) for path in sys.path])
-    quiet = {"PYTHONDONTWRITEBYTECODE": "1"} if sys.dont_write_bytecode else {}
-    with (
-        tempfile.TemporaryDirectory(prefix="femubench-apart-") as at,
-        subprocess.Popen(
-            [sys.executable, "-c", _START, paths, at],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            env={**os.environ, **quiet},
-            start_new_session=True,
-        ) as process,
-    ):
-        try:
-            said, _ = process.communicate(json.dumps(list(questions)).encode(), seconds)
-        except subprocess.TimeoutExpired:
-            return None
-        finally:
-            # Also on Ctrl-C, which does not reach that session.
-            if process.poll() is None:
-                process.kill()
-    if process.returncode != 0:
-        return None
-    found = json.loads(said or b"null")
-    return found if isinstance(found, list) else None
-
-
-def _read(item: Mapping[str, str]) -> Any:  # noqa: ANN401 - plain data
-    """Return an answer as plain data, or why there is none."""
-    if "lost" in item:
-        return str(item["lost"])
-    text = item["said"]
+    It is called in a process in which code of the plugin may run.
+    """
     try:
-        found = json.loads(text)
+        function = EntryPoint("", question["do"], "").load()
+        answer = dict(function(Origin(*question["origin"]), question))
+    except BaseException as fault:
+        kind = "InputError" if isinstance(fault, InputError) else type(fault).__name__
+        answer = {"fault": [kind, " ".join(str(fault).split())]}
+    return json.dumps(answer).encode()
+
+
+def _read(ending: Ending) -> Any:  # noqa: ANN401 - plain data
+    """Return an answer as plain data, or why there is none."""
+    if ending.how != "answer":
+        return ending.reason.replace("the worker process", "its process")
+    try:
+        found = json.loads(ending.answer.decode("utf-8", "replace"))
     except (ValueError, RecursionError):
-        return "what it told is no JSON"
+        return "its answer is no JSON"
     match found:
         case {"fault": [str(), str()]}:
             return found
         case {"fault": _}:
-            return "what it told is no fault"
+            return "its answer is no fault"
         case {}:
             return found
-    return "what it told is no JSON object"
+    return "its answer is no JSON object"

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields, is_dataclass
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
-from femubench.core.errors import InputError
 from femubench.core.plugin.apart import Origin
 from femubench.core.plugin.distribution import about
 from femubench.core.plugin.foreign import doc_of
@@ -36,16 +34,6 @@ _WAYS = {
     "reporters": ("render_with", "render_bytes"),
 }
 _FLAGS = ("baseline", "yardstick")
-
-
-def answer(question: dict[str, Any]) -> dict[str, Any]:
-    """Return what a question asks for as plain data, or under ``fault`` what was raised."""
-    try:
-        function = EntryPoint("", question["do"], "").load()
-        return dict(function(Origin(*question["origin"]), question))
-    except BaseException as fault:
-        kind = "InputError" if isinstance(fault, InputError) else type(fault).__name__
-        return {"fault": [kind, " ".join(str(fault).split())]}
 
 
 def described(origin: Origin, _: Mapping[str, Any]) -> dict[str, Any]:

@@ -28,9 +28,9 @@ from femubench.core.plugin.importing import (
     take,
 )
 from femubench.core.plugin.markers import PROJECT
-from femubench.core.plugin.source_files import stamps
 from femubench.core.plugin.validation import CHECKS, chosen, of_type
 from femubench.core.roles import Effect, Fault, Paper, Reader, Reporter, Scenario, Strategy
+from femubench.core.source_files import stamps
 from femubench.core.version import __version__
 
 DESCRIBE = "femubench.core.plugin.describing:described"

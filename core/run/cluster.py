@@ -7,6 +7,8 @@ import pickle
 import re
 import secrets
 import shutil
+import sys
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -14,8 +16,10 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
 from itertools import islice
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from femubench.core.child.sandbox import OFF, Enclosure, enclosure
 from femubench.core.display import counted
 from femubench.core.errors import FemubenchError, InputError, require
 from femubench.core.roles import Strategy
@@ -30,11 +34,9 @@ from femubench.core.run.cluster_worker import (
 )
 from femubench.core.run.jobs import JobOutcome, one_line
 from femubench.core.run.provenance import home_of
-from femubench.core.run.sandbox import OFF, Enclosure, enclosure
 from femubench.core.run.schedule import Workload
 from femubench.core.run.slots import Start
 from femubench.core.run.stopping import interrupts_kept
-from femubench.core.run.workers import no_script, repeating
 from femubench.core.schema.results import JobResult
 from femubench.core.schema.run_options import Sandbox, Where
 
@@ -299,9 +301,47 @@ def start_cluster(where: Where) -> Iterator[DaskWorkers]:
         scale = partial(cluster.scale, **size)
         scale()
         # A nanny gives up a worker that dies as it starts.
-        stack.enter_context(repeating(scale, _COUNTED))
+        stack.enter_context(_repeat(scale, _COUNTED))
         client = stack.enter_context(_client(cluster))
         yield DaskWorkers(client, words, waits=queued, sandbox=where.sandbox)
+
+
+@contextmanager
+def _repeat(action: Callable[[], object], seconds: float) -> Iterator[None]:
+    """Call a function every so many seconds, in another thread, while the block runs."""
+    done = threading.Event()
+
+    def watch() -> None:
+        while not done.wait(seconds):
+            action()
+
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        done.set()
+        watcher.join()
+
+
+_hiding = threading.Lock()
+_hidden: list[ModuleType] = []
+
+
+@contextmanager
+def _no_script() -> Iterator[None]:
+    """Hide the script or notebook from a worker that starts, which would run it once more."""
+    with _hiding:
+        _hidden.append(sys.modules["__main__"])
+        sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        with _hiding:
+            # Blocks of several threads overlap; what the first of them found comes back last.
+            script = _hidden.pop()
+            if not _hidden:
+                sys.modules["__main__"] = script
 
 
 def _local(count: int) -> Cluster:
@@ -316,7 +356,7 @@ def _local(count: int) -> Cluster:
         """Starts its worker, also in place of one that died, without the user's script."""
 
         async def instantiate(self) -> Any:  # noqa: ANN401 - a distributed.Status
-            with no_script():
+            with _no_script():
                 return await super().instantiate()
 
     return LocalCluster(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import threading
 from collections.abc import Mapping
@@ -13,15 +12,15 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
+from femubench.core.child.limits import LEAST, Limits, memory_share, spoken_bytes
+from femubench.core.child.sandbox import enclosure, missing
+from femubench.core.child.workers import adopt_orphans
 from femubench.core.errors import FemubenchError
 from femubench.core.run.jobs import JobOutcome
-from femubench.core.run.limits import LEAST, Limits, memory_share, spoken_bytes
 from femubench.core.run.provenance import blas_name, cpu_name, package_version, versions
-from femubench.core.run.sandbox import enclosure, missing
 from femubench.core.run.schedule import Workload, compute_jobs
 from femubench.core.run.slots import Slot, Start
 from femubench.core.run.standing_judge import Judges
-from femubench.core.run.workers import adopting
 from femubench.core.schema.results import JobResult
 from femubench.core.schema.run_options import Sandbox
 from femubench.core.score.scoring import Reference
@@ -152,9 +151,7 @@ _OPEN, _OF_THREAD = ExitStack(), threading.local()
 @cache
 def _prepare() -> None:
     """Let this process start processes, and become the parent of what jobs leave behind."""
-    # The nanny of a worker starts it as a daemon, which may have no children.
-    multiprocessing.current_process().daemon = False
-    _OPEN.enter_context(adopting())
+    _OPEN.enter_context(adopt_orphans())
     threadpool_limits(1)
 
 

@@ -8,11 +8,11 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from femubench.core.child.limits import memory_share
+from femubench.core.child.sandbox import Enclosure, enclosure
 from femubench.core.display import counted
 from femubench.core.errors import InputError, require
 from femubench.core.roles import Strategy
-from femubench.core.run.limits import memory_share
-from femubench.core.run.sandbox import Enclosure, enclosure
 from femubench.core.run.schedule import Workload, compute_jobs
 from femubench.core.schema.results import JobResult
 from femubench.core.schema.run_options import Sandbox, Where

@@ -20,10 +20,10 @@ from femubench.core.case.case import Case
 from femubench.core.modal.factorisation import solver_name, solver_note
 from femubench.core.plugin.distribution import about
 from femubench.core.plugin.foreign import ForeignStrategy
-from femubench.core.plugin.source_files import Stamp, python_files, stamp, stamps
 from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Strategy
 from femubench.core.score.scoring import Reference
+from femubench.core.source_files import Stamp, python_files, stamp, stamps
 from femubench.core.version import __version__
 
 _OWN = "femubench"

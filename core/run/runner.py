@@ -12,12 +12,12 @@ from typing import Any, Unpack
 from threadpoolctl import threadpool_limits
 
 from femubench.core.case.case import Case
+from femubench.core.child.limits import Limits
 from femubench.core.errors import InputError
 from femubench.core.files import make_folder
 from femubench.core.pace import Told
 from femubench.core.roles import Strategy
 from femubench.core.run.executor import Executor, open_executor
-from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import home_of, plan_digest, run_meta
 from femubench.core.run.recording import Progress, Results, ended, recorded
 from femubench.core.run.schedule import Workload

@@ -12,14 +12,15 @@ from functools import cached_property, lru_cache
 from itertools import islice
 from typing import Any
 
+from femubench.core.child.guarded_child import Ending
+from femubench.core.child.limits import Limits
+from femubench.core.child.workers import Workers
 from femubench.core.errors import InputError
 from femubench.core.run.answers import AnswerError, read_report
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.judging import Dossier, Judgement, judged, run_strategy
-from femubench.core.run.limits import Limits
 from femubench.core.run.slots import Slot, Start, first_seed
 from femubench.core.run.standing_judge import Judges
-from femubench.core.run.workers import Ending, Workers
 from femubench.core.schema.results import JobResult, Status
 from femubench.core.schema.validation import read_plain
 from femubench.core.score.scoring import Reference
@@ -92,7 +93,7 @@ def compute_jobs(
                 yield from bench.start(workers, judges)
             if not (workers.busy or judges.busy):
                 return
-            for task, ending in (*workers.wait(judges.parts), *judges.ended()):
+            for task, ending in (*workers.wait(judges.at_work), *judges.ended()):
                 yield from bench.taken(task, ending)
 
 

@@ -1,47 +1,44 @@
 """Judges that live through a run: each judges one answer after the other in a process of its own.
 
 An answer is plain data, so that nothing of it is left behind: a judge forks from the same server as
-all workers, is told every case once, and is replaced when it dies, hangs or has grown.
+all workers, is sent every case once, and is replaced when it dies, hangs or has grown.
 """
 
 from __future__ import annotations
 
-import ctypes
-import os
 import pickle
 import resource
 import sys
-import threading
 import time
 from collections import OrderedDict
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from multiprocessing import connection, get_context
-from typing import Any, Generic
+from functools import cache
+from typing import Any, Generic, cast
 
+from femubench.core.child.confinement import Confinement, address_space
+from femubench.core.child.guarded_child import Ending, GuardedChild
+from femubench.core.child.limits import MIB, Limits
+from femubench.core.child.server import search_path
+from femubench.core.child.workers import JOBS, Key
 from femubench.core.run.judging import Dossier, run_judge
-from femubench.core.run.limits import MIB, Limits
-from femubench.core.run.worker import LENGTH_BYTES, address_space, stand_alone, write_all
-from femubench.core.run.workers import Ending, Key, Task, end_group, forked, parts_of, progress_of
 
 _MOST_CASES = 20  # that a judge holds
 _CASE_BYTES = 128 * MIB  # of them together, pickled
 _GROWTH = 192 * MIB  # of its memory, after which it is replaced
-_AT_ONCE = 60_000  # bytes that a pipe takes at once
 _GOES_ON, _IS_DONE = b"\0", b"\1"
-_LAST_BREATH = 5.0  # s that a process may take to end
 _LOOK = 0.5  # s between two looks at its memory
-_PR_SET_DUMPABLE = 4
 
 
 @dataclass(frozen=True)
 class _Request:
-    """What a judge is asked, all of it written by this program; the answer follows as it came.
+    """What a judge is asked, all of it written by this program but the answer in it.
 
     Arguments:
         case: digest of the case; `Dossier.case` is empty where the judge has it already.
         forget: digests of cases that are sent anew should they come up again.
+        verdict: what is judged.
         memory: bytes that judging may take; None for no limit.
     """
 
@@ -51,35 +48,37 @@ class _Request:
     memory: int | None
 
 
-def serve(
-    requests: connection.Connection, answer: connection.Connection, output: connection.Connection
-) -> None:
-    """Judge until nobody asks; the body of a judge's process."""
-    stand_alone(output, requests.fileno(), answer.fileno())
-    if sys.platform == "linux":  # strategies run under the same account: its memory has the data
-        ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 0)
-    cases: dict[bytes, Any] = {}
-    first, grown = _peak(), False
-    while not grown:
-        try:
-            request: _Request = pickle.loads(requests.recv_bytes())
-            verdict = replace(request.verdict, answer=requests.recv_bytes())
-        except EOFError:
-            return
-        for digest in request.forget:
-            cases.pop(digest, None)
-        with _memory(request.memory):
-            if request.case not in cases:
-                cases[request.case] = pickle.loads(verdict.case)
-            data = run_judge(verdict, *cases[request.case])
-        grown = _peak() - first > _GROWTH
-        data = (_IS_DONE if grown else _GOES_ON) + data
-        write_all(answer.fileno(), len(data).to_bytes(LENGTH_BYTES, "big") + data)
-        del request, verdict, data
+def judge_next(request: _Request) -> bytes:
+    """Judge an answer, and say first whether the process is good for another; runs in a judge."""
+    first, cases = _first_peak(), _cases()
+    for digest in request.forget:
+        cases.pop(digest, None)
+    with _limit_memory(request.memory):
+        if request.case not in cases:
+            cases[request.case] = pickle.loads(request.verdict.case)
+        data = run_judge(request.verdict, *cases[request.case])
+    return (_IS_DONE if _peak() - first > _GROWTH else _GOES_ON) + data
+
+
+@cache
+def _cases() -> dict[bytes, Any]:
+    """Return the cases that this judge has, by digest."""
+    return {}
+
+
+@cache
+def _first_peak() -> int:
+    return _peak()
+
+
+def _peak() -> int:
+    """Return the largest resident memory that this process has had so far in bytes."""
+    found = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return found if sys.platform == "darwin" else 1024 * found
 
 
 @contextmanager
-def _memory(allowed: int | None) -> Iterator[None]:
+def _limit_memory(allowed: int | None) -> Iterator[None]:
     """Limit what the block may take beyond what the process has."""
     before = resource.getrlimit(resource.RLIMIT_AS)
     if allowed is not None:
@@ -93,13 +92,7 @@ def _memory(allowed: int | None) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_AS, before)
 
 
-def _peak() -> int:
-    """Return the largest resident memory that this process has had so far in bytes."""
-    found = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return found if sys.platform == "darwin" else 1024 * found
-
-
-@dataclass
+@dataclass(eq=False)
 class _Judge:
     """A judge's process.
 
@@ -107,48 +100,27 @@ class _Judge:
         held: sizes of the cases that it has, by digest; what was used last comes last.
     """
 
-    process: Any
-    requests: connection.Connection
-    answer: connection.Connection
-    output: connection.Connection
+    process: GuardedChild
     held: OrderedDict[bytes, int] = field(default_factory=OrderedDict)
 
-    def ask(self, case: bytes, verdict: Dossier, memory: int | None) -> None:
+    def ask(self, case: bytes, verdict: Dossier, limits: Limits) -> None:
         """Send an answer to be judged, the case too where it is not there yet."""
-        answer, verdict = verdict.answer, replace(verdict, answer=b"")
+        sent = replace(verdict, answer=cast(bytes, pickle.PickleBuffer(verdict.answer)))
         if case in self.held:
-            verdict = replace(verdict, case=b"")
+            sent = replace(sent, case=b"")
         self.held[case] = self.held.pop(case, len(verdict.case))
         forget = []
         while len(self.held) > 1 and (
             len(self.held) > _MOST_CASES or sum(self.held.values()) > _CASE_BYTES
         ):
             forget.append(self.held.popitem(last=False)[0])
-        request = _Request(case, tuple(forget), verdict, memory)
-        parts = pickle.dumps(request, protocol=pickle.HIGHEST_PROTOCOL), answer
-        # With an end of its own, which stays open however long it takes.
-        way = connection.Connection(os.dup(self.requests.fileno()), readable=False)
-        if sum(map(len, parts)) <= _AT_ONCE:
-            _send(way, parts)
-        else:  # one that was stopped must not stop its parent
-            threading.Thread(target=_send, args=(way, parts), daemon=True).start()
+        request = _Request(case, tuple(forget), sent, limits.memory)
+        self.process.ask(judge_next, request, limits)
 
     def end(self) -> None:
         """End the process; what it is at is lost."""
-        end_group(self.process.pid)
-        for end in (self.requests, self.answer, self.output):
-            with suppress(OSError):
-                end.close()
-        # The server tells of its end, and may have been stopped.
-        self.process.join(_LAST_BREATH)
-        with suppress(ValueError):
-            self.process.close()
-
-
-def _send(way: connection.Connection, parts: Sequence[bytes]) -> None:
-    with way, suppress(OSError):  # it died: whoever waits for its answer learns of it
-        for part in parts:
-            way.send_bytes(part)
+        self.process.kill()
+        self.process.bury()
 
 
 class Judges(Generic[Key]):
@@ -156,7 +128,7 @@ class Judges(Generic[Key]):
 
     def __init__(self) -> None:
         self._idle: list[_Judge] = []
-        self._at_work: list[tuple[Task[Key], _Judge]] = []
+        self._at_work: list[tuple[Key, _Judge]] = []
         self._looked = 0.0
 
     def __enter__(self) -> Judges[Key]:
@@ -187,26 +159,24 @@ class Judges(Generic[Key]):
         return len(self._at_work)
 
     @property
-    def parts(self) -> list[Any]:
-        """Return what there is to wait for."""
-        return [part for task, _ in self._at_work for part in parts_of(task)]
+    def at_work(self) -> list[GuardedChild]:
+        """Return the processes of those that are at work."""
+        return [judge.process for _, judge in self._at_work]
 
     def start(self, key: Key, case: bytes, verdict: Dossier, limits: Limits) -> Ending | None:
         """Have an answer judged; return how it ended where no process could be started.
 
         Arguments:
-            key: by which `ended` tells of it.
+            key: by which `ended` names it.
             case: digest of `verdict.case`.
             limits: what judging may take.
         """
         try:
             judge = self._free(case)
-        except (OSError, EOFError) as error:
+        except OSError as error:
             return Ending("no-start", reason=f"no worker process could start: {error}")
-        judge.ask(case, verdict, limits.memory)
-        task = Task(key, judge.process, judge.answer, judge.output, limits, "")
-        task.ready = time.monotonic()
-        self._at_work.append((task, judge))
+        judge.ask(case, verdict, limits)
+        self._at_work.append((key, judge))
         return None
 
     def _free(self, case: bytes) -> _Judge:
@@ -214,25 +184,11 @@ class Judges(Generic[Key]):
         self._idle.sort(key=lambda judge: case in judge.held)
         while self._idle:
             judge = self._idle.pop()
-            if judge.process.is_alive():
+            if judge.process.alive:
                 return judge
             judge.end()
-        context = get_context("forkserver")
-        taken, requests = context.Pipe(duplex=False)
-        answer, given = context.Pipe(duplex=False)
-        output, printed = context.Pipe(duplex=False)
-        try:
-            process = forked(serve, taken, given, printed)
-        except (OSError, EOFError):
-            for end in (requests, answer, output):
-                end.close()
-            raise
-        finally:
-            for end in (taken, given, printed):
-                end.close()
-        for end in (answer, output):
-            os.set_blocking(end.fileno(), False)
-        return _Judge(process, requests, answer, output)
+        how = Confinement(Limits(None), search_path(), own=False, once=False, secret=True)
+        return _Judge(GuardedChild.start(how, JOBS))
 
     def ended(self) -> list[tuple[Key, Ending]]:
         """Return what has been judged since, or could not be."""
@@ -240,15 +196,14 @@ class Judges(Generic[Key]):
         if look:
             self._looked = time.monotonic()
         found = []
-        for pair in tuple(self._at_work):
-            task, judge = pair
-            ending = progress_of(task, look=look)
+        for key, judge in tuple(self._at_work):
+            ending = judge.process.progress(look=look)
             if ending is None:
                 continue
-            self._at_work.remove(pair)
+            self._at_work.remove((key, judge))
             if ending.how == "answer" and ending.answer[:1] == _GOES_ON:
                 self._idle.append(judge)
             else:
                 judge.end()
-            found.append((task.key, replace(ending, answer=ending.answer[1:])))
+            found.append((key, replace(ending, answer=ending.answer[1:])))
         return found

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench import InputError
-from femubench.plugins.readers.apart import apart, limit_memory
+from femubench.plugins.readers.apart import apart
 from femubench.plugins.readers.reading import directions, needs, no_modes
 
 if TYPE_CHECKING:
@@ -63,7 +63,6 @@ def full_file(path: Path) -> dict[str, Any]:
     from ansys.mapdl.reader.common import read_table
     from ansys.mapdl.reader.full import FullFile
 
-    limit_memory(path)
     file: Any = FullFile(str(path))
     rows, stiffness, mass = file.load_km(as_sparse=True, sort=False)
     with path.open("rb") as stream:
@@ -87,7 +86,6 @@ def rst_file(path: Path) -> dict[str, Any]:
     """Return number and place of every node of a .rst file."""
     from ansys.mapdl.reader import read_binary
 
-    limit_memory(path)
     results: Any = read_binary(str(path))
     mesh = results.mesh
     return {"node": np.asarray(mesh.nnum), "xyz": np.asarray(mesh.nodes)[:, :3]}

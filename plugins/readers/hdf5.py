@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from femubench import InputError
-from femubench.plugins.readers.apart import apart, limit_memory
+from femubench.plugins.readers.apart import apart
 from femubench.plugins.readers.reading import needs, sparse_of
 from femubench.plugins.readers.variables import Variables, VariablesReader
 
@@ -49,7 +49,6 @@ def found_in(path: Path) -> dict[str, Any]:
     """Return what a file holds by name; a crash is for the caller to stand."""
     import h5py
 
-    limit_memory(path)
     with h5py.File(path, "r") as file:
         return dict(_found(file, "", path))
 

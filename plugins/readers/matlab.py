@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import scipy.io
 
-from femubench.plugins.readers.apart import apart, limit_memory
+from femubench.plugins.readers.apart import apart
 from femubench.plugins.readers.hdf5 import read_hdf5, save_hdf5
 from femubench.plugins.readers.variables import Variables, VariablesReader
 
@@ -47,7 +47,6 @@ def is_hdf5(path: Path) -> bool:
 
 def found_in(path: Path) -> dict[str, Any]:
     """Return the variables by name; a crash is for the caller to stand."""
-    limit_memory(path)
     found = _loaded(path)
     for name, value in found.items():
         if getattr(value, "dtype", np.dtype(float)).kind == "O":

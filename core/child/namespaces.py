@@ -26,7 +26,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-_NEW = 0x00020000 | 0x04000000 | 0x08000000 | 0x10000000 | 0x20000000 | 0x40000000
+_NEW_MOUNTS, _NEW_NAME, _NEW_IPC = 0x00020000, 0x04000000, 0x08000000
+_NEW_USER, _NEW_PROCESSES, _NEW_NETWORK = 0x10000000, 0x20000000, 0x40000000
 _READ_ONLY, _NO_SUID, _NO_DEV, _NO_EXEC, _BIND, _RECURSIVE, _PRIVATE = (
     1,
     2,
@@ -66,11 +67,12 @@ class Walls:
     hidden: tuple[str, ...] = ()
 
 
-def go_apart(walls: Walls, at: str, room: int, processes: int) -> None:
+def go_apart(walls: Walls | None, at: str, room: int, processes: int) -> None:
     """Return in a new process within walls; the caller waits, and ends as that one does.
 
     Arguments:
-        walls: what there is inside.
+        walls: what there is inside; with None only a namespace of processes is made, where that is
+            possible, and the root, rights and network stay.
         at: an empty folder, used to build the new root.
         room: bytes that the temporary folder may hold.
         processes: that there may be, with their threads.
@@ -78,11 +80,8 @@ def go_apart(walls: Walls, at: str, room: int, processes: int) -> None:
     Raises:
         OSError: where the system refuses the namespaces; the processes are as before then.
     """
-    user, group = os.geteuid(), os.getegid()
-    _call("unshare", "namespaces", _NEW)
-    _write("/proc/self/setgroups", "deny")
-    _write("/proc/self/uid_map", f"{user} {user} 1")
-    _write("/proc/self/gid_map", f"{group} {group} 1")
+    if not _unshare(alone=walls is None):
+        return
     # The first process of the namespace, whose end ends all in it, is a program that reads until
     # the end, and small, where a copy of this process would be as large as this one. That it hears
     # of no signal from within makes it no place for a strategy: one that ends itself would go on.
@@ -120,6 +119,14 @@ def go_apart(walls: Walls, at: str, room: int, processes: int) -> None:
         if release >= (6, 14):
             with suppress(OSError):
                 _write("/proc/sys/kernel/pid_max", str(max(processes, 301)))
+        if walls is None:
+            with suppress(OSError):
+                _mount("", "/", flags=_RECURSIVE | _PRIVATE)
+                _mount("proc", "/proc", "proc", _NO_SUID | _NO_DEV | _NO_EXEC)
+            os.setsid()
+            resource.setrlimit(resource.RLIMIT_NPROC, (processes, processes))
+            os.chdir(at)
+            return
         _build(walls, at, room)
         # A loopback that leads to nobody else, and another name of the host.
         _call("sethostname", "a name", b"sandbox", 7)
@@ -141,6 +148,35 @@ def go_apart(walls: Walls, at: str, room: int, processes: int) -> None:
     except Exception as error:
         os.write(2, f"no sandbox: {error}\n".encode())
         os._exit(FAILED)
+
+
+def _unshare(*, alone: bool) -> bool:
+    """Let the next child begin namespaces of its own; tell whether it will.
+
+    Arguments:
+        alone: whether one of processes is enough, and none is no error.
+
+    Raises:
+        OSError: where the system refuses them.
+    """
+    user, group = os.geteuid(), os.getegid()
+    wanted = _NEW_PROCESSES | _NEW_MOUNTS
+    if not alone:
+        wanted |= _NEW_NAME | _NEW_IPC | _NEW_NETWORK
+    elif sys.platform != "linux" or not os.path.exists(_READER):
+        return False
+    elif user == 0 and _libc().unshare(wanted) == 0:  # keeps the rights of root
+        return True
+    try:
+        _call("unshare", "namespaces", wanted | _NEW_USER)
+    except OSError:
+        if not alone:
+            raise
+        return False
+    _write("/proc/self/setgroups", "deny")
+    _write("/proc/self/uid_map", f"{user} {user} 1")
+    _write("/proc/self/gid_map", f"{group} {group} 1")
+    return True
 
 
 def _build(walls: Walls, at: str, room: int) -> None:

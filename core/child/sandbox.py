@@ -7,7 +7,6 @@ scenarios, stores, the working folder and home are not.
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import platform
@@ -15,18 +14,19 @@ import resource
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Literal
 
+from femubench.core.child import namespaces
+from femubench.core.child.namespaces import FOLDER, Walls, go_apart
+from femubench.core.child.syscall_filter import known_processor, refuse_system_calls
 from femubench.core.errors import InputError
-from femubench.core.run import namespaces
-from femubench.core.run.namespaces import FOLDER, Walls, go_apart
-from femubench.core.run.syscall_filter import known_processor, refuse_system_calls
-from femubench.core.schema.run_options import Sandbox as Sandbox
+from femubench.core.schema.run_options import Sandbox
 
+Mode = Sandbox | Literal["processes"]  # the last: only a namespace of processes, where possible
 OFF = "it is switched off"
 _OLDEST = (5, 14)  # Linux: counts the processes of a user in each namespace of users apart
 _SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store")
@@ -37,11 +37,6 @@ _MODULES = (".py", ".pyc", ".so", ".pth", ".zip", ".egg")
 _ABOUT = (".dist-info", ".egg-info", ".egg-link", ".libs", ".data")
 _PATIENCE = 20.0  # s
 _MOST_FILES = 1024  # open at a time: what pipes and sockets hold is in no count of memory
-_ENVIRONMENT_START = 47  # word of /proc/self/stat behind the name: proc_pid_stat(5), field 50
-_VARIABLES = frozenset(
-    {"PATH", "LANG", "LANGUAGE", "TZ", "LD_LIBRARY_PATH", "VIRTUAL_ENV", "CONDA_PREFIX", "TERM"}
-)
-_FAMILIES = ("LC_", "PYTHON", "OMP_", "OPENBLAS_", "MKL_", "BLIS_", "VECLIB_", "NUMEXPR_")
 
 
 @dataclass(frozen=True)
@@ -57,17 +52,17 @@ class Enclosure:
     reason: str = ""
 
 
-def enclosure(mode: Sandbox) -> Enclosure:
+def enclosure(mode: Mode) -> Enclosure:
     """Return how strategies run here.
 
     Arguments:
-        mode: ``off`` for no sandbox, ``auto`` for one where that is possible, ``require`` for no
-            run without.
+        mode: ``off`` or ``processes`` for no sandbox, ``auto`` for one where that is possible,
+            ``require`` for no run without.
 
     Raises:
         InputError: where one is required and is not possible.
     """
-    if mode == "off":
+    if mode in ("off", "processes"):
         return Enclosure("none", OFF)
     reason = missing()
     if reason is None:
@@ -145,21 +140,8 @@ def walls_around(hidden: Iterable[str], code: Iterable[str] = ()) -> Walls:
     return Walls(outermost, links, tuple(_outermost(inside)))
 
 
-def way_in(room: int, processes: int) -> Callable[[str], None] | None:
-    """Return what lets a process go on where it sees code alone; None where none need be tried.
-
-    It takes an empty folder and is `enter` for the rest.
-
-    Arguments:
-        room, processes: as for `enter`.
-    """
-    if _unfit() is not None:
-        return None
-    return partial(enter, walls_around(()), room=room, processes=processes)
-
-
 def enter(walls: Walls, at: str, room: int, processes: int) -> None:
-    """Go on in a process within walls, where no secret of the environment is left.
+    """Go on in a process within walls, whose environment the fork server has freed of secrets.
 
     Arguments:
         walls, at, room, processes: as for `go_apart`.
@@ -168,25 +150,11 @@ def enter(walls: Walls, at: str, room: int, processes: int) -> None:
         OSError: where the system refuses the namespaces; the processes are as before then.
     """
     go_apart(walls, at, room, processes)
-    kept = {name: os.environ[name] for name in _bare(os.environ)}
-    for name in tuple(os.environ):
-        del os.environ[name]
-    # Put there anew, the text lies elsewhere than what the first process was given.
-    os.environ.update(kept)
-    with open("/proc/self/stat", "rb") as stream:
-        words = stream.read().rpartition(b")")[2].split()
-    start, end = int(words[_ENVIRONMENT_START]), int(words[_ENVIRONMENT_START + 1])
-    ctypes.memset(start, 0, end - start)
     os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     most = _MOST_FILES if hard == resource.RLIM_INFINITY else min(_MOST_FILES, hard)
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
     refuse_system_calls()
-
-
-def _bare(given: Iterable[str]) -> set[str]:
-    """Return the names of variables that a process in the sandbox keeps."""
-    return {name for name in given if name in _VARIABLES or name.startswith(_FAMILIES)}
 
 
 def _environment(prefix: Path) -> Iterator[str]:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import psutil
-
-from femubench.core.run.sandbox import Sandbox
+from femubench.core.child.sandbox import Mode
 
 MIB = 2**20
 _SHARE = 0.9  # of the memory that is there, for all workers together
@@ -25,7 +23,8 @@ class Limits:
         answer: bytes that it may hand back.
         file: size of the largest file that it may write.
         processes: that it may have, where there is a sandbox with their threads.
-        sandbox: whether it runs in one.
+        sandbox: whether it runs in one; with ``processes`` only in a namespace of processes where
+            that is possible, in the folder and with the environment of its parent.
         hidden: folders that it does not see there, wherever they are.
         shown: files of code that it sees there besides what can be imported.
     """
@@ -36,7 +35,7 @@ class Limits:
     answer: int = 1024 * MIB
     file: int = 1024 * MIB
     processes: int = 512
-    sandbox: Sandbox = "off"
+    sandbox: Mode = "off"
     hidden: tuple[str, ...] = ()
     shown: tuple[str, ...] = ()
 
@@ -48,6 +47,8 @@ def memory_share(workers: int, given: int | None = None) -> int:
         workers: number of them.
         given: bytes that they have together where that is less than the machine's.
     """
+    import psutil
+
     total = psutil.virtual_memory().total if given is None else given
     return max(int(_SHARE * total / workers), LEAST)
 

@@ -1,0 +1,369 @@
+"""A child process in its limits, seen from its parent: started, asked, watched, ended."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import psutil
+
+from femubench.core.child.confinement import LENGTH_BYTES, READY, Confinement, object_frames
+from femubench.core.child.limits import Limits, spoken_bytes
+from femubench.core.child.namespaces import FOLDER
+from femubench.core.child.server import NUMBER, end_group, end_server, fork_server
+
+How = Literal[
+    "answer", "timeout", "memory", "output", "answer-size", "died", "no-start", "orphaned"
+]
+_START = 120.0  # s that a process may take until it is ready
+_CHUNK = 2**20
+_TICK = 0.5  # s between two looks at a server that may have been stopped
+_BASE = 256 * 2**20  # bytes of a fresh child, most of them shared with the server
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a request to a child ended.
+
+    Arguments:
+        how: ``answer`` when it handed back its bytes.
+        answer: the bytes.
+        reason: one line on any other end.
+        seconds: wall time since the process was ready.
+    """
+
+    how: How
+    answer: bytes = b""
+    reason: str = ""
+    seconds: float = 0.0
+
+
+@dataclass(eq=False)
+class GuardedChild:
+    """A child process.
+
+    Arguments:
+        pid: number of the process.
+        requests, answers, output, status: our ends of its pipes.
+        confinement: how it runs.
+        limits: on the request that it is at.
+    """
+
+    pid: int
+    requests: int
+    answers: int
+    output: int
+    status: int
+    confinement: Confinement
+    limits: Limits
+    code: int | None = None
+    _started: float = field(default_factory=time.monotonic)
+    _asked: float = 0.0
+    _ready: float | None = None
+    _received: bytearray = field(default_factory=bytearray)
+    _printed: int = 0
+    _unsent: list[memoryview] = field(default_factory=list)
+
+    @classmethod
+    def start(cls, confinement: Confinement, module: str) -> GuardedChild:
+        """Start a child.
+
+        Arguments:
+            confinement: how it runs.
+            module: of ours, which the fork server loads first.
+
+        Raises:
+            OSError: when there is none to be had.
+        """
+        pipes = [os.pipe() for _ in range(4)]
+        ours = [pipes[0][1], *(end for end, _ in pipes[1:])]
+        theirs = [pipes[0][0], *(end for _, end in pipes[1:])]
+        server = fork_server()
+        try:
+            try:
+                server.ask(module, theirs)
+            finally:
+                _close(theirs)
+            pid = _number(ours[-1])
+        except BaseException as error:
+            _close(ours)  # where there is a child, it ends for want of a request
+            if isinstance(error, OSError):
+                end_server(server)
+            raise
+        for end in ours:
+            os.set_blocking(end, False)
+        child = cls(pid, ours[0], ours[1], ours[2], ours[3], confinement, confinement.limits)
+        child._send(confinement)
+        return child
+
+    def ask(self, function: Callable[[Any], bytes], argument: object, limits: Limits) -> None:
+        """Have a function called there; `progress` tells of its answer.
+
+        Arguments:
+            function: importable by name.
+            argument: its argument; pickled.
+            limits: on time, memory and volume until the answer is there.
+        """
+        self.limits, self._asked = limits, time.monotonic()
+        self._received, self._printed = bytearray(), 0
+        self._send((function, argument))
+
+    def _send(self, what: object) -> None:
+        self._unsent += map(memoryview, object_frames(what))
+        self._push()
+
+    def _push(self) -> None:
+        """Send on what the child takes now: one that was stopped must not stop its parent."""
+        try:
+            while self._unsent:
+                view = self._unsent[0]
+                sent = os.write(self.requests, view[:_CHUNK]) if view else 0
+                self._unsent[0] = view[sent:]
+                if not self._unsent[0]:
+                    del self._unsent[0]
+        except BlockingIOError:
+            return
+        except OSError:  # it died, as its status will tell
+            self._unsent.clear()
+
+    @property
+    def deadline(self) -> float | None:
+        """Return when it is stopped, on the monotonic clock."""
+        if self._ready is None:
+            return self._started + _START
+        return None if self.limits.seconds is None else self._begun + self.limits.seconds
+
+    @property
+    def _begun(self) -> float:
+        return max(self._asked, self._ready or self._asked)
+
+    @property
+    def _length(self) -> int:
+        """Return the length that the answer with its head is said to have; 0 before that."""
+        head = self._received[:LENGTH_BYTES]
+        return LENGTH_BYTES + int.from_bytes(head, "big") if len(head) == LENGTH_BYTES else 0
+
+    @property
+    def alive(self) -> bool:
+        """Tell whether it has not ended yet."""
+        self._look()
+        return self.code is None and self.status >= 0
+
+    @property
+    def gone(self) -> bool:
+        """Tell whether nothing of it is left, nor of what it started."""
+        self._look()
+        return self.status < 0
+
+    def progress(self, *, look: bool) -> Ending | None:
+        """Take what it has sent; return how the request ended, None while it goes on.
+
+        Arguments:
+            look: whether memory and number of its processes are looked at too.
+        """
+        ended = not self.alive
+        self._push()
+        for end in ("output", "answers"):
+            self._take(end)
+        limits, now = self.limits, time.monotonic()
+        seconds = now - self._begun if self._ready else 0.0
+        if 0 < self._length <= min(len(self._received), limits.answer + LENGTH_BYTES):
+            answer = bytes(self._received[LENGTH_BYTES : self._length])
+            return Ending("answer", answer, seconds=seconds)
+        if self._printed > limits.output:
+            what = f"printed more than {spoken_bytes(limits.output)}"
+            return Ending("output", reason=what, seconds=seconds)
+        if self._length > limits.answer + LENGTH_BYTES:
+            what = f"its result is larger than {spoken_bytes(limits.answer)}"
+            return Ending("answer-size", reason=what, seconds=seconds)
+        if ended and self.code is None:
+            what = "the process from which all workers are started was ended"
+            return Ending("orphaned", reason=what, seconds=seconds)
+        if ended:
+            how: How = "died" if self._ready is not None else "no-start"
+            return Ending(how, reason=self._death(), seconds=seconds)
+        if self.deadline is not None and now >= self.deadline:
+            if self._ready is None:
+                reason = f"the worker process was not ready in {_START:g} s"
+                return Ending("no-start", reason=reason)
+            limit = limits.seconds or 0.0
+            return Ending("timeout", reason=f"no result within {limit:g} s", seconds=limit)
+        excess = self._excess() if look else None
+        return None if excess is None else Ending("memory", reason=excess, seconds=seconds)
+
+    def _take(self, name: str) -> None:
+        """Take what has come through a pipe, but not much more than is allowed."""
+        end = getattr(self, name)
+        while end >= 0:
+            try:
+                data = os.read(end, _CHUNK)
+            except BlockingIOError:
+                return
+            except OSError:
+                data = b""
+            if not data:
+                _close([end])
+                setattr(self, name, -1)
+                return
+            if name == "output":
+                self._printed += len(data)
+                if self._printed > self.limits.output:
+                    return
+                continue
+            if self._ready is None:
+                self._ready, data = time.monotonic(), data[len(READY) :]
+            self._received += data
+            if len(self._received) > self.limits.answer + LENGTH_BYTES:
+                return
+
+    def _look(self) -> None:
+        """Learn whether it has ended, and what it started too."""
+        while self.status >= 0:
+            try:
+                data = os.read(self.status, NUMBER)
+            except BlockingIOError:
+                return
+            if data:
+                self.code = int.from_bytes(data, "big", signed=True)
+            else:
+                os.close(self.status)
+                self.status = -1
+
+    def _death(self) -> str:
+        when = "" if self._ready is not None else " before it was ready"
+        assert self.code is not None
+        if self.code >= 0:
+            return f"the worker process ended with exit code {self.code}{when}"
+        with suppress(ValueError):
+            return f"the worker process was ended by {signal.Signals(-self.code).name}{when}"
+        return f"the worker process was ended by signal {-self.code}{when}"
+
+    def _excess(self) -> str | None:
+        """Return of what it has more than it may, None where it keeps its limits."""
+        limits, walled = self.limits, self.confinement.walls is not None
+        processes = processes_of(self.pid, walled=walled)
+        if len(processes) > limits.processes:
+            return f"has {len(processes)} processes, allowed {limits.processes}"
+        if limits.memory is not None:
+            used = memory_of(processes, f"/proc/{self.pid}/root" if walled else None)
+            if used > limits.memory + _BASE:
+                return f"used {spoken_bytes(used)} of memory, allowed {spoken_bytes(limits.memory)}"
+        return None
+
+    def kill(self) -> None:
+        """End the process and its group; what they are at is lost."""
+        if self.alive:
+            end_group(self.pid)
+        _close(end for end in (self.requests, self.answers, self.output) if end >= 0)
+        self.requests = self.answers = self.output = -1
+
+    def bury(self) -> None:
+        """Wait until nothing is left of a child that was ended."""
+        while not self.gone:
+            if not select.select([self.status], [], [], _TICK)[0]:
+                fork_server().wake()
+
+    def watch(self, poll: select.poll) -> None:
+        """Have a poll tell when there is something for `progress` to do."""
+        for end in (self.status, self.answers, self.output):
+            if end >= 0:
+                poll.register(end, select.POLLIN)
+        if self._unsent:
+            poll.register(self.requests, select.POLLOUT)
+
+
+def wait_for(children: Iterable[GuardedChild], seconds: float) -> None:
+    """Wait until there is something to do for one of some children, but not for long.
+
+    Arguments:
+        children: that are asked something.
+        seconds: at most.
+    """
+    poll, now = select.poll(), time.monotonic()
+    for child in children:
+        child.watch(poll)
+        if child.deadline is not None:
+            seconds = min(seconds, child.deadline - now)
+    poll.poll(max(1000.0 * seconds, 0.0))
+
+
+def _number(status: int) -> int:
+    """Wait for the number of a child that was asked for."""
+    until = time.monotonic() + _START
+    while not select.select([status], [], [], _TICK)[0]:
+        if time.monotonic() > until:
+            raise TimeoutError("the process from which all workers are started does not answer")
+        fork_server().wake()
+    data = os.read(status, NUMBER)
+    if not data:
+        raise BrokenPipeError("the process from which all workers are started was ended")
+    return int.from_bytes(data, "big")
+
+
+def _close(ends: Iterable[int]) -> None:
+    for end in ends:
+        with suppress(OSError):
+            os.close(end)
+
+
+def processes_of(leader: int, *, walled: bool) -> list[psutil.Process]:
+    """Return a worker and all processes below it.
+
+    Arguments:
+        leader: the worker.
+        walled: whether it only waits for the one in its sandbox.
+    """
+    with suppress(psutil.Error):
+        top = psutil.Process(leader)
+        below = top.children(recursive=True)
+        return below if walled else [top, *below]
+    return []
+
+
+def memory_of(processes: Iterable[psutil.Process], root: str | None) -> int:
+    """Return the bytes that processes hold in memory, with files that exist there alone.
+
+    Arguments:
+        root: of their sandbox, whose temporary folder is in memory; None for none.
+    """
+    total, seen = 0, set[int]()
+    for process in processes:
+        with suppress(psutil.Error, OSError):
+            total += _resident(process)
+            total += sum(_unmapped(f"/proc/{process.pid}/fd", seen))
+    with suppress(OSError):
+        # As a worker starts its root is still that of this process.
+        if root is not None and not os.path.samefile(root, "/"):
+            held = os.statvfs(root + FOLDER)
+            total += (held.f_blocks - held.f_bfree) * held.f_frsize
+    return total
+
+
+def _resident(process: psutil.Process) -> int:
+    """Return the bytes of a process in memory; on Linux without pages of files, which it shares."""
+    if sys.platform != "linux":
+        return int(process.memory_info().rss)
+    with open(f"/proc/{process.pid}/status", "rb") as lines:
+        known = [line.split() for line in lines if line.startswith((b"RssAnon", b"RssShmem"))]
+    return sum(1024 * int(words[1]) for words in known)
+
+
+def _unmapped(folder: str, seen: set[int]) -> Iterator[int]:
+    """Yield the sizes of anonymous files that are open, which count in no process (memfd)."""
+    if sys.platform != "linux":
+        return
+    for name in os.listdir(folder):
+        path = f"{folder}/{name}"
+        with suppress(OSError):
+            if os.readlink(path).startswith(("/memfd:", "/dev/shm/")):
+                found = os.stat(path)
+                if found.st_ino not in seen:
+                    seen.add(found.st_ino)
+                    yield 512 * found.st_blocks

@@ -1,0 +1,262 @@
+"""Every task in a fresh process of its own, stopped when it takes more than its limits."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import psutil
+
+from femubench.core.child import server
+from femubench.core.child.confinement import Confinement
+from femubench.core.child.guarded_child import Ending, GuardedChild, wait_for
+from femubench.core.child.limits import Limits
+from femubench.core.child.sandbox import enclosure, walls_around
+
+JOBS = "femubench.core.run.preload"  # what children that run strategies or judge need
+Key = TypeVar("Key")
+_PR_SET_CHILD_SUBREAPER, _PR_GET_CHILD_SUBREAPER = 36, 37
+_TICK = 0.5  # s between two looks at the memory of a worker
+_ATTEMPTS = 3  # to start a process
+
+
+class Workers(Generic[Key]):
+    """Runs tasks, at most `count` at a time.
+
+    Arguments:
+        count: number of processes.
+        module: of ours, with what they need.
+    """
+
+    def __init__(self, count: int, module: str = JOBS) -> None:
+        self.count, self._module = count, module
+        self._running: list[tuple[Key, GuardedChild]] = []
+        self._dying: list[GuardedChild] = []
+        self._root = Path()
+        self._looked = 0.0
+        self._walls = lru_cache(walls_around)
+
+    @property
+    def running(self) -> int:
+        """Return how many tasks are running."""
+        return len(self._running)
+
+    @property
+    def free(self) -> bool:
+        """Tell whether another task can start."""
+        return self.running < self.count
+
+    @property
+    def busy(self) -> bool:
+        """Tell whether a task is running."""
+        return self.running > 0
+
+    @contextmanager
+    def open(self) -> Iterator[Workers[Key]]:
+        """Start what the workers need, and leave no process and no file behind."""
+        self._root = _scratch_root()
+        if not server.fork_server().current:
+            server.end_server()
+        with suppress(OSError):
+            server.fork_server().ask(self._module)
+        with adopt_orphans():
+            try:
+                yield self
+            finally:
+                for _, child in self._running:
+                    self._end(child)
+                self._running = []
+                self._bury(wait=True)
+                self._end_strays()
+                shutil.rmtree(self._root, ignore_errors=True)
+
+    def start(
+        self, key: Key, function: Callable[[Any], bytes], argument: object, limits: Limits
+    ) -> Ending | None:
+        """Start a task; return how it ended where no process could be started.
+
+        Arguments:
+            key: by which `wait` names it.
+            function: importable by name.
+            argument: its argument; pickled.
+            limits: what it may take.
+        """
+        self._root.mkdir(mode=0o700, parents=True, exist_ok=True)  # a job may have removed it
+        scratch = tempfile.mkdtemp(dir=self._root)
+        try:
+            child = GuardedChild.start(self._confinement(limits, scratch), self._module)
+        except OSError as error:
+            return Ending("no-start", reason=f"no worker process could start: {error}")
+        child.ask(function, argument, limits)
+        self._running.append((key, child))
+        return None
+
+    def _confinement(self, limits: Limits, scratch: str) -> Confinement:
+        path = server.search_path()
+        if enclosure(limits.sandbox).sandbox != "none":
+            walls = self._walls(limits.hidden, limits.shown)
+            return Confinement(limits, path, scratch, walls=walls)
+        environment = {**os.environ, **server.ONE_THREAD, server.MARK: server.fork_server().mark}
+        if limits.sandbox == "processes":
+            return Confinement(limits, path, os.getcwd(), own=False, environment=environment)
+        return Confinement(limits, path, scratch, environment=environment)
+
+    def wait(self, others: Sequence[GuardedChild] = ()) -> list[tuple[Key, Ending]]:
+        """Wait until some task has ended, and return those that have; none after a short while.
+
+        Arguments:
+            others: children that may end the waiting too.
+        """
+        wait_for([*(child for _, child in self._running), *others], _TICK)
+        look = time.monotonic() - self._looked >= _TICK
+        if look:
+            self._looked = time.monotonic()
+        ended = []
+        for key, child in tuple(self._running):
+            ending = child.progress(look=look)
+            if ending is not None:
+                self._running.remove((key, child))
+                self._end(child)
+                ended.append((key, ending))
+        self._bury(wait=False)
+        if look:
+            server.fork_server().wake()
+            self._end_strays()
+        return ended
+
+    def _end(self, child: GuardedChild) -> None:
+        child.kill()
+        self._dying.append(child)
+
+    def _bury(self, *, wait: bool) -> None:
+        """Remove what is left of children that were ended; ending takes its time."""
+        for child in tuple(self._dying):
+            if wait:
+                child.bury()
+            if child.gone:
+                self._dying.remove(child)
+                if child.confinement.own:
+                    shutil.rmtree(child.confinement.folder, ignore_errors=True)
+
+    def _end_strays(self) -> None:
+        """End what workers have left to this process, which adopts it when their server has ended.
+
+        It is known by the mark in its environment, or by its folder.
+        """
+        running = server.fork_server()
+        with suppress(psutil.Error):
+            for child in psutil.Process().children():
+                if child.pid != running.process.pid and self._is_stray(child, running.mark):
+                    for process in (child, *_below(child)):
+                        server.end_group(process.pid)
+                    with suppress(ChildProcessError):
+                        os.waitpid(child.pid, 0)
+
+    def _is_stray(self, process: psutil.Process, mark: str) -> bool:
+        with suppress(psutil.Error, OSError):
+            if process.status() == psutil.STATUS_ZOMBIE:
+                # Its environment is gone; a child of ours that nobody waits for is an orphan of a
+                # job or a process of a caller, who keeps the right to its exit code.
+                return False
+            marked = process.environ().get(server.MARK) == mark
+            return marked or Path(process.cwd()).is_relative_to(self._root)
+        return False
+
+
+def _below(process: psutil.Process) -> list[psutil.Process]:
+    try:
+        return list(process.children(recursive=True))
+    except psutil.Error:
+        return []
+
+
+@contextmanager
+def adopt_orphans() -> Iterator[None]:
+    """Make orphans of the workers children of this process as long as the block runs (Linux).
+
+    What a job detaches from itself would else become a child of init and could not be found.
+    """
+    if sys.platform != "linux":
+        yield
+        return
+    libc = ctypes.CDLL(None)
+    before = ctypes.c_int()
+    libc.prctl(_PR_GET_CHILD_SUBREAPER, ctypes.byref(before))
+    libc.prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    try:
+        yield
+    finally:
+        libc.prctl(_PR_SET_CHILD_SUBREAPER, before.value)
+
+
+def _scratch_root() -> Path:
+    """Make a folder for the scratch folders of this process; remove those of dead processes."""
+    above = Path(tempfile.gettempdir())
+    for left in above.glob("femubench-*-*"):
+        number = left.name.split("-")[1]
+        if number.isdigit() and not psutil.pid_exists(int(number)):
+            shutil.rmtree(left, ignore_errors=True)
+    return Path(tempfile.mkdtemp(prefix=f"femubench-{os.getpid()}-", dir=above))
+
+
+def run_apart(
+    tasks: Mapping[Key, tuple[Callable[[Any], bytes], object]],
+    limits: Limits,
+    count: int,
+    module: str = JOBS,
+) -> dict[Key, Ending]:
+    """Return how every task ended, each in a process of its own.
+
+    Arguments:
+        tasks: by key, a function that is importable by name and its argument.
+        limits: what each may take.
+        count: number of processes at a time.
+        module: as for `Workers`.
+    """
+    found: dict[Key, Ending] = {}
+    waiting, attempts = list(tasks), dict.fromkeys(tasks, 0)
+    if not waiting:
+        return found
+    with Workers[Key](count, module).open() as workers:
+        while waiting or workers.busy:
+            while workers.free and waiting:
+                key = waiting.pop(0)
+                attempts[key] += 1
+                ending = workers.start(key, *tasks[key], limits)
+                if ending is not None:
+                    found[key] = ending
+            for key, ending in workers.wait() if workers.busy else ():
+                if ending.how == "no-start" and attempts[key] < _ATTEMPTS:
+                    waiting.append(key)
+                else:
+                    found[key] = ending
+    # One of them has ended the server of all; alone it does so to itself.
+    orphaned = [key for key in found if found[key].how == "orphaned" and len(tasks) > 1]
+    for key in orphaned:
+        found |= run_apart({key: tasks[key]}, limits, 1, module)
+    return found
+
+
+def call_apart(
+    function: Callable[[Any], bytes], argument: object, seconds: float, memory: int, module: str
+) -> Ending:
+    """Return how a call of a function ended in a process of its own, from which it reads files.
+
+    Arguments:
+        function: importable by name; returns bytes.
+        argument: its argument; pickled.
+        seconds: that it may take.
+        memory: bytes that it may take, libraries and answer among them.
+        module: of femubench, which is loaded once for all calls.
+    """
+    limits = Limits(seconds, memory, answer=memory, sandbox="processes")
+    return run_apart({0: (function, argument)}, limits, 1, module)[0]
