@@ -8,19 +8,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, Strict
+from msgspec import Meta, Struct
+from msgspec.structs import asdict
 
 from femubench.core.errors import InputError
 from femubench.core.files import MIB, read_text
-from femubench.core.schema.validation import validated
+from femubench.core.schema.bounds import Real, Whole
+from femubench.core.schema.validation import read_plain
 
 TRUTH_FILE = "truth.toml"
 # Kind -> how many causes it has.
 KINDS = {"defect": 1, "pair": 2, "clean": 0, "outside": 1, "data-fault": 1, "input-fault": 1}
 
-_CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False)
-_STRICT = _CONFIG | ConfigDict(strict=True)
-_Finding = Annotated[str, Field(pattern=r"^[^@]+@(?s:.+)$")]
+_Finding = Annotated[str, Meta(pattern=r"^[^@]+@(?s:.+)$")]
+_ChiSquare = Annotated[float, Meta(ge=0.0, le=1e300)]
 
 
 def held(name: str) -> bool:
@@ -28,8 +29,7 @@ def held(name: str) -> bool:
     return hashlib.sha256(name.encode()).digest()[0] % 2 == 1
 
 
-@dataclass(frozen=True)
-class TrueCause:
+class TrueCause(Struct, frozen=True, forbid_unknown_fields=True):
     """One thing that is wrong.
 
     Arguments:
@@ -41,13 +41,11 @@ class TrueCause:
         unit: empty for a ratio.
     """
 
-    __pydantic_config__ = _CONFIG
-
     what: str
     effect: str
     place: str
     also: tuple[_Finding, ...] = ()
-    size: Annotated[float, Strict()] | None = None
+    size: Real | None = None
     unit: str = ""
 
     @property
@@ -118,28 +116,22 @@ class GivenTruth:
         return str(self.truth)
 
 
-class _Mass(BaseModel):
-    model_config = _STRICT
-
-    value: float
-    std: float
+class _Mass(Struct, forbid_unknown_fields=True):
+    value: Real
+    std: Real
 
 
-class _Visible(BaseModel):
-    model_config = _STRICT
-
-    chi2: Annotated[float, Field(ge=0.0)]
-    chi2_frequencies: Annotated[float, Field(ge=0.0)]
+class _Visible(Struct, forbid_unknown_fields=True):
+    chi2: _ChiSquare
+    chi2_frequencies: _ChiSquare
     appears: int = 0
 
 
-class _TruthTable(BaseModel):
-    model_config = _STRICT
-
+class _TruthTable(Struct, forbid_unknown_fields=True):
     structure: str
     kind: str
     held: bool
-    seed: Annotated[int, Field(ge=0)]
+    seed: Whole
     mass: _Mass | None = None
     visible: _Visible | None = None
     cause: list[TrueCause] = []
@@ -156,7 +148,7 @@ def read_truth(folder: Path) -> KnownCase:
         content = tomllib.loads(read_text(file, MIB))
     except tomllib.TOMLDecodeError as error:
         raise InputError(str(error), file=file, expected="valid TOML") from None
-    table = validated(_TruthTable, content, file)
+    table = read_plain(_TruthTable, content, file=file)
     kind, half = table.kind, held(folder.name)
     if kind not in KINDS:
         expected = f"one of {', '.join(KINDS)}"
@@ -170,4 +162,4 @@ def read_truth(folder: Path) -> KnownCase:
     mass = None if table.mass is None else (table.mass.value, table.mass.std)
     causes, seen = tuple(table.cause), table.visible
     known = KnownCase(folder.name, table.structure, kind, table.seed, causes, mass=mass)
-    return known if seen is None else replace(known, **seen.model_dump())
+    return known if seen is None else replace(known, **asdict(seen))
