@@ -1,4 +1,4 @@
-"""Search for readings of the ladder paper that give its open columns; write docs/open-cells.md.
+"""Search for readings of the ladder paper that give its open columns; write docs/reproduce.md.
 
     python benchmarks/open_cells.py [--quick] [--write]     # some minutes on one core
 
@@ -26,7 +26,7 @@ from femubench import StrategyFailure
 from femubench.fem import FloatArray
 from femubench.papers.printed import printed
 
-PAGE = Path(__file__).parents[1] / "docs" / "open-cells.md"
+PAGE = Path(__file__).parents[1] / "docs" / "reproduce.md"
 CLOSED = 0.5  # percent
 TABLES = printed("frame")
 NOMINAL = TABLES["table1"]["fe"]

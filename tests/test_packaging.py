@@ -77,5 +77,7 @@ def test_facade_says_the_same_to_python_and_to_type_checkers() -> None:
 
 def test_index_of_the_docs_names_every_page() -> None:
     docs = ROOT / "docs"
-    linked = set(re.findall(r"\]\(([\w-]+\.md)\)", (docs / "index.md").read_text(encoding="utf-8")))
-    assert linked | {"index.md"} == {page.name for page in docs.glob("*.md")}
+    linked = set(
+        re.findall(r"\]\(([\w/-]+\.md)\)", (docs / "index.md").read_text(encoding="utf-8"))
+    )
+    assert linked | {"index.md"} == {str(page.relative_to(docs)) for page in docs.rglob("*.md")}
