@@ -26,10 +26,9 @@ import numpy as np
 import pandas as pd
 
 ROOT = Path(__file__).parents[1]
-PAGE, KEPT = (
-    ROOT / "docs" / "development" / "performance.md",
-    ROOT / "docs" / "figures" / "performance.json",
-)
+DOCS = ROOT / "docs"
+PAGE = DOCS / "development" / "performance.md"
+KEPT = DOCS / "figures" / "performance.json"
 _BEGIN, _END = "<!-- performance -->\n", "<!-- /performance -->"
 _GRIDS, _LATTICES = (12, 36, 115, 259), (4, 6, 9, 13, 19)
 _RESULTS = (1000, 10000, 100000)
