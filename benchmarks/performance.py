@@ -220,7 +220,7 @@ BARS = (
 def page_of(kept: Mapping[str, Any]) -> str:
     """Return what stands between the marks of the page."""
     lines = pd.DataFrame([bar.line(kept) for bar in BARS])
-    parts = ["## What is asked for", lines.to_markdown(index=False, disable_numparse=True)]
+    parts = ["## Bars", lines.to_markdown(index=False, disable_numparse=True)]
     for section in SECTIONS:
         if section.word in kept:
             found = kept[section.word]
