@@ -61,7 +61,7 @@ kernels: $(VENV)/.installed-test
 bench: $(VENV)/.installed-test
 	$(BIN)/pytest benchmarks -o addopts="--import-mode=importlib -ra" --benchmark-only $(ARGS)
 
-# A quarter of an hour and up to 1.5 GB; docs/performance.md tells what is measured.
+# A quarter of an hour and up to 1.5 GB; docs/development/performance.md says what is measured.
 bench-report: $(VENV)/.installed-test
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/performance.py --write $(ARGS)
 

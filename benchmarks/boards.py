@@ -1,8 +1,8 @@
 """The leaderboards that README and docs print: run, kept in docs/figures, put into the pages.
 
 python benchmarks/boards.py default      # README.md; minutes on two cores
-python benchmarks/boards.py suite        # docs/suite.md
-python benchmarks/boards.py noise        # docs/noise.md
+python benchmarks/boards.py suite        # docs/scenarios.md
+python benchmarks/boards.py noise        # docs/scoring.md
 python benchmarks/boards.py default --from run.json    # of a run that is there
 """
 
@@ -47,8 +47,8 @@ class Board:
 
 BOARDS = {
     "default": Board("README.md", modes=True),
-    "suite": Board("docs/suite.md", ("suite",)),
-    "noise": Board("docs/noise.md", ("frame", "hframe", "frame-solid", "hframe-solid"), 3),
+    "suite": Board("docs/scenarios.md", ("suite",)),
+    "noise": Board("docs/scoring.md", ("frame", "hframe", "frame-solid", "hframe-solid"), 3),
 }
 
 

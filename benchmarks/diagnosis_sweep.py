@@ -1,7 +1,7 @@
-"""Diagnose some 680 blind cases and write the figures of docs/diagnosis-sweep.md.
+"""Diagnose some 680 blind cases and write figures of docs/diagnosis-accuracy.md.
 
     python benchmarks/diagnosis_sweep.py run --jobs 2          # appends, goes on where it stopped
-    python benchmarks/diagnosis_sweep.py tables                # table, confusion, calibration
+    python benchmarks/diagnosis_sweep.py tables                # tables, confusion, calibration
     python benchmarks/diagnosis_sweep.py kernels --cases 13    # does rounding change an answer?
 
 The figures need `pip install femubench[figures]`.
@@ -16,13 +16,12 @@ import os
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from blind_sweep import (
     GROUPS,
     Record,
@@ -42,12 +41,13 @@ from stated_probabilities import (
     percent,
     wilson,
 )
+from sweep_data import DATA, PAGE, as_markdown, filled, write_rows
 from threadpoolctl import threadpool_limits
 from true_fit import fits_worse, is_search_fault
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "femubench-results" / "diagnosis-sweep.jsonl"
-DOCS = ROOT / "docs"
+MARK = "blind-cases"
 NO_NAME = ("none", "unknown", "not-confirmed", "error")
 
 
@@ -264,73 +264,18 @@ def _faults(record: Record) -> list[tuple[bool, bool]]:
     return [] if worse is None else [(worse, bool(is_search_fault(record)))]
 
 
-def _markdown(rows: Iterable[Any]) -> str:
-    return str(pd.DataFrame(list(rows)).to_markdown(index=False, disable_numparse=True))
-
-
-def page(records: Sequence[Record]) -> str:
-    """Return docs/diagnosis-sweep.md."""
-    groups, effects = _markdown(group_rows(records)), _markdown(effect_rows(records))
-    said = _markdown(calibration_rows(stated(records)))
-    sizes = by_group(records, lambda record: record.get("size_deviations", ()))
-    covered, faults = coverage_rows(sizes), fault_rows(by_group(records, _faults))
-    return f"""\
-# How often the diagnosis is right
-
-{len(records)} blind cases, drawn and scored as described under [blind cases](challenge.md); `python
-benchmarks/diagnosis_sweep.py run` and `tables` generate this page.
-
-## Targets
-
-{_markdown(bars_table(records))}
-
-A name counts as right when the diagnosis gives it, alone or as a member of one group of at most
-six names. Where the hidden effect lowers chi-square by less than 12, `none` is right and a wrong
-name is still wrong. Intervals are Wilson's.
-
-## By kind of case
-
-{groups}
-
-`strict`: named alone, with every place right, whether or not it can be seen. `too small`: cases
-whose effect lowers chi-square by less than 12. `groups`: verdicts that name several effects which
-the data cannot distinguish, and how many on average.
-
-## By hidden effect
-
-{effects}
-
-## Stated probabilities
-
-Every cause that is named, alone or in a group, states the probability of its name and that of its
-name at its place. A calibrated one is right as often as it says.
-
-{said}
-
-## Stated deviations
-
-Sizes of causes that are named at the right place, against the true ones. 95.4 % of normal errors
-lie within two deviations, and their root mean square is 1.
-
-{_markdown(covered)}
-
-## Faults of the search
-
-The true causes are fitted where they truly sit, from their true sizes on, in the noise and on the
-textbook set of the most probable explanation. That one *fits worse* if it has at least as many
-unknowns and its chi-square is higher by more than 1. If the truth is the more probable by prior and
-evidence too, the search has missed it; otherwise it chose by prior and evidence, rightly or not.
-
-{_markdown(faults)}
-
-![Confusion matrix](figures/diagnosis-confusion.svg)
-
-![Calibration](figures/diagnosis-calibration.svg)
-"""
+def tables(records: Sequence[Record]) -> dict[str, list[dict[str, str]]]:
+    """Return the rows of all tables by name."""
+    return {
+        "effects": effect_rows(records),
+        "calibration": calibration_rows(stated(records)),
+        "sizes": coverage_rows(by_group(records, lambda r: r.get("size_deviations", ()))),
+        "fits": fault_rows(by_group(records, _faults)),
+    }
 
 
 def main() -> None:
-    """Run the sweep, or write its page."""
+    """Run the sweep, or write its figures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("what", choices=("run", "tables", "kernels"))
     parser.add_argument("--kernels", nargs=2, default=("Nehalem", "Haswell"), help="of OpenBLAS")
@@ -338,7 +283,8 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=None, help="at most so many of each group")
     parser.add_argument("--groups", default="", help="groups by name, parted by semicolons")
     parser.add_argument("--results", type=Path, default=RESULTS)
-    parser.add_argument("--docs", type=Path, default=DOCS)
+    parser.add_argument("--page", type=Path, default=PAGE)
+    parser.add_argument("--data", type=Path, default=DATA, help="folder of the tables")
     options = parser.parse_args()
     names = [name for name in options.groups.split(";") if name]
     unknown = set(names) - {group.name for group in GROUPS}
@@ -358,9 +304,15 @@ def main() -> None:
     records = read_records(options.results)
     if not records:
         parser.error(f"no results in {options.results}: run the sweep first")
-    draw_confusion(records, options.docs / "figures" / "diagnosis-confusion")
-    draw_calibration(stated(records), options.docs / "figures" / "diagnosis-calibration")
-    (options.docs / "diagnosis-sweep.md").write_text(page(records), encoding="utf-8")
+    figures = options.page.parent / "figures"
+    draw_confusion(records, figures / "diagnosis-confusion")
+    draw_calibration(stated(records), figures / "diagnosis-calibration")
+    for table, rows in tables(records).items():
+        write_rows(options.data / f"sweep-{table}.csv", "blind", rows)
+    page = options.page.read_text(encoding="utf-8")
+    page = filled(page, as_markdown(bars_table(records)), MARK)
+    page = filled(page, as_markdown(group_rows(records)), f"{MARK}-kinds")
+    options.page.write_text(page, encoding="utf-8")
     for row in bars_table(records):
         print(*row.values(), sep=" | ")
 

@@ -13,7 +13,7 @@ FOLDER has the npm packages as published, each in a folder of its name with `_` 
 
 Every library draws a matrix of 40 x 60 values, a chart of 10 curves of 100 points and a structure
 of 1000 nodes that moves, with `drawing_libraries.js`, in a page whose policy allows inline scripts
-and styles alone. Prints the tables of docs/drawing.md: medians of REPEATS fresh pages (5).
+and styles alone. Prints the tables of docs/development/drawing.md: medians of REPEATS pages (5).
 Milliseconds are of the page's main thread, and in brackets until the picture stood. Needs chromium,
 see CONTRIBUTING.md.
 """

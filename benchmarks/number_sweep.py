@@ -26,7 +26,7 @@ from femubench.core.inference.settings import Setting, Value, overridden, settin
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-RESULTS = DOCS / "settings-sweep.jsonl"
+RESULTS = DOCS / "data" / "settings-sweep.jsonl"
 ODDS = ("probability", "cosine", "MAC")
 SLOW = ("pairs", "outside")
 COLUMNS = ("name", "value", "unit", "kind", "why", "changes")

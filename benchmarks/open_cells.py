@@ -1,4 +1,4 @@
-"""Search for readings of the ladder paper that give its open columns; write docs/open-cells.md.
+"""Search for readings of the ladder paper that give its open columns; write docs/reproduce.md.
 
     python benchmarks/open_cells.py [--quick] [--write]     # some minutes on one core
 
@@ -20,13 +20,14 @@ from equation_readings import Reading, predicted
 from nearest_model import nearest_with
 from open_cells_choices import ALONE, AXES, CLOSING, EXPANSIONS, WEIGHTS
 from open_cells_numbering import DIRECTIONS, SHAPES, direction
+from sweep_data import DATA, as_markdown, filled
 from threadpoolctl import threadpool_limits
 
 from femubench import StrategyFailure
 from femubench.fem import FloatArray
 from femubench.papers.printed import printed
 
-PAGE = Path(__file__).parents[1] / "docs" / "open-cells.md"
+PAGE = Path(__file__).parents[1] / "docs" / "reproduce.md"
 CLOSED = 0.5  # percent
 TABLES = printed("frame")
 NOMINAL = TABLES["table1"]["fe"]
@@ -242,53 +243,45 @@ def firm_rows() -> list[dict[str, str]]:
     return rows
 
 
-def block(quick: bool) -> str:
-    """Return the generated part of the page."""
+def search(quick: bool) -> tuple[str, dict[str, list[dict[str, str]]]]:
+    """Return the generated part of the page, and the rows of the tables in docs/data."""
     results: list[Found] = []
     for family in COLUMNS:
         readings = grid(family)
         results += found(readings[:: 20 if quick else 1])
         print(f"{family}: {len(readings)} readings", flush=True)
-    best = [row for family in COLUMNS for row in best_rows(results, family)]
     parts = [
         f"{len(results)} readings gave a model. Printed, modes 1 to 5 in Hz:",
         "\n".join(f"- {n}: {' '.join(map(str, column(f)))}" for f, (n, _, _) in COLUMNS.items()),
         "How many come near, by the frequencies that the equations ask for:",
-        _markdown(count_rows(results)),
-        "The best of each column, and the largest deviation of the other columns under the same "
-        "reading:",
-        _markdown(best),
-        "Single departures from the built-in reading, largest deviation:",
-        _markdown(axis_rows()),
-        "Adjusted column, tied cores not turned end for end, every member numbered either way:",
-        _markdown(numbering_rows()),
-        "Equation error over inertia forces, physical family, shapes of the first iteration:",
-        _markdown(need_rows()),
-        "The readings that close a column, or come nearest, with other shapes:",
-        _markdown(firm_rows()),
+        as_markdown(count_rows(results)),
     ]
-    return "\n\n".join(parts)
-
-
-def _markdown(rows: Sequence[dict[str, str]]) -> str:
-    return str(pd.DataFrame(rows).to_markdown(index=False, disable_numparse=True))
+    return "\n\n".join(parts), {
+        "best": [row for family in COLUMNS for row in best_rows(results, family)],
+        "departures": axis_rows(),
+        "numbering": numbering_rows(),
+        "equations": need_rows(),
+        "shapes": firm_rows(),
+    }
 
 
 def main() -> None:
-    """Search, print, and with --write replace the generated block of the page."""
+    """Search, print, and with --write replace the generated block of the page and its data."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="a twentieth of the readings")
-    parser.add_argument("--write", action="store_true", help=f"into {PAGE.name}")
+    parser.add_argument("--write", action="store_true", help=f"into {PAGE.name} and {DATA.name}")
     options = parser.parse_args()
     with threadpool_limits(1):
-        text = block(options.quick)
+        text, tables = search(options.quick)
     print(text)
+    for name, rows in tables.items():
+        print(f"\n{name}\n\n{as_markdown(rows)}")
     if options.write:
-        page = PAGE.read_text(encoding="utf-8")
-        head, rest = page.split("<!-- open-cells -->\n", 1)
-        tail = rest.split("<!-- /open-cells -->", 1)[1]
-        marked = f"<!-- open-cells -->\n{text}\n<!-- /open-cells -->"
-        PAGE.write_text(head + marked + tail, encoding="utf-8")
+        page = filled(PAGE.read_text(encoding="utf-8"), text, "open-cells")
+        PAGE.write_text(page, encoding="utf-8")
+        for name, rows in tables.items():
+            table = pd.DataFrame(rows)
+            table.to_csv(DATA / f"open-cells-{name}.csv", index=False, lineterminator="\n")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """How the cost of things grows with their size, beside what one would else use.
 
-    make bench-report                             # everything, into docs/performance.md
+    make bench-report                             # everything, into docs/development/performance.md
     python benchmarks/performance.py --only lattice --within 60
 
 Every figure is that of a process of its own (`benchmarks/scaling.py`), on one thread, in seconds of
@@ -26,7 +26,9 @@ import numpy as np
 import pandas as pd
 
 ROOT = Path(__file__).parents[1]
-PAGE, KEPT = ROOT / "docs" / "performance.md", ROOT / "docs" / "figures" / "performance.json"
+DOCS = ROOT / "docs"
+PAGE = DOCS / "development" / "performance.md"
+KEPT = DOCS / "figures" / "performance.json"
 _BEGIN, _END = "<!-- performance -->\n", "<!-- /performance -->"
 _GRIDS, _LATTICES = (12, 36, 115, 259), (4, 6, 9, 13, 19)
 _RESULTS = (1000, 10000, 100000)
@@ -218,7 +220,7 @@ BARS = (
 def page_of(kept: Mapping[str, Any]) -> str:
     """Return what stands between the marks of the page."""
     lines = pd.DataFrame([bar.line(kept) for bar in BARS])
-    parts = ["## What is asked for", lines.to_markdown(index=False, disable_numparse=True)]
+    parts = ["## Bars", lines.to_markdown(index=False, disable_numparse=True)]
     for section in SECTIONS:
         if section.word in kept:
             found = kept[section.word]

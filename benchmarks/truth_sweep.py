@@ -1,7 +1,7 @@
-"""Diagnose every case whose truth comes from outside, and write the tables of docs/truth-sweep.md.
+"""Diagnose every case whose truth comes from outside; write figures of docs/diagnosis-accuracy.md.
 
 python benchmarks/truth_sweep.py run --jobs 2         # appends, goes on where it stopped
-python benchmarks/truth_sweep.py run --reference      # with the healthy structure beside it
+python benchmarks/truth_sweep.py run --reference      # with the measurement before the defect
 python benchmarks/truth_sweep.py run --set opensees   # the second generator
 python benchmarks/truth_sweep.py tables               # of each run: [--reference] [--set opensees]
 """
@@ -28,7 +28,6 @@ from statistics import median
 from types import FrameType
 from typing import Any, TypeVar
 
-import pandas as pd
 from threadpoolctl import threadpool_limits
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the truths are not installed
@@ -43,6 +42,7 @@ from stated_probabilities import (
     statements,
     wilson,
 )
+from sweep_data import DATA, PAGE, as_markdown, filled, write_rows
 from true_fit import CataloguedCause, fits_of, fits_worse, is_search_fault
 
 from femubench import read_case
@@ -66,14 +66,14 @@ from truths.posing import DEFECTS, FAULTS, OPENSEES, STRUCTURES, SUITE, pose
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "femubench-results" / "truth-sweep.jsonl"
-PAGE = ROOT / "docs" / "truth-sweep.md"
 MARK = "truth-sweep"
 SURE = 0.99
-# Truths, their structures, and what is added to headings.
+HALVES = {"development": False, "held": True}
+# Truths and their structures.
 SETS = {
-    "solids": ((DEFECTS,), SUITE, ""),
-    "faults": ((FAULTS,), SUITE, ", faults of data and input"),
-    "opensees": ((OPENSEES,), STRUCTURES, ", second generator"),
+    "solids": ((DEFECTS,), SUITE),
+    "faults": ((FAULTS,), SUITE),
+    "opensees": ((OPENSEES,), STRUCTURES),
 }
 # Upper ends of the ranges of chi-square.
 EDGES = (9.0, 30.0, 100.0, 1000.0, math.inf)
@@ -329,14 +329,15 @@ def outcome_row(first: Mapping[str, str], cases: Sequence[Scored]) -> dict[str, 
     return {**row, "counts as right": share}
 
 
-def outcome_table(
-    head: str, group: Callable[[KnownCase], str], cases: Iterable[Scored], order: Sequence[str] = ()
-) -> str:
-    """Return a table with one row a group of cases, in a given order or by name."""
+def outcome_rows(
+    by: str, group: Callable[[KnownCase], str], cases: Iterable[Scored], order: Sequence[str] = ()
+) -> list[dict[str, str]]:
+    """Return one row a group of cases, in a given order or by name."""
     groups: dict[str, list[Scored]] = {}
     for case in cases:
         groups.setdefault(group(case.truth), []).append(case)
-    return _markdown(outcome_row({head: name}, groups[name]) for name in ranked(groups, order))
+    names = ranked(groups, order)
+    return [outcome_row({"by": by, "group": name}, groups[name]) for name in names]
 
 
 def ranked(names: Iterable[str], order: Sequence[str]) -> list[str]:
@@ -346,51 +347,41 @@ def ranked(names: Iterable[str], order: Sequence[str]) -> list[str]:
     return [*first, *sorted(known - set(first))]
 
 
-def visibility_table(truths: Iterable[KnownCase]) -> str:
+def visibility_rows(truths: Iterable[KnownCase]) -> list[dict[str, str]]:
     """Return how many cases of each kind change the data by how much."""
     kinds: dict[str, list[str]] = {}
     for truth in truths:
         kinds.setdefault(kind_of(truth), []).append(reach(truth))
-    return _markdown(
+    return [
         {
             "kind": name,
             "cases": str(len(kinds[name])),
             **{word: str(kinds[name].count(word)) for word in (*RANGES, "-")},
         }
         for name in ranked(kinds, KIND_ORDER)
-    )
+    ]
 
 
-def _markdown(rows: Iterable[Mapping[str, str]]) -> str:
-    return str(pd.DataFrame(list(rows)).to_markdown(index=False, disable_numparse=True))
-
-
-def half(title: str, cases: Sequence[Scored]) -> str:
-    """Return the tables of one half of the cases."""
+def half(cases: Sequence[Scored]) -> dict[str, list[dict[str, str]]]:
+    """Return the rows of one half of the cases by the name of their table."""
     single = [case for case in cases if case.truth.kind == "defect"]
     found = [case for case in cases if case.truth.chi2 is not None and case.truth.causes]
-    parts = [f"## {title}", strict_table(cases)]
-    parts += ["What is said, kind by kind:", outcome_table("kind", kind_of, cases, KIND_ORDER)]
-    if single:
-        effects = outcome_table("effect", lambda truth: truth.causes[0].effect, single)
-        parts += ["Single defects by effect:", effects]
-    if faulty := [case for case in cases if case.truth.kind.endswith("-fault")]:
-        parts += ["What is said of the structure beside a fault of data or input:", _beside(faulty)]
-    if found:
-        ranges = outcome_table("chi-square", reach, found, RANGES)
-        parts += ["All that hide something, by the chi-square of the change:", ranges]
-    said = [one for case in cases for one in case.stated]
-    parts += ["Stated probabilities of names, and of names at their places:"]
-    parts += [_markdown(calibration_rows(said))]
-    if sizes := coverage_rows(by_kind(cases, lambda case: case.deviations)):
-        parts += ["Sizes of what is named where it sits, in stated deviations:", _markdown(sizes)]
+    faulty = [case for case in cases if case.truth.kind.endswith("-fault")]
     fits = by_kind(cases, lambda case: () if case.fits is None else (case.fits,))
-    if faults := fault_rows(fits):
-        parts += ["Answers beside the fit of the truth itself:", _markdown(faults)]
-    return "\n\n".join(parts)
+    return {
+        "outcomes": [
+            *outcome_rows("kind", kind_of, cases, KIND_ORDER),
+            *outcome_rows("effect", lambda truth: truth.causes[0].effect, single),
+            *outcome_rows("chi-square", reach, found, RANGES),
+        ],
+        "structure": structure_rows(faulty),
+        "calibration": calibration_rows([one for case in cases for one in case.stated]),
+        "sizes": coverage_rows(by_kind(cases, lambda case: case.deviations)),
+        "fits": fault_rows(fits),
+    }
 
 
-def strict_table(cases: Sequence[Scored]) -> str:
+def strict_rows(cases: Sequence[Scored]) -> list[dict[str, str]]:
     """Return the shares that matter: one name at one place, groups apart, and the seconds."""
 
     def of(*kinds: str) -> list[Scored]:
@@ -423,8 +414,7 @@ def strict_table(cases: Sequence[Scored]) -> str:
     seconds = sorted(case.seconds for case in cases)
     taken = f"median {median(seconds):.1f}, slowest {seconds[-1]:.0f}"
     rows.append({"figure": "seconds of one core", "cases": str(len(cases)), "right": taken})
-    shares = [{("share" if key == "right" else key): v for key, v in r.items()} for r in rows]
-    return str(pd.DataFrame(shares).fillna("").to_markdown(index=False, disable_numparse=True))
+    return [{("share" if key == "right" else key): v for key, v in r.items()} for r in rows]
 
 
 V = TypeVar("V")
@@ -438,46 +428,41 @@ def by_kind(cases: Iterable[Scored], values: Callable[[Scored], Sequence[V]]) ->
     return {kind: found[kind] for kind in ranked(found, KIND_ORDER)}
 
 
-def _beside(cases: Sequence[Scored]) -> str:
-    """Return what is said of the structure where the fault was named, and where it was not."""
+def structure_rows(cases: Sequence[Scored]) -> list[dict[str, str]]:
+    """Return the verdict on the structure where the fault was named, and where it was not."""
     rows = []
+    usual = ("none", "a cause", "unknown", "not confirmed")
+    words = ranked((*usual, *(case.beside for case in cases)), usual)
     for head, chosen in (("named", True), ("not named", False)):
         own = [case.beside for case in cases if (case.said in ("right", "with others")) is chosen]
-        words = ranked(own, ("none", "a cause", "unknown", "not confirmed"))
         rows.append({"fault": head, "cases": str(len(own))} | {w: str(own.count(w)) for w in words})
-    return str(pd.DataFrame(rows).fillna("0").to_markdown(index=False, disable_numparse=True))
+    return rows if cases else []
 
 
-def tables(
-    cases: Sequence[Scored],
-    truths: Sequence[KnownCase],
-    *,
-    reference: bool = False,
-    generator: str = "",
-) -> str:
-    """Return all tables: visibility, then the outcomes of both halves apart.
+def tables(cases: Sequence[Scored], truths: Sequence[KnownCase]) -> dict[str, list[dict[str, str]]]:
+    """Return the rows of all tables by name; the outcomes of the two halves stay apart.
 
     Arguments:
         cases: what has a record.
         truths: all that there are.
-        reference: whether the healthy structure was beside them.
-        generator: what is added to headings.
     """
-    parts = [f"## How visible the cases are{generator}", visibility_table(truths)]
-    parts = [] if reference else parts
-    which = generator + (" with reference" if reference else "")
-    for name, is_held in (("Development half", False), ("Held half", True)):
-        title = name + which
+    found: dict[str, list[dict[str, str]]] = {"visibility": visibility_rows(truths)}
+    for name, is_held in HALVES.items():
         own = [case for case in cases if case.truth.held is is_held]
-        parts += [half(title, own)] if own else [f"## {title}", "No case was diagnosed yet."]
-    return "\n\n".join(parts)
+        for table, rows in half(own).items() if own else ():
+            found.setdefault(table, []).extend({"half": name, **row} for row in rows)
+    return found
 
 
-def filled(page: str, text: str, mark: str = MARK) -> str:
-    """Return a page with a text between its markers."""
-    head, rest = page.split(f"<!-- {mark} -->\n", 1)
-    tail = rest.split(f"<!-- /{mark} -->", 1)[1]
-    return f"{head}<!-- {mark} -->\n\n{text}\n\n<!-- /{mark} -->{tail}"
+def strict_table(cases: Sequence[Scored]) -> str:
+    """Return the strict figures of both halves next to each other."""
+    rows: dict[str, dict[str, str]] = {}
+    for name, is_held in HALVES.items():
+        own = [case for case in cases if case.truth.held is is_held]
+        for row in strict_rows(own) if own else ():
+            cells = {f"{name}: {key}": v for key, v in row.items() if key != "figure"}
+            rows.setdefault(row["figure"], {"figure": row["figure"]}).update(cells)
+    return as_markdown(rows.values())
 
 
 def parser() -> argparse.ArgumentParser:
@@ -493,14 +478,15 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--suite", type=Path, help="where the structures are; that of the set")
     found.add_argument("--truths", type=Path, nargs="*", help="folders of truths; the set's")
     found.add_argument("--page", type=Path, default=PAGE)
+    found.add_argument("--data", type=Path, default=DATA, help="folder of the tables")
     return found
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the sweep, or write its page."""
+    """Run the sweep, or write its figures."""
     known = parser()
     options: Any = known.parse_args(arguments)
-    rooms, suite, generator = SETS[options.set]
+    rooms, suite = SETS[options.set]
     options.truths, options.suite = options.truths or rooms, options.suite or suite
     folders = truth_folders(*options.truths)
     if unknown := set(options.names) - {folder.name for folder in folders}:
@@ -524,11 +510,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     cases = scored(records, truths, options.suite)
     if not cases:
         known.error(f"no results in {results}: run the sweep first")
-    text = tables(cases, truths, reference=options.reference, generator=generator)
-    mark = MARK + run_of
-    page = filled(options.page.read_text(encoding="utf-8"), text, mark)
+    name = options.set + ("-reference" if options.reference else "")
+    for table, rows in tables(cases, truths).items():
+        write_rows(options.data / f"sweep-{table}.csv", name, rows)
+    page = filled(options.page.read_text(encoding="utf-8"), strict_table(cases), MARK + run_of)
     options.page.write_text(page, encoding="utf-8")
-    print(f"{len(cases)} of {len(truths)} cases, {options.page}")
+    print(f"{len(cases)} of {len(truths)} cases, {options.page}, {options.data}")
 
 
 if __name__ == "__main__":

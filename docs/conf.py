@@ -41,7 +41,7 @@ version = release = femubench.__version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 root_doc = "docs/index"
 include_patterns = [
-    *("*.md", "docs/*.md", "docs/api/*.rst"),
+    *("*.md", "docs/*.md", "docs/development/*.md", "docs/api/*.rst"),
     *("scenarios/*/README.md", "scenarios/suite/*/README.md"),
 ]
 exclude_patterns = ["build", "femubench", ".*"]
@@ -125,9 +125,9 @@ def add_navigation(app: Sphinx, docname: str, source: list[str]) -> None:
     if docname == root_doc:
         api = "".join(f"[{name}](api/{name}.rst)\n" for name in MODULES)
         sections = f"{source[0]}\n## API reference\n{api}".split("\n## ")[1:]
-    elif docname in ("docs/scenarios", "docs/suite"):
+    elif docname == "docs/scenarios":
         links = re.findall(r"\[[^\]]+\]\(\.\./scenarios/[^)]+\)", source[0])
-        sections = ["\n".join([docname.partition("/")[2].capitalize(), *links])]
+        sections = ["\n".join(["Scenarios", *links])]
     else:
         return
     for section in sections:

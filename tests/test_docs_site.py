@@ -35,7 +35,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_page_is_there(site: Path) -> None:
-    texts = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("scenarios/*/README.md")]
+    texts = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("scenarios/*/README.md")]
     for text in texts:
         assert (site / text.relative_to(ROOT)).with_suffix(".html").is_file()
     assert 'url=docs/index.html"' in (site / "index.html").read_text(encoding="utf-8")
@@ -72,7 +72,7 @@ def _asked_for() -> set[str]:
 
 
 def test_every_dependency_has_its_line() -> None:
-    text = (ROOT / "docs" / "dependencies.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "development" / "dependencies.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| ([\w.\[\], -]+?) \|", text, flags=re.MULTILINE)
     described = [name for row in rows for name in row.split(", ") if name != "package"]
     assert sorted(described) == sorted(_asked_for())

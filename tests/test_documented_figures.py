@@ -1,8 +1,8 @@
 """The figures of README and docs that one run, one reproduction and a committed file give.
 
 Figures of single pages stand in tests of their own: tables of docs/effects.md in test_effects_docs,
-the tutorial's in test_tutorial, those of the papers in test_papers_*; docs/noise.md in
-test_sweep_noise, docs/diagnosis-sweep.md in test_sweep_diagnosis.
+the tutorial's in test_tutorial, those of the papers in test_papers_*; docs/scoring.md in
+test_sweep_noise, docs/diagnosis-accuracy.md in test_sweep_diagnosis.
 """
 
 from __future__ import annotations
@@ -151,13 +151,11 @@ def test_the_stated_uncertainties(rows: dict[str, dict[str, Any]]) -> None:
     assert [as_printed(text) for text in said] == [100.0 * rows[n]["coverage90"] for n in names]
 
 
-@pytest.mark.parametrize(
-    ("page", "count"), [("docs/strategies-matrix.md", 6), ("docs/strategies-element.md", 5)]
-)
-def test_numbers_of_unknowns(run: Run, page: str, count: int) -> None:
-    """The last column of the first table: on the ladder of the first paper."""
-    text = (ROOT / page).read_text(encoding="utf-8")
-    table = text.partition("\n\n## ")[0]
+@pytest.mark.parametrize(("part", "count"), [("Matrix strategies", 6), ("Element strategies", 5)])
+def test_numbers_of_unknowns(run: Run, part: str, count: int) -> None:
+    """The last column of the first table of a family: on the ladder of the first paper."""
+    text = (ROOT / "docs" / "strategies.md").read_text(encoding="utf-8")
+    table = text.partition(f"\n## {part}\n")[2].partition("\n### ")[0]
     listed = re.findall(r"^\| `([a-z-]+)` \|.*\| (\d+) \|$", table, re.M)
     assert len(listed) == count
     for strategy, unknowns in listed:

@@ -77,5 +77,7 @@ def test_facade_says_the_same_to_python_and_to_type_checkers() -> None:
 
 def test_index_of_the_docs_names_every_page() -> None:
     docs = ROOT / "docs"
-    linked = set(re.findall(r"\]\(([\w-]+\.md)\)", (docs / "index.md").read_text(encoding="utf-8")))
-    assert linked | {"index.md"} == {page.name for page in docs.glob("*.md")}
+    index = (docs / "index.md").read_text(encoding="utf-8")
+    linked = set(re.findall(r"\]\(([\w/-]+\.md)\)", index))
+    pages = {page.relative_to(docs).as_posix() for page in docs.rglob("*.md")}
+    assert linked | {"index.md"} == pages

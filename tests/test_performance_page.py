@@ -1,4 +1,4 @@
-"""docs/performance.md tells the kept figures, and calls a bar met when it is."""
+"""docs/development/performance.md has the kept figures, and calls a bar met when it is."""
 
 from __future__ import annotations
 

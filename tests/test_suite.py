@@ -83,7 +83,7 @@ def test_no_two_structures_share_their_geometry() -> None:
 def test_the_board_of_all_structures_is_that_of_the_run_kept() -> None:
     run = stored("suite")
     assert set(run.meta["cases"]) == {f"suite/{name}" for name in NAMES}
-    assert_board_is_that_of(run, "docs/suite.md")
+    assert_board_is_that_of(run, "docs/scenarios.md")
 
 
 def test_the_stated_uncertainties() -> None:
@@ -105,7 +105,7 @@ def test_what_the_documents_say_of_the_board() -> None:
     run = stored("suite")
     board = leaderboard(run).set_index("strategy")
     (skill, low, high), below = board.iloc[0][["skill", "skill_low", "skill_high"]], 12
-    for page in ("README.md", "docs/suite.md"):
+    for page in ("README.md", "docs/scenarios.md"):
         text = text_of(page)
         said = re.search(r"takes away (\d+) %.{0,60}?\((\d+) to (\d+)", text)
         assert said is not None, page

@@ -1,4 +1,4 @@
-"""The diagnosis on all blind cases against its bars; the figures stand in docs/diagnosis-sweep.md.
+"""The diagnosis on all blind cases against its bars, which docs/diagnosis-accuracy.md prints.
 
 About ten minutes on two cores; `benchmarks/diagnosis_sweep.py` runs the same cases, keeps the
 records and draws them.

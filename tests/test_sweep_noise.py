@@ -1,4 +1,4 @@
-"""All strategies under measurement noise; the figures stand in docs/noise.md."""
+"""All strategies under measurement noise; the figures stand in docs/scoring.md."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from printed_boards import assert_board_is_that_of, assert_same_errors, stored
 def test_the_board_in_the_docs_is_that_of_the_run_kept() -> None:
     run = stored("noise")
     assert run.meta["seeds"] == [1, 2, 3]
-    assert_board_is_that_of(run, "docs/noise.md")
+    assert_board_is_that_of(run, "docs/scoring.md")
 
 
 @pytest.mark.sweep

@@ -167,26 +167,28 @@ def test_tables_count_both_halves_apart() -> None:
     row = sweep.outcome_row({"kind": "defect"}, cases)
     assert (row["cases"], row["right"]) == (str(len(shown)), str(len(shown) - 2))
     assert (row["wrong"], row["wrong, P >= 0.99"]) == ("2", "1")
-    text = sweep.tables(cases, truths)
-    development, kept_text = text.split("## Development half")[1].split("## Held half")
-    assert f"| defect | {len(shown)} " in " ".join(development.split())
-    assert "| joint-rotation |" in " ".join(development.split())
-    assert kept_text.strip() == "No case was diagnosed yet."
-    everything = sweep.tables(
-        sweep.scored({**records, kept[0]: said("none")}, truths, ROOT / "scenarios"), truths
-    )
-    assert development in everything
-    beside = sweep.tables(sweep.scored(records, truths, ROOT / "scenarios"), truths, reference=True)
-    assert "## Held half with reference" in beside
-    assert "visible" not in beside
-    assert "| defect | 1 | 0 | 0 | 0 | 0 | 0 | 1 " in " ".join(everything.split())
+    found = sweep.tables(cases, truths)
+    assert [row["cases"] for row in found["visibility"]] == [str(len(truths))]
+    development = found["outcomes"]
+    groups = {(row["half"], row["by"], row["group"]): row["cases"] for row in development}
+    assert groups["development", "kind", "defect"] == str(len(shown))
+    assert groups["development", "effect", "joint-rotation"] == str(len(shown))
+    assert {half for half, _, _ in groups} == {"development"}
+    everything = sweep.scored({**records, kept[0]: said("none")}, truths, ROOT / "scenarios")
+    outcomes = sweep.tables(everything, truths)["outcomes"]
+    assert [row for row in outcomes if row["half"] == "development"] == development
+    (last,) = [row for row in outcomes if row["half"] == "held" and row["by"] == "kind"]
+    assert (last["group"], last["cases"], last["right"], last["none"]) == ("defect", "1", "0", "1")
+    text = " ".join(sweep.strict_table(everything).split())
+    assert f"| one defect: named with its place, alone | {len(shown)} " in text
+    assert "| 1 | 0.0 % | 0.0 to 79.3 % |" in text
 
 
 def test_the_page_keeps_its_words() -> None:
-    page = (ROOT / "docs" / "truth-sweep.md").read_text(encoding="utf-8")
-    once = sweep.filled(page, "| a | table |")
+    page = sweep.PAGE.read_text(encoding="utf-8")
+    once = sweep.filled(page, "| a | table |", sweep.MARK)
     assert once.startswith(page.split("<!-- truth-sweep -->")[0])
-    assert sweep.filled(once, "| a | table |") == once
+    assert sweep.filled(once, "| a | table |", sweep.MARK) == once
     assert sweep.filled(once, "another", "truth-sweep-reference").count("| a | table |") == 1
     assert "| a | table |" in once.split("<!-- /truth-sweep -->")[0]
 
@@ -274,10 +276,7 @@ def test_strict_figures_part_names_from_groups() -> None:
         for name, kind in zip(names, kinds, strict=True)
     ]
     cases = sweep.scored(records, truths, ROOT / "scenarios")
-    rows = {
-        row.split("|")[1].strip(): [cell.strip() for cell in row.split("|")[2:4]]
-        for row in sweep.strict_table(cases).splitlines()
-    }
+    rows = {row["figure"]: [row["cases"], row.get("share", "")] for row in sweep.strict_rows(cases)}
     assert rows["one defect: named with its place, alone"] == ["4", "25.0 %"]
     assert rows["one defect: so, or in a group"] == ["4", "50.0 %"]
     assert rows["sound: none"] == ["2", "50.0 %"]
@@ -285,18 +284,31 @@ def test_strict_figures_part_names_from_groups() -> None:
     assert not any(name.startswith("two defects") for name in rows)
 
 
-def test_answers_beside_the_fit_of_the_truth_are_in_the_tables() -> None:
+def test_a_run_replaces_its_own_rows(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    sweep.write_rows(path, "solids", [{"kind": "defect", "cases": "3"}])
+    sweep.write_rows(path, "faults", [{"kind": "unit-slip", "cases": "1", "none": "1"}])
+    sweep.write_rows(path, "solids", [{"kind": "pair", "cases": "2"}])
+    lines = ["run,kind,cases,none", "faults,unit-slip,1,1", "solids,pair,2,"]
+    assert path.read_text(encoding="utf-8").splitlines() == lines
+
+
+def test_answers_and_the_fit_of_the_truth_are_in_the_tables() -> None:
     name = next(name for name in map(str, range(20)) if not held(name))
-    fits = [{"chi2": c, "unknowns": 1, "log_weight": -c} for c in (50.0, 40.0)]
+    given = [{"chi2": c, "unknowns": 1, "log_weight": -c} for c in (50.0, 40.0)]
     record = said("named", "added-mass@J1") | dict(
-        zip(("leader_fit", "true_fit"), fits, strict=True)
+        zip(("leader_fit", "true_fit"), given, strict=True)
     )
     truths = [truth("defect", LOOSE, name=name)]
     (case,) = sweep.scored({name: record}, truths, ROOT / "scenarios")
     assert case.fits == (True, True)
-    text = " ".join(sweep.tables([case], truths).split())
-    assert "| defect | 1 | 1 | 1 | 100.0 % |" in text
-    assert "| 0.8 to 0.95 | 1 | 0.0 % |" in text
+    found = sweep.tables([case], truths)
+    fits = [row for row in found["fits"] if row["kind"] == "defect"]
+    assert [list(row.values())[:6] for row in fits] == [
+        ["development", "defect", "1", "1", "1", "100.0 %"]
+    ]
+    (bin_,) = [row for row in found["calibration"] if row["stated"] == "0.8 to 0.95"]
+    assert (bin_["names"], bin_["name right"]) == ("1", "0.0 %")
 
 
 def test_records_cut_off_are_left_out(tmp_path: Path) -> None:

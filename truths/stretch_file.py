@@ -41,7 +41,7 @@ WANTED_ERROR = 2e-4  # at the stretches by which the size is chosen
 HELD_OUT = 2  # stretches by which it is chosen, and others at which the file is checked
 _CHOICE_SEED, HELD_OUT_SEED = 7, 99
 ALL = "all-that-can"
-PAGE = Path(__file__).parents[1] / "docs" / "twins.md"
+PAGE = Path(__file__).parents[1] / "docs" / "scoring.md"
 MARK, END = "<!-- stretched -->", "<!-- /stretched -->"
 
 

@@ -1,4 +1,4 @@
-"""The table of the suite in docs/suite.md: ``python -m truths.tables``."""
+"""The table of the suite in docs/scenarios.md: ``python -m truths.tables``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from femubench import rank
 from truths.posing import ROOT, SUITE
 from truths.suite import listed_modes
 
-PAGE = ROOT / "docs" / "suite.md"
+PAGE = ROOT / "docs" / "scenarios.md"
 MARK, END = "<!-- suite -->", "<!-- /suite -->"
 NODES = re.compile(r"scikit-fem, (\d+) and\s+(\d+) nodes")
 

@@ -19,8 +19,8 @@ from femubench.papers.frame.common import (
 from femubench.reproduction import Extra, Ground, Workbench
 from femubench.update import QuasiModes, generic_family, quasi_measured_modes
 
-SEARCH = "docs/open-cells.md has the search"
-# Readings of one column in the grid of docs/open-cells.md, and those that the page says were tried
+SEARCH = "docs/reproduce.md has the search"
+# Readings of one column in the grid of docs/reproduce.md, and those that the page says were tried
 # for all columns before the grid was chosen.
 TRIED, EXPLORED = 2208, 17000
 CUTOFFS = (0.1, 0.03, 0.01, 0.001, 0.0003, 0.0001, 0.00001)
@@ -80,7 +80,7 @@ def forced_ground(bench: Workbench, words: str) -> Ground:
         "searched",
         f"shapes expanded by (15), where the text has (16)-(17) ({words}), one of {TRIED} readings "
         f"of this column that were tried, after about {EXPLORED} with random choices "
-        f"(docs/open-cells.md): it has modes 1-3 at {listed(used)} Hz, but the adjusted "
+        f"(docs/reproduce.md): it has modes 1-3 at {listed(used)} Hz, but the adjusted "
         f"solution at {listed(strain_modes(bench, tied)[3:])} Hz; with (16)-(17) modes 4, 5 are "
         f"{listed(strain_modes(bench, 'generic-ls')[3:])} Hz, from the equations of motion alone "
         f"{listed(strain_modes(bench, 'generic-ls:orthogonality=false')[3:])} Hz; {TWIN_SHAPES}; "

@@ -1,4 +1,4 @@
-// Figures on Observable Plot and d3, all of one schema (docs/plot.md). Every figure is one stop of the
+// Figures on Observable Plot and d3, all of one schema (docs/reports.md). Every figure is one stop of the
 // keyboard: the arrow keys step through its points, whose text stands below; a table holds all numbers.
 {
   const { el, svg, number } = bench;
@@ -240,7 +240,7 @@
     return bench.scroll(bench.table(`Numbers of: ${title}`, heads, rows));
   }
 
-  // Return a <figure> that draws itself to the width it is given; the schema is that of docs/plot.md.
+  // Return a <figure> that draws itself to the width it is given; the schema is that of docs/reports.md.
   bench.draw = (figure) => {
     const [cells, series] = [figure.kind === "cells", figure.series ?? []];
     let [free, width] = [0, 0];
