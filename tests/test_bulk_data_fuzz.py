@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import sys
 import tracemalloc
 from collections import Counter
 from pathlib import Path
 
+import garteur_plane
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
-
-from femubench import InputError
-from femubench.plugins.readers.bulk_data import BulkDataReader
-
-sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parent / "fuzz"))
-import garteur_plane
 from mutations import NUMBERS, Edit, edits, mutated
 from test_bulk_data import KINDS, LARGE, TWO
 from test_fuzz import outcome_of
+
+from femubench import InputError
+from femubench.plugins.readers.bulk_data import BulkDataReader
 
 READER = BulkDataReader()
 SEEDS = (garteur_plane.cards(), TWO, LARGE, KINDS)

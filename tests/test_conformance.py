@@ -13,13 +13,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import conformance_toys as toys
 import numpy as np
 import pytest
 from click.testing import CliRunner
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-
-import conformance_toys as toys
 
 from femubench import Scenario, Strategy
 from femubench.core.cli.main import bench

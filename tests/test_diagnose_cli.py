@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import diagnosis_toys as toys
 import pytest
 from click.testing import CliRunner, Result
 
@@ -27,9 +28,6 @@ from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.score.scoring import frequency_error, score_model
 from femubench.reports.diagnosis import diagnosis_markdown, diagnosis_text
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import diagnosis_toys as toys
 
 Invoke = Callable[..., Result]
 Told = tuple[str, Result, dict[str, Any], Path]

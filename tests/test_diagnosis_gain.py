@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnosis_problems import case_of, coordinates, effects_named, measured, part_at
 
 from femubench import Case, Diagnosis, Measurement, Model, diagnose
 from femubench.core.case.case import Modification
@@ -29,9 +28,6 @@ from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block
 from femubench.core.score.scoring import score_model
 from femubench.fem import GroundSpring, Place, PointMass
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import case_of, coordinates, effects_named, measured, part_at
 
 FRAME = structure_named("ladder").frame
 MODEL = Model.of(FRAME)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnosis_problems import case_of, catalogue, measured
 
 from femubench import Case, InputError, Measurement, Model, diagnose, read_case
 from femubench.core.case.writing import write_case
@@ -17,9 +17,6 @@ from femubench.core.fem.frame import Factor, JointSpring, RigidEnd
 from femubench.core.inference.examine import examine
 from femubench.core.modal.eigen import DENSE_LIMIT
 from femubench.fem import Frame
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import case_of, catalogue, measured
 
 ROOT = Path(__file__).parents[1]
 FRAME = structure_named("portal").frame

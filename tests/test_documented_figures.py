@@ -8,20 +8,9 @@ test_sweep_noise, docs/diagnosis-sweep.md in test_sweep_diagnosis.
 from __future__ import annotations
 
 import re
-import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
-
-import femubench
-from femubench import Run
-from femubench.core.library.cases import read_cases
-from femubench.core.plugin.loader import load_plugins
-from femubench.core.schema.results import Nominal
-from femubench.results import JobResult, leaderboard, tell_apart
-
-sys.path.insert(0, str(Path(__file__).parent))
 from printed_boards import (
     ROOT,
     as_printed,
@@ -30,6 +19,13 @@ from printed_boards import (
     stored,
     text_of,
 )
+
+import femubench
+from femubench import Run
+from femubench.core.library.cases import read_cases
+from femubench.core.plugin.loader import load_plugins
+from femubench.core.schema.results import Nominal
+from femubench.results import JobResult, leaderboard, tell_apart
 
 PAGES = ("README.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md"))))
 NUMBERS = {"eleven": 11, "twelve": 12, "seventeen": 17, "twenty-three": 23, "twenty-five": 25}

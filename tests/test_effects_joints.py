@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnosis_problems import case_of, measured
+from effect_checks import compare
 
 from femubench import Model, diagnose
 from femubench.fem import (
@@ -22,10 +22,6 @@ from femubench.fem import (
 )
 from femubench.plugins.effects.joint_flexibility import JointFlexibility
 from femubench.plugins.effects.joint_rotation import JointRotation
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import case_of, measured
-from effect_checks import compare
 
 TUBE, STEEL = rectangular_tube(0.06, 0.04, 0.003), Material(207e9, 0.3, 7850.0)
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnosis_problems import case_of, measured
+from effect_checks import changed_matrices, check_neutral, compare
 from scipy.optimize import brentq
 
 from femubench import Measurement, Model, Sensors, diagnose
@@ -30,10 +30,6 @@ from femubench.fem import (
     solid_rectangle,
 )
 from femubench.plugins.effects.support_flexibility import SupportFlexibility
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import case_of, measured
-from effect_checks import changed_matrices, check_neutral, compare
 
 FrameBuilder = Callable[..., Frame]
 EFFECT = SupportFlexibility()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import resource
 import shutil
-import sys
 from collections import Counter
 from contextlib import nullcontext, redirect_stdout, suppress
 from io import StringIO
@@ -13,16 +12,13 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
+from bytes_changed import broken
+from test_model_readers import FORMATS, JOB, WRITERS, Files, base, rounded
+from watch import watched
 
 from femubench import FemubenchError
 from femubench.core.case.model_files import ModelFiles, read_model
 from femubench.core.plugin.loader import load_plugins
-
-sys.path.insert(0, str(Path(__file__).parent / "fuzz"))
-sys.path.insert(0, str(Path(__file__).parent))
-from bytes_changed import broken
-from test_model_readers import FORMATS, JOB, WRITERS, Files, base, rounded
-from watch import watched
 
 FEW, MANY, MANY_APART = 6, 3000, 60
 LARGEST = 2**30  # bytes that reading may take

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
+import harness_toys as toys
 import numpy as np
 import pytest
 
@@ -18,9 +17,6 @@ from femubench.core.update.posterior_sampling import StretchMove
 from femubench.core.update.quadratic_fit import QuadraticFit, coefficients_of
 from femubench.plugins.strategies.sampling import BayesianSampling
 from femubench.update import Discrepancy
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
 
 CASE = toys.tiny_case()
 

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
+from synthetic_run import synthetic_run
 
 from femubench.core.cli.main import bench
 from femubench.core.run.upkeep import exported
@@ -22,10 +23,6 @@ from femubench.reports.csvs import CsvReporter
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.runs import MarkdownReporter, TerminalReporter
 from femubench.results import Run, Store, results_frame, run_to_json
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-
-from synthetic_run import synthetic_run
 
 RUN = synthetic_run(4, 6)
 RUN_ID = RUN.meta["run"]

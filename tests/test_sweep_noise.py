@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
+from printed_boards import assert_board_is_that_of, assert_same_errors, stored
 
 import femubench
-
-sys.path.insert(0, str(Path(__file__).parent))
-from printed_boards import assert_board_is_that_of, assert_same_errors, stored
 
 
 def test_the_board_in_the_docs_is_that_of_the_run_kept() -> None:

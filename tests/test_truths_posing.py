@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from small_suite import write_suite
 
 from femubench import InputError, read_case
 from femubench.core.challenge.truth_file import KnownCase, TrueCause, held, read_truth, truth_text
 from truths.posing import DEFECTS, SUITE, pose
-
-sys.path.insert(0, str(Path(__file__).parent))
-from small_suite import write_suite
 
 CAUSES = (
     TrueCause("a loose joint", "joint-rotation", "J5", ("joint-rotation@T",), 1.25e5, "N m/rad"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 import pytest
 from playwright.sync_api import Page
+from synthetic_run import synthetic_run
 
 from femubench import report
 from femubench.core.schema.records import read_run
@@ -24,9 +24,6 @@ from femubench.results import (
     run_to_json,
     structures_of,
 )
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "toys"))
-from synthetic_run import synthetic_run
 
 BLOCKS = ("used", "higher", "modified")
 ROUNDED = {"seconds": 1e-3}  # figures that the page holds with fewer digits

@@ -5,22 +5,19 @@ from __future__ import annotations
 import csv
 import io
 import json
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from synthetic_run import synthetic_run
 
 from femubench.core.schema.records import finite
 from femubench.reports.csvs import CsvReporter
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.runs import MarkdownReporter
 from femubench.results import Run, run_to_json
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "toys"))
-from synthetic_run import synthetic_run
 
 SCRIPT = "<script>alert(1)</script>"
 TITLE = """Frame "of" 'quotes' </table></script><img src=x onerror=alert(2)> & more"""
