@@ -84,7 +84,7 @@ def test_a_few(tmp_path: Path) -> None:
     check(tmp_path, FEW)
 
 
-@pytest.mark.fuzz
+@pytest.mark.nightly
 def test_many(tmp_path: Path) -> None:
     check(tmp_path, MANY)
 

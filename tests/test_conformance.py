@@ -41,6 +41,7 @@ DANGEROUS = (
 )
 HARMLESS = [toy for toy in toys.FAULTS if toy not in DANGEROUS]
 BUILT_IN = load_plugins()
+FEW = ("unchanged", "baruch", "global", "physical")  # all others in `make nightly`
 SLOW = ("spring", "offset", "bayesian", "bayesian-sampling", "diagnosed")
 
 
@@ -175,13 +176,17 @@ def test_a_verdict_that_is_none_is_a_failure(told: bytes, monkeypatch: pytest.Mo
 
 
 @pytest.mark.usefixtures("here")
-@pytest.mark.parametrize("name", [name for name in BUILT_IN.strategies if name not in SLOW])
+@pytest.mark.parametrize(
+    "name",
+    [n if n in FEW else pytest.param(n, marks=pytest.mark.nightly) for n in BUILT_IN.strategies
+     if n not in SLOW],
+)  # fmt: skip
 def test_built_in_strategies_pass(name: str) -> None:
     (subject,) = subjects(name, BUILT_IN)
     assert bad({f.check.name: f.verdict for f in findings(subject)}) == {}
 
 
-@pytest.mark.sweep
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", SLOW)
 def test_slow_built_in_strategies_pass(name: str) -> None:
     (subject,) = subjects(name, BUILT_IN)

@@ -434,7 +434,7 @@ def lattice(count: int, elements: int) -> Frame:
     return Frame("3d", "timoshenko", joints, tuple(members), supports=supports, rotary_inertia=True)
 
 
-@pytest.mark.sweep
+@pytest.mark.nightly
 @pytest.mark.parametrize(("elements", "size"), [(10, 2000), (118, 29000)])
 def test_a_lattice_is_diagnosed_in_minutes(elements: int, size: int) -> None:
     frame = lattice(2, elements)

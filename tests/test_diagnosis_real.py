@@ -14,7 +14,7 @@ from femubench.core.score.scoring import score_model
 
 HELD_OUT_HFRAME = (911.64, 979.89)  # Hz
 # The larger of the two takes as long as all the rest.
-SOLID = ("frame-solid", pytest.param("hframe-solid", marks=pytest.mark.sweep))
+SOLID = ("frame-solid", pytest.param("hframe-solid", marks=pytest.mark.nightly))
 
 
 @cache

@@ -67,12 +67,12 @@ def test_the_leaderboard(run: Run) -> None:
 
 
 def test_the_run_kept_is_what_runs_today(run: Run) -> None:
-    """On the structures of the papers; all cases under the marker `sweep`."""
+    """On the structures of the papers; all cases under the marker `nightly`."""
     found = femubench.rank(["frame", "hframe"], list(QUICK), jobs=2)
     assert_same_errors(run, found)
 
 
-@pytest.mark.sweep
+@pytest.mark.nightly
 def test_all_of_the_run_kept_is_what_runs_today(run: Run) -> None:
     assert_same_errors(run, femubench.rank(jobs=2))
 

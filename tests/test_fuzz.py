@@ -207,7 +207,7 @@ def test_a_few(tmp_path: Path, format: str) -> None:
     check(tmp_path, FEW, format)
 
 
-@pytest.mark.fuzz
+@pytest.mark.nightly
 @pytest.mark.parametrize("format", FORMATS)
 def test_many(tmp_path: Path, format: str) -> None:
     check(tmp_path, MANY, format)

@@ -122,7 +122,7 @@ def test_a_few(kind: str, tmp_path: Path) -> None:
     assert check(kind, tmp_path, count, 0).total() == count
 
 
-@pytest.mark.fuzz
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", [*WRITERS, "calculix", "ansys", *REAL])
 def test_many(kind: str, tmp_path: Path) -> None:
     count = MANY_APART if kind in APART else MANY

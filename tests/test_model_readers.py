@@ -407,7 +407,7 @@ def test_five_commands_lead_from_a_job_to_a_ranking(tmp_path: Path) -> None:
     assert ranked[:2] == [("1", "berman"), ("2", "unchanged")]
 
 
-@pytest.mark.sweep
+@pytest.mark.nightly
 def test_five_commands_rank_all_strategies(tmp_path: Path) -> None:
     told = run_documented(fresh_plates(tmp_path))
     assert "diagnosed" in told.splitlines()[2]

@@ -119,6 +119,6 @@ def test_what_the_documents_say_of_the_board() -> None:
     assert int((data["skill"] < 0.0).sum()) == 11
 
 
-@pytest.mark.sweep
+@pytest.mark.nightly
 def test_the_run_kept_is_what_runs_today() -> None:
     assert_same_errors(stored("suite"), femubench.rank("suite", jobs=2))

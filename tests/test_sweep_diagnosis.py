@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from femubench.core.challenge.sweep import BARS, Goal, Record, SweepCase, run_task, tasks
 
-pytestmark = pytest.mark.sweep
+pytestmark = pytest.mark.nightly
 
 
 def diagnosed(task: SweepCase) -> Record:

@@ -14,7 +14,7 @@ def test_the_board_in_the_docs_is_that_of_the_run_kept() -> None:
     assert_board_is_that_of(run, "docs/noise.md")
 
 
-@pytest.mark.sweep
+@pytest.mark.nightly
 def test_the_run_kept_is_what_runs_today() -> None:
     kept = stored("noise")
     assert_same_errors(kept, femubench.rank(list(kept.meta["cases"]), seeds=3))
