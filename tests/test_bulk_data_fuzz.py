@@ -80,6 +80,7 @@ def check(folder: Path, examples: int) -> None:
     assert 0.02 < outcomes["read"] / outcomes.total() < 0.9
 
 
+@pytest.mark.slow(5)
 def test_a_few(tmp_path: Path) -> None:
     check(tmp_path, FEW)
 

@@ -241,6 +241,7 @@ def test_causes_outside_the_catalogue_show(name: str) -> None:
     assert noisy > 0.3 * blind.truth.excess
 
 
+@pytest.mark.slow(20)
 def test_a_sensor_fault_is_in_all_modes_and_needs_shapes() -> None:
     with pytest.raises(InputError, match="cannot be hidden"):
         draw_case(1, "C", hidden="outside", effect="swapped-sensors")

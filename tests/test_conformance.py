@@ -194,6 +194,7 @@ def test_slow_built_in_strategies_pass(name: str) -> None:
     assert set(found) <= {"resources"}
 
 
+@pytest.mark.slow(5)
 @pytest.mark.usefixtures("here")
 def test_time_and_memory_are_told_and_a_ratio_is_a_warning() -> None:
     physical = BUILT_IN.strategies["physical"]
@@ -360,6 +361,7 @@ def test_pytest_runs_checks_without_any_test_file(tmp_path: Path) -> None:
     assert "Traceback" not in found.stdout
 
 
+@pytest.mark.slow(5)
 def test_pytest_without_the_option_does_nothing(tmp_path: Path) -> None:
     assert run_pytest(tmp_path).returncode == 5
     unknown = run_pytest(tmp_path, "--femubench", "god")

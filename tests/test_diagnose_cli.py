@@ -321,6 +321,7 @@ def told(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
 class TestBuiltInCases:
     """The real search on measured structures, from the command line to the extended case."""
 
+    @pytest.mark.slow(10)
     def test_screen_and_json_agree(self, told: Told) -> None:
         name, result, data, _ = told
         assert data["case"] == name

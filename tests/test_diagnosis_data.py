@@ -197,6 +197,7 @@ def scatters(ladder: FrameBuilder) -> tuple[Data, Noise, FloatArray, FloatArray]
     return problem.data, problem.noise, slopes, np.array(rows)
 
 
+@pytest.mark.slow(5)
 def test_scatter_has_the_covariance_that_the_noise_says(
     scatters: tuple[Data, Noise, FloatArray, FloatArray],
 ) -> None:

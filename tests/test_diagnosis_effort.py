@@ -17,6 +17,8 @@ from femubench.core.inference.effort import Effort
 from femubench.core.pace import Advance
 from femubench.core.plugin.loader import load_plugins
 
+pytestmark = pytest.mark.slow(20)
+
 TASK = next(task for task in tasks() if task.key == ("pairs", 1))
 
 

@@ -171,6 +171,7 @@ def test_unseen_data_do_not_move_the_naming_bit_for_bit() -> None:
     assert right.gain.modified_percent != wrong.gain.modified_percent
 
 
+@pytest.mark.slow(5)
 def test_nor_do_they_where_nothing_is_missing_or_several_causes_are_possible() -> None:
     for case in (made(), made(("youngs-modulus", "all", 0.1))):
         blind = replace(case, measurement=replace(case.measurement, total_mass=None))
@@ -261,6 +262,7 @@ def test_what_unseen_data_refute_does_not_lead(effect: str, size: float) -> None
     assert extended == pytest.approx(size if effect == "density" else 0.0, abs=0.01)
 
 
+@pytest.mark.slow(10)
 def test_a_mode_left_out_has_no_part_in_what_predicts_it() -> None:
     """One frequency 3 % off asks for a cause; without it nothing does."""
     test = measured(MODEL, FRAME, count=6)

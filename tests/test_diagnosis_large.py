@@ -370,6 +370,7 @@ class TestNaming:
         assert best.chi2 < 0.1
         assert departure(best.fit) < 1e-2
 
+    @pytest.mark.slow(5)
     def test_damage_over_many_elements_is_told_from_that_of_one(
         self, model: Model, found: Callable[..., Examination]
     ) -> None:

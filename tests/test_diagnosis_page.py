@@ -246,6 +246,7 @@ class TestStructure:
 
 
 class TestCommand:
+    @pytest.mark.slow(5)
     def test_writes_page_and_markdown(self, tmp_path: Path) -> None:
         for name, start in (("a.html", "<!DOCTYPE html>"), ("a.MD", "# Diagnosis of frame")):
             file = tmp_path / name

@@ -556,6 +556,7 @@ def test_frequencies_alone_will_do() -> None:
     assert {row.kind for row in found.residuals} == {"frequency"}
 
 
+@pytest.mark.slow(5)
 def test_data_of_another_structure_are_no_reason_to_name_anything() -> None:
     case = trial("density", "all", 0.01)
     rng = np.random.default_rng(2)

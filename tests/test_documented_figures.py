@@ -27,12 +27,9 @@ from femubench.core.plugin.loader import load_plugins
 from femubench.core.schema.results import Nominal
 from femubench.results import JobResult, leaderboard, tell_apart
 
+pytestmark = pytest.mark.nightly
 PAGES = ("README.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md"))))
 NUMBERS = {"eleven": 11, "twelve": 12, "seventeen": 17, "twenty-three": 23, "twenty-five": 25}
-QUICK = (
-    *("unchanged", "textbook", "baruch", "berman", "global", "local", "bayesian", "physical"),
-    *("eigensensitivity", "sparse", "diagnosed"),
-)
 
 
 @pytest.fixture(scope="module")
@@ -66,13 +63,6 @@ def test_the_leaderboard(run: Run) -> None:
     assert_board_is_that_of(run, "README.md")
 
 
-def test_the_run_kept_is_what_runs_today(run: Run) -> None:
-    """On the structures of the papers; all cases under the marker `nightly`."""
-    found = femubench.rank(["frame", "hframe"], list(QUICK), jobs=2)
-    assert_same_errors(run, found)
-
-
-@pytest.mark.nightly
 def test_all_of_the_run_kept_is_what_runs_today(run: Run) -> None:
     assert_same_errors(run, femubench.rank(jobs=2))
 

@@ -375,6 +375,7 @@ def test_known_eccentricity_is_gone_on_from(models: dict[str, Model]) -> None:
         assert_agree(effect, known, place, [0.003])
 
 
+@pytest.mark.slow(5)
 @pytest.mark.parametrize(
     ("name", "place", "widths", "told"),
     [

@@ -54,6 +54,7 @@ def test_a_spring_at_the_axis_is_found_with_its_stiffness(seed: int) -> None:
     assert arm.value < 2.0 * arm.std < 0.5
 
 
+@pytest.mark.slow(5)
 def test_a_spring_at_the_face_needs_no_more_than_its_stiffness() -> None:
     """The data do not ask for a free arm: the simple explanation is not worse."""
     frame, effect = portal(4), JointRotation()
@@ -129,6 +130,7 @@ def test_joints_of_one_type_and_elements_between_two_are_left_to_others() -> Non
     assert effect.places(Model.of(replace(portal(4), joints=weld))) == ()
 
 
+@pytest.mark.slow(5)
 def test_all_joints_that_give_are_found_as_one_cause() -> None:
     """Tees half as stiff as corners: one cause with a factor a type, not two or four."""
     effect = JointFlexibility()

@@ -57,6 +57,7 @@ def found(blind: BlindCase) -> Diagnosis:
     return diagnose(blind.case, known(Skin.name, *OURS))
 
 
+@pytest.mark.slow(5)
 def test_it_keeps_the_rules() -> None:
     plugins = load_plugins()
     assert plugins.broken == ()

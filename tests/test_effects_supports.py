@@ -218,6 +218,7 @@ def test_a_foot_that_turns_is_no_damage_beside_it(seed: int) -> None:
     assert found.causes[0] is cause
 
 
+@pytest.mark.slow(5)
 def test_one_soft_foot_of_two_is_found_in_a_finer_model(hframe: FrameBuilder) -> None:
     feet = tuple(Support(Place(joint=j), ("x", "z", "ry")) for j in ("L1", "L2"))
     nominal = replace(hframe(mesh=(8, 4, 8)), supports=feet)

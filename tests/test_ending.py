@@ -214,6 +214,7 @@ def can_mount() -> bool:
     return bool(shutil.which("unshare")) and subprocess.run(words, check=False).returncode == 0
 
 
+@pytest.mark.slow(5)
 @pytest.mark.skipif(not can_mount(), reason="no user namespaces to mount a small disk in")
 @pytest.mark.parametrize(
     ("kib", "code", "told"),

@@ -202,6 +202,7 @@ def check(folder: Path, share: float, format: str) -> None:
     (results_format if format in ("run", "store") else case_format)(folder, share, format)
 
 
+@pytest.mark.slow(20)
 @pytest.mark.parametrize("format", FORMATS)
 def test_a_few(tmp_path: Path, format: str) -> None:
     check(tmp_path, FEW, format)

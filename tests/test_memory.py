@@ -49,6 +49,7 @@ def every_strategy() -> list[object]:
     return [n if n in QUICK else pytest.param(n, marks=pytest.mark.nightly) for n in names]
 
 
+@pytest.mark.slow(5)
 @pytest.mark.parametrize("name", every_strategy())
 def test_no_strategy_makes_a_dense_matrix(name: str, tested: tuple[Model, Measurement]) -> None:
     model, measurement = tested

@@ -205,6 +205,7 @@ class TestStatistics:
         ]
         assert p == 1.0
 
+    @pytest.mark.slow(5)
     def test_many_overlapping_groups_become_stretches(self) -> None:
         run = synthetic_run(120, 30)
         found = outcome_of(run)

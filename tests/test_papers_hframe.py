@@ -26,6 +26,8 @@ from femubench.papers.printed import printed
 from femubench.reproduction import VERDICTS, Bars, Cell, Study, Workbench
 from femubench.scenarios import HERE
 
+pytestmark = pytest.mark.slow(20)
+
 Cells = dict[tuple[str, str, str], Cell]
 PAIRS = (*((k, k) for k in range(1, 7)), (8, 7))  # the twin's MAC is none of the test's
 OPEN = {
