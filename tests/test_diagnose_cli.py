@@ -13,6 +13,7 @@ from typing import Any
 import diagnosis_toys as toys
 import pytest
 from click.testing import CliRunner, Result
+from distributions import install_metadata
 
 from femubench.core.case.case import TOLERANCE, Case
 from femubench.core.case.example import write_example
@@ -90,10 +91,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("site")
     name = "femubench_diagnose_tests"
     (folder / f"{name}.py").write_text(EFFECTS, encoding="utf-8")
-    info = folder / f"{name}-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[femubench]\n{name} = {name}\n")
+    install_metadata(folder, name, {name: name})
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
         yield folder

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from distributions import install_metadata
 from stranger_effects import CAUTION, SUMMARY, Bare, Plain, Skin
 
 import femubench
@@ -32,10 +33,7 @@ OURS = ("youngs-modulus", "density", "torsion-constant")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Install the package of the stranger, as pip would."""
     folder = tmp_path_factory.mktemp("site")
-    info = folder / "strangers-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: strangers\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[femubench]\nstrangers = stranger_effects\n")
+    install_metadata(folder, "strangers", {"strangers": "stranger_effects"})
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
         draw.registered_effects.cache_clear()

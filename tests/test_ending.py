@@ -231,7 +231,6 @@ def test_a_disk_that_is_full(kib: int, code: int, told: str, tmp_path: Path) -> 
         capture_output=True,
         text=True,
         check=False,
-        timeout=300,
     )
     assert done.returncode == code
     first, *rest = done.stderr.splitlines()

@@ -356,7 +356,7 @@ def plates(tmp_path_factory: pytest.TempPathFactory) -> Path:
     deck = (folder / "plates.inp").read_text().replace(", SOLVER=MATRIXSTORAGE", "")
     (folder / "frequencies.inp").write_text(deck)
     for job in ("plates", "plates_left", "plates_right", "frequencies"):
-        subprocess.run([CCX, job], cwd=folder, check=True, capture_output=True, timeout=100)
+        subprocess.run([CCX, job], cwd=folder, check=True, capture_output=True)
     return folder
 
 

@@ -144,7 +144,7 @@ def view(browser: Browser) -> Iterator[Callable[..., View]]:
             **more,
         )
         windows.append(window)
-        window.set_default_timeout(10_000)
+        window.set_default_timeout(300_000)  # ms; others may use the machine
         found = View(window.new_page())
         page = found.page
         page.on("console", lambda message: found.messages.append(message.text))

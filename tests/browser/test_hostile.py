@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,9 +12,7 @@ import pytest
 from synthetic_run import synthetic_run
 
 from femubench.core.schema.records import finite
-from femubench.reports.csvs import CsvReporter
 from femubench.reports.htmls import HtmlReporter
-from femubench.reports.runs import MarkdownReporter
 from femubench.results import Run, run_to_json
 
 SCRIPT = "<script>alert(1)</script>"
@@ -83,18 +79,6 @@ def test_markup_in_the_compared_page_and_the_site_is_text(
     assert SCRIPT in opened.page.locator("body").inner_text()
     assert opened.page.locator("img").count() == 0
     opened.assert_quiet(compared)
-
-
-def test_markdown_and_csv_twins() -> None:
-    run = hostile()
-    text = MarkdownReporter().render(run)
-    assert "<script" not in text
-    assert "alert(1)" in text
-    rows = list(csv.reader(io.StringIO(CsvReporter().render(run))))
-    assert len({len(row) for row in rows}) == 1
-    cells = [cell for row in rows for cell in row]
-    assert SCRIPT in cells
-    assert not [cell for cell in cells if cell.startswith(("=", "@", "+"))]
 
 
 def test_a_page_of_everything_stays_small(real: Any) -> None:
