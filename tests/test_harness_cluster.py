@@ -30,6 +30,8 @@ from femubench.core.schema.results import JobResult
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
 
+pytestmark = pytest.mark.slow(40)
+
 JOBS = 200  # of the run with two kills; 10 000 in `make nightly`
 ROOT = Path(__file__).parents[1]
 QUIET = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}

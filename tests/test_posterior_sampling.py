@@ -44,6 +44,7 @@ def test_a_quadratic_function_is_met_and_others_have_their_error() -> None:
     assert coefficients_of(3) == 10
 
 
+@pytest.mark.slow(5)
 def test_the_posterior_is_that_of_exact_solutions() -> None:
     """Weighed draws of a wider distribution, every one solved, give the same mean and spread."""
     measurement, discrepancy = CASE.used_measurement(), Discrepancy(0.02, 0.01)
@@ -71,6 +72,7 @@ def test_the_posterior_is_that_of_exact_solutions() -> None:
         assert parameter.std / parameter.after == pytest.approx(std[k], rel=0.25)
 
 
+@pytest.mark.slow(5)
 def test_the_discrepancy_grows_with_what_the_model_cannot_follow() -> None:
     measurement = CASE.used_measurement()
     spoiled = replace(measurement, frequencies=measurement.frequencies * [1.0, 1.25, 0.8])

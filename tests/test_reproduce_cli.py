@@ -237,6 +237,7 @@ ORDER = (
 )
 
 
+@pytest.mark.slow(10)
 class TestRealPaper:
     """The ladder frame in earnest: everything that the study holds comes through."""
 
