@@ -321,6 +321,7 @@ def folder_of(result: Result) -> Path:
     return Path(result.stderr.removeprefix("html: ").strip()).parent
 
 
+@pytest.mark.slow(5)
 def test_a_diagnosis_is_reported_too(tmp_path: Path) -> None:
     file = tmp_path / "found.json"
     runner = CliRunner()
