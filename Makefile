@@ -21,32 +21,55 @@ NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py asymmetric_frame.py 
 	element_strategies.py exhibits.py expansion.py frame_extensions.py frf.py kernels.py \
 	localisation.py look*.py matrix_strategies.py pairing.py papers_*.py preload.py rigid_modes.py \
 	scenarios.py scoring.py sections.py sensitiv*.py sparse_eigen.py stretched_twins.py suite.py truths_*.py)
-# What counts processes, memory or seconds has the machine to itself, and the browser its one run.
-ALONE := $(addprefix tests/,browser $(addprefix test_,harness_*.py report_robust.py untrusted.py))
 # A file stays on one worker, and with it what its tests share; in the order of names, since those with
 # few tests take long and would come last.
 ON_ALL_CORES := -n 2 --dist loadfile --no-loadscope-reorder -p no:benchmark
 
-.PHONY: run test docs kernels bench bench-report sweep fuzz truths format clean
+# What a change is tried with while one works on it; `test` has the rest that does not take hours.
+QUICK := -m "not slow and not nightly"
+LINT := ruff layout budgets mypy pyright
+
+.PHONY: run check test nightly pytest $(LINT) docs kernels bench bench-report truths format clean
 .DELETE_ON_ERROR:
 
 run: $(VENV)/.installed
 	@# 1 tells that some strategy failed on some case, which is a finding and no fault of make.
 	$(BIN)/bench run $(ARGS) || test $$? -eq 1
 
-test: $(VENV)/.installed-test
+check: $(VENV)/.installed-test
 	$(BIN)/ruff check .
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest $(ON_ALL_CORES) $(QUICK) $(ARGS)
+
+# Nothing that fails keeps the rest from running.
+test: $(VENV)/.installed-test
+	@status=0; \
+	$(MAKE) --no-print-directory -k -j 2 --output-sync=target $(LINT) || status=1; \
+	$(MAKE) --no-print-directory pytest || status=1; \
+	exit $$status
+
+ruff: $(VENV)/.installed-test
+	$(BIN)/ruff check .
+
+layout: $(VENV)/.installed-test
 	$(BIN)/ruff format --check .
+
+budgets: $(VENV)/.installed-test
 	$(BIN)/python benchmarks/line_budget.py
-	$(BIN)/mypy -p femubench
-	$(BIN)/mypy truths
+
+mypy: $(VENV)/.installed-test
+	$(BIN)/mypy -p femubench -p truths
+
+pyright: $(VENV)/.installed-test
 	$(BIN)/pyright --pythonpath $(BIN)/python
-ifeq ($(ARGS),)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest $(ON_ALL_CORES) $(addprefix --ignore=,$(wildcard $(ALONE)))
-	$(BIN)/pytest $(wildcard $(ALONE))
-else
-	$(BIN)/pytest $(ARGS)
-endif
+
+pytest: $(VENV)/.installed-test
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest $(or $(ARGS),$(ON_ALL_CORES))
+
+nightly: $(VENV)/.installed-test
+	@status=0; \
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest $(ON_ALL_CORES) -m nightly $(ARGS) || status=1; \
+	$(MAKE) --no-print-directory -k docs kernels truths ARGS= || status=1; \
+	exit $$status
 
 docs: $(VENV)/.installed-test
 	$(BIN)/sphinx-build -q -E -W --keep-going -c docs -b html . build/site $(ARGS)
@@ -64,12 +87,6 @@ bench: $(VENV)/.installed-test
 # A quarter of an hour and up to 1.5 GB; docs/development/performance.md says what is measured.
 bench-report: $(VENV)/.installed-test
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/performance.py --write $(ARGS)
-
-sweep: $(VENV)/.installed-test
-	$(BIN)/pytest -m sweep $(ARGS)
-
-fuzz: $(VENV)/.installed-test
-	$(BIN)/pytest tests -m fuzz -s $(ARGS)
 
 # gmsh's wheel wants Debian's libglu1-mesa, libxcursor1, libxft2 and libxinerama1.
 truths: $(VENV)/.installed-truths

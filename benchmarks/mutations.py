@@ -1,10 +1,11 @@
 """How many wrong lines of numerics and judging the tests see: one line changed at a time.
 
-    python benchmarks/mutations.py [--only WORD] [--list] [--root DIR]
+    python benchmarks/mutations.py [--only WORD] [--quick] [--list] [--root DIR]
 
 Every change is made in a temporary copy of the tree, where the test files named with it are run:
 killed when one of them fails, survived when all pass, stale where the text is not there once, in
-its file or else in one of core. The table: a file :: its tests, then lines of old => new.
+its file or else in one of core. With --quick the tests are those of `make check`.
+The table: a file :: its tests, then lines of old => new.
 """
 
 from __future__ import annotations
@@ -111,6 +112,7 @@ core/run/model_checks.py :: harness_jobs
 core/run/judging.py :: uncertainty
     check_model(sample, outcome.model) => pass
 """
+QUICK = ("-m", "not slow and not nightly")
 SECONDS = 120  # of the processor, for the test files of one change
 LEFT_OUT = shutil.ignore_patterns(".git", "*_cache", "__pycache__", "femubench-results", "docs")
 
@@ -145,30 +147,34 @@ def mutations() -> Iterator[Mutation]:
             yield Mutation(file, old, new, tuple(f"tests/test_{t}.py" for t in tests.split()))
 
 
-def failed(root: Path, tests: Iterable[str], seconds: int) -> str:
-    """Return the first test that fails in a tree, empty where all pass."""
+def first_failure(root: Path, words: Iterable[str], seconds: int) -> str:
+    """Return the first test that fails in a tree, empty where all pass.
+
+    Arguments:
+        words: for pytest: files, and which of their tests.
+    """
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests],
+        [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *words],
         cwd=root,
         env={**os.environ, "PYTHONPATH": str(root)},
         capture_output=True,
         text=True,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds)),
     )
-    if done.returncode == 0:
+    if done.returncode in (0, 5):  # 5 where none of the tests is chosen
         return ""
     named = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
     return named.group(1) if named else f"no more than exit status {done.returncode}"
 
 
-def outcome(mutation: Mutation, root: Path) -> tuple[str, str]:
+def outcome(mutation: Mutation, root: Path, which: Iterable[str]) -> tuple[str, str]:
     """Return killed, survived or stale, and the test that saw the change."""
     file = mutation.place(root)
     if file is None:
         return "stale", ""
     before = file.read_text()
     file.write_text(before.replace(mutation.old, mutation.new))
-    test = failed(root, mutation.tests, SECONDS)
+    test = first_failure(root, (*which, *mutation.tests), SECONDS)
     file.write_text(before)
     return ("killed", f"  by {test}") if test else ("survived", "")
 
@@ -177,6 +183,7 @@ def main() -> None:
     """Run the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--only", default="", help="changes with this in file, text or tests")
+    parser.add_argument("--quick", action="store_true", help="with the tests of `make check` alone")
     parser.add_argument("--list", action="store_true", help="print the table and where it is stale")
     parser.add_argument("--root", type=Path, default=Path(__file__).parents[1], help="the tree")
     asked = parser.parse_args()
@@ -189,11 +196,12 @@ def main() -> None:
         root = Path(folder) / "tree"
         shutil.copytree(asked.root, root, symlinks=True, ignore=LEFT_OUT)
         tests = dict.fromkeys(test for m in chosen for test in m.tests)
-        if test := failed(root, tests, SECONDS * len(tests)):
+        which = QUICK if asked.quick else ()
+        if test := first_failure(root, (*which, *tests), SECONDS * len(tests)):
             raise SystemExit(f"{test} fails without any change")
         counts: Counter[str] = Counter()
         for m in chosen:
-            word, test = outcome(m, root)
+            word, test = outcome(m, root, which)
             counts[word] += 1
             print(f"{word:8} {m}{test}", flush=True)
     print(", ".join(f"{n} {word}" for word, n in counts.items()), f"of {len(chosen)}")

@@ -1,8 +1,9 @@
-"""Structures that several tests share, given as fixtures that return builders."""
+"""Budgets of processor time, and structures that several tests share as fixtures."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import os
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -24,6 +25,12 @@ from femubench.core.fem.frame import (
 from femubench.core.fem.sections import Section, constant_kappa, rectangular_tube
 
 FrameBuilder = Callable[..., Frame]
+
+UNMARKED = 2.0  # s of a processor that a test without the marker `slow` takes at most
+# A test fails above so many times its budget: what it shares is charged to the first that asks for
+# it, and a busy machine takes longer for the same.
+TOLERANCE = 5.0
+_STARTED = pytest.StashKey[float]()
 
 HALF_SIDE, RUNG = 0.2921, 0.2794  # m
 ALUMINIUM = Material(68.367e9, 0.33, 2700.0)  # sqrt(E / rho) = 5032 m/s
@@ -141,6 +148,32 @@ def build_portal(seed: int, beam: str = "timoshenko", elements: int = 2, **parts
         ends = (f"J{a}", f"J{b}")
         members.append(Member(f"m{k}", ends, elements, section, material, (x, y, z)))
     return Frame("3d", beam, joints, tuple(members), **parts)  # type: ignore[arg-type]
+
+
+def processor_time() -> float:
+    """Return the seconds that this process and its children that have ended took."""
+    return sum(os.times()[:4])
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup(item: pytest.Item) -> Generator[None]:
+    item.stash[_STARTED] = processor_time()
+    yield
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item) -> Generator[None]:
+    yield
+    if item.get_closest_marker("nightly"):
+        return
+    slow = item.get_closest_marker("slow")
+    budget = slow.args[0] if slow else UNMARKED
+    used = processor_time() - item.stash[_STARTED]
+    if used > TOLERANCE * budget:
+        pytest.fail(
+            f"took {used:.0f} s of a processor, its budget is {budget:g} s: make it cheaper, or "
+            "mark it with `slow(seconds)`"
+        )
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from advice_problems import STD, advised, every_option, fitted, one_outlook, posed
 from numpy.testing import assert_allclose
 
 from femubench import Model
@@ -21,9 +20,6 @@ from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.material import Density, YoungsModulus
 from femubench.plugins.effects.shear_deformation import ShearDeformation
 from femubench.plugins.effects.temperature import Temperature
-
-sys.path.insert(0, str(Path(__file__).parent))
-from advice_problems import STD, advised, every_option, fitted, one_outlook, posed
 
 FrameBuilder = Callable[..., Frame]
 

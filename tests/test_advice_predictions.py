@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.linalg as la
+from advice_problems import STD, advised, every_option, fitted, one_outlook, part_of, posed
 from numpy.testing import assert_allclose
 from scipy.special import logsumexp
 
@@ -28,9 +27,6 @@ from femubench.plugins.effects.attached_oscillator import AttachedOscillator
 from femubench.plugins.effects.grounding_spring import GroundingSpring
 from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.material import YoungsModulus
-
-sys.path.insert(0, str(Path(__file__).parent))
-from advice_problems import STD, advised, every_option, fitted, one_outlook, part_of, posed
 
 FrameBuilder = Callable[..., Frame]
 

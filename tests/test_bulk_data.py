@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import garteur_plane
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from test_peer import Peer, description, peer  # noqa: F401 - a fixture
 
 import femubench
 from femubench import InputError, Model, Sensors
@@ -23,10 +24,6 @@ from femubench.fem import Coupling, Eccentricity, GroundSpring, LowRank, Place, 
 from femubench.plugins.readers.bulk_data import BulkDataReader
 from femubench.plugins.readers.bulk_data.cards import Card
 from femubench.plugins.readers.bulk_data.writing import real
-
-sys.path.insert(0, str(Path(__file__).parent))
-import garteur_plane
-from test_peer import Peer, description, peer  # noqa: F401 - a fixture
 
 READER = BulkDataReader()
 E, RHO, L = 7.0e10, 2700.0, 0.8

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import sys
 import tracemalloc
 from collections import Counter
 from pathlib import Path
 
+import garteur_plane
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
-
-from femubench import InputError
-from femubench.plugins.readers.bulk_data import BulkDataReader
-
-sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parent / "fuzz"))
-import garteur_plane
 from mutations import NUMBERS, Edit, edits, mutated
 from test_bulk_data import KINDS, LARGE, TWO
 from test_fuzz import outcome_of
+
+from femubench import InputError
+from femubench.plugins.readers.bulk_data import BulkDataReader
 
 READER = BulkDataReader()
 SEEDS = (garteur_plane.cards(), TWO, LARGE, KINDS)
@@ -84,11 +80,12 @@ def check(folder: Path, examples: int) -> None:
     assert 0.02 < outcomes["read"] / outcomes.total() < 0.9
 
 
+@pytest.mark.slow(5)
 def test_a_few(tmp_path: Path) -> None:
     check(tmp_path, FEW)
 
 
-@pytest.mark.fuzz
+@pytest.mark.nightly
 def test_many(tmp_path: Path) -> None:
     check(tmp_path, MANY)
 

@@ -3,15 +3,9 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
-
-from femubench.core.challenge.answer import Answer
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 from blind_sweep import Record
 from stated_probabilities import (
     Statement,
@@ -23,6 +17,8 @@ from stated_probabilities import (
     wilson,
 )
 from true_fit import fits_worse, is_search_fault
+
+from femubench.core.challenge.answer import Answer
 
 
 def test_interval_of_a_proportion() -> None:

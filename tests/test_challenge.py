@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import shutil
-import sys
 import zlib
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,10 +13,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 from blind_sweep import bars_table, run_task, tasks
+from click.testing import CliRunner
 
 from femubench import Case, Diagnosis, InputError, Model, read_case
 from femubench.core.challenge.answer import Answer, AnswerCause, read_answer
@@ -245,6 +242,7 @@ def test_causes_outside_the_catalogue_show(name: str) -> None:
     assert noisy > 0.3 * blind.truth.excess
 
 
+@pytest.mark.slow(20)
 def test_a_sensor_fault_is_in_all_modes_and_needs_shapes() -> None:
     with pytest.raises(InputError, match="cannot be hidden"):
         draw_case(1, "C", hidden="outside", effect="swapped-sensors")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from printed_boards import assert_same_errors, stored
 
 import femubench
 import femubench.scenarios
@@ -20,6 +21,10 @@ from femubench.core.plugin.loader import Plugins, load_plugins
 from femubench.core.plugin.validation import check_scenario
 
 ROOT = Path(__file__).parents[1]
+QUICK = (
+    *("unchanged", "textbook", "baruch", "berman", "global", "local", "bayesian", "physical"),
+    *("eigensensitivity", "sparse", "diagnosed"),
+)
 LISTED = """\
 [portal]
 title = "Portal with haunches"
@@ -202,3 +207,9 @@ class TestStrangers:
             Scenario("group", "B", {"group/a": second, "group/b": second}),
         )
         assert case_folders(["group/a"], plugins.scenarios) == [("group/a", first)]
+
+
+@pytest.mark.slow(30)
+def test_the_run_kept_is_what_runs_today() -> None:
+    """On the structures of the papers; all cases in test_documented_figures."""
+    assert_same_errors(stored("default"), femubench.rank(["frame", "hframe"], list(QUICK), jobs=2))

@@ -10,8 +10,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import diagnosis_toys as toys
 import pytest
 from click.testing import CliRunner, Result
+from distributions import install_metadata
 
 from femubench.core.case.case import TOLERANCE, Case
 from femubench.core.case.example import write_example
@@ -27,9 +29,6 @@ from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.score.scoring import frequency_error, score_model
 from femubench.reports.diagnosis import diagnosis_markdown, diagnosis_text
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import diagnosis_toys as toys
 
 Invoke = Callable[..., Result]
 Told = tuple[str, Result, dict[str, Any], Path]
@@ -92,10 +91,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("site")
     name = "femubench_diagnose_tests"
     (folder / f"{name}.py").write_text(EFFECTS, encoding="utf-8")
-    info = folder / f"{name}-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[femubench]\n{name} = {name}\n")
+    install_metadata(folder, name, {name: name})
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
         yield folder
@@ -323,6 +319,7 @@ def told(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
 class TestBuiltInCases:
     """The real search on measured structures, from the command line to the extended case."""
 
+    @pytest.mark.slow(10)
     def test_screen_and_json_agree(self, told: Told) -> None:
         name, result, data, _ = told
         assert data["case"] == name

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from diagnosis_problems import measured as seen
 
 from femubench import (
     Case,
@@ -43,9 +43,6 @@ from femubench.plugins.strategies.diagnosed import Diagnosed
 from femubench.results import Run, leaderboard, run_jobs
 from femubench.scenarios import HERE
 from femubench.update import check_used_modes, with_measured_frequencies
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import measured as seen
 
 FrameBuilder = Callable[..., Frame]
 USED, ALL = (1, 2, 3), (1, 2, 3, 4, 5, 6, 7, 8)

@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-from femubench import Model
-from femubench.core.challenge.structures import structure_named
-from femubench.core.fit.modal_fit import Fit, Problem, fit, state_at
-from femubench.core.inference.grid_search import Screened, _in_cells, screen
-
-sys.path.insert(0, str(Path(__file__).parent))
 from diagnosis_problems import (
     catalogue,
     coordinates,
@@ -23,6 +14,11 @@ from diagnosis_problems import (
     part_at,
     problem_of,
 )
+
+from femubench import Model
+from femubench.core.challenge.structures import structure_named
+from femubench.core.fit.modal_fit import Fit, Problem, fit, state_at
+from femubench.core.inference.grid_search import Screened, _in_cells, screen
 
 NOTHING = np.zeros(0)
 # Of chi-square, beside a share of what is explained.

@@ -144,6 +144,7 @@ def test_a_structure_without_fault_lacks_nothing(structure: str) -> None:
     assert answer.causes == ()
 
 
+@pytest.mark.slow(5)
 @pytest.mark.parametrize("seed", [3, 5])
 def test_two_hidden_effects_are_both_found(seed: int) -> None:
     verdict, _, delta = judged(Blind(seed, hidden="pair"))
@@ -152,6 +153,7 @@ def test_two_hidden_effects_are_both_found(seed: int) -> None:
     assert verdict.right, verdict.reason
 
 
+@pytest.mark.slow(10)
 @pytest.mark.parametrize(
     ("blind", "few"),
     [

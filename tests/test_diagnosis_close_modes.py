@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-from femubench import Measurement, Model, diagnose, solve_modes
-from femubench.core.fit.modal_fit import state_at
-from femubench.fem import Frame, Joint, Material, Member, rectangular_tube
-
-sys.path.insert(0, str(Path(__file__).parent))
 from diagnosis_problems import (
     case_of,
     catalogue,
@@ -23,6 +15,10 @@ from diagnosis_problems import (
     part_at,
     problem_of,
 )
+
+from femubench import Measurement, Model, diagnose, solve_modes
+from femubench.core.fit.modal_fit import state_at
+from femubench.fem import Frame, Joint, Material, Member, rectangular_tube
 
 CORNERS = {"A": (0.0, 0.0, 0.0), "B": (1.0, 0.0, 0.0), "C": (1.0, 1.0, 0.0), "D": (0.0, 1.0, 0.0)}
 TUBE, ALUMINIUM = rectangular_tube(0.03, 0.03, 0.003), Material(7e10, 0.33, 2700.0)

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnosis_problems import (
+    FREQUENCY_STD,
+    coordinates,
+    effects_named,
+    measured,
+    part_at,
+    problem_of,
+)
 
 from femubench import Measurement, Model, NotApplicable, Sensors, solve_modes
 from femubench.core.fem.frame import Factor, GroundSpring, Place
@@ -18,16 +24,6 @@ from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
 from femubench.core.inference.examine import posed
 from femubench.fem import FloatArray, Frame
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import (
-    FREQUENCY_STD,
-    coordinates,
-    effects_named,
-    measured,
-    part_at,
-    problem_of,
-)
 
 FrameBuilder = Callable[..., Frame]
 NOTHING = np.zeros(0)
@@ -201,6 +197,7 @@ def scatters(ladder: FrameBuilder) -> tuple[Data, Noise, FloatArray, FloatArray]
     return problem.data, problem.noise, slopes, np.array(rows)
 
 
+@pytest.mark.slow(5)
 def test_scatter_has_the_covariance_that_the_noise_says(
     scatters: tuple[Data, Noise, FloatArray, FloatArray],
 ) -> None:

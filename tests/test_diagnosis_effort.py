@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from functools import cache
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 from blind_sweep import Record, run_task, stated, tasks
 from true_fit import CataloguedCause, fits_worse, true_fit
 
@@ -20,6 +16,8 @@ from femubench.core.errors import InputError
 from femubench.core.inference.effort import Effort
 from femubench.core.pace import Advance
 from femubench.core.plugin.loader import load_plugins
+
+pytestmark = pytest.mark.slow(20)
 
 TASK = next(task for task in tasks() if task.key == ("pairs", 1))
 

@@ -152,6 +152,7 @@ def test_deviations_stated_too_small_are_told_with_the_factor() -> None:
     assert value(found) == pytest.approx(1 / 3, rel=0.15)
 
 
+@pytest.mark.slow(5)
 @pytest.mark.parametrize(
     ("name", "structure", "edit", "place"),
     [
@@ -171,6 +172,7 @@ def test_a_fault_of_what_was_typed_in_is_named(
     assert not found.gain.used_percent[1] > 0.5  # nan where the wrong model has no partners
 
 
+@pytest.mark.slow(10)
 @pytest.mark.parametrize("structure", ["ladder", "portal"])
 def test_clean_data_have_no_fault(structure: str) -> None:
     assert [faults_of(diagnosed(clean(structure, seed))) for seed in range(10)] == [[]] * 10
@@ -182,6 +184,7 @@ def test_what_a_drawing_gets_wrong_of_a_solid_is_no_fault(name: str) -> None:
     assert faults_of(diagnosed(solid(name))) == []
 
 
+@pytest.mark.slow(5)
 @pytest.mark.parametrize(("name", "sensor"), [("h-tube", "9Z"), ("stiffened-strip", "3Z")])
 def test_a_wrong_sign_stands_out_of_what_a_drawing_gets_wrong(name: str, sensor: str) -> None:
     found = diagnosed(edited(lambda m: multiply_readings(m, sensor, -1.0), solid(name)))
@@ -222,6 +225,7 @@ def test_a_cause_beside_a_fault_is_still_named() -> None:
     assert found.verdict == "named"
 
 
+@pytest.mark.slow(5)
 def test_a_cause_alone_is_no_fault() -> None:
     for seed in range(4):
         found = diagnosed(draw_case(seed, "A", effect="member-stiffness").case)

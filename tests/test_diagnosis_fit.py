@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.linalg as la
+from diagnosis_problems import (
+    catalogue,
+    coordinates,
+    effects_named,
+    measured,
+    part_at,
+    problem_of,
+)
+from effect_checks import as_matrices, changed_matrices
 from scipy import integrate, optimize
 
 from femubench import Model
@@ -21,17 +28,6 @@ from femubench.core.fit.projection import Projection
 from femubench.core.modal.eigen import natural_shift, solve_dense
 from femubench.effect import total_mass
 from femubench.fem import FloatArray, Frame
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import (
-    catalogue,
-    coordinates,
-    effects_named,
-    measured,
-    part_at,
-    problem_of,
-)
-from effect_checks import as_matrices, changed_matrices
 
 FrameBuilder = Callable[..., Frame]
 NOTHING = np.zeros(0)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnosis_problems import case_of, coordinates, effects_named, measured, part_at
 
 from femubench import Case, Diagnosis, Measurement, Model, diagnose
 from femubench.core.case.case import Modification
@@ -29,9 +28,6 @@ from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block
 from femubench.core.score.scoring import score_model
 from femubench.fem import GroundSpring, Place, PointMass
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import case_of, coordinates, effects_named, measured, part_at
 
 FRAME = structure_named("ladder").frame
 MODEL = Model.of(FRAME)
@@ -175,6 +171,7 @@ def test_unseen_data_do_not_move_the_naming_bit_for_bit() -> None:
     assert right.gain.modified_percent != wrong.gain.modified_percent
 
 
+@pytest.mark.slow(5)
 def test_nor_do_they_where_nothing_is_missing_or_several_causes_are_possible() -> None:
     for case in (made(), made(("youngs-modulus", "all", 0.1))):
         blind = replace(case, measurement=replace(case.measurement, total_mass=None))
@@ -265,6 +262,7 @@ def test_what_unseen_data_refute_does_not_lead(effect: str, size: float) -> None
     assert extended == pytest.approx(size if effect == "density" else 0.0, abs=0.01)
 
 
+@pytest.mark.slow(10)
 def test_a_mode_left_out_has_no_part_in_what_predicts_it() -> None:
     """One frequency 3 % off asks for a cause; without it nothing does."""
     test = measured(MODEL, FRAME, count=6)

@@ -370,6 +370,7 @@ class TestNaming:
         assert best.chi2 < 0.1
         assert departure(best.fit) < 1e-2
 
+    @pytest.mark.slow(5)
     def test_damage_over_many_elements_is_told_from_that_of_one(
         self, model: Model, found: Callable[..., Examination]
     ) -> None:
@@ -434,7 +435,7 @@ def lattice(count: int, elements: int) -> Frame:
     return Frame("3d", "timoshenko", joints, tuple(members), supports=supports, rotary_inertia=True)
 
 
-@pytest.mark.sweep
+@pytest.mark.nightly
 @pytest.mark.parametrize(("elements", "size"), [(10, 2000), (118, 29000)])
 def test_a_lattice_is_diagnosed_in_minutes(elements: int, size: int) -> None:
     frame = lattice(2, elements)

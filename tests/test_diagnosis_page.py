@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
-import sys
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
+import diagnosis_toys as toys
+import harness_toys
 import pytest
 from click.testing import CliRunner
+from diagnosis_toys import STRUCTURE, data_of
 
 from femubench.core.cli.main import bench
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
@@ -18,11 +20,6 @@ from femubench.core.errors import InputError
 from femubench.core.schema.diagnosis import LocationRow, Rival
 from femubench.reports.diagnosis import diagnosis_html, diagnosis_text
 from femubench.reports.diagnosis_words import odds, times
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import diagnosis_toys as toys
-import harness_toys
-from diagnosis_toys import STRUCTURE, data_of
 
 VERDICTS = ("named", "none", "unknown", "ambiguous", "not-confirmed")
 
@@ -249,6 +246,7 @@ class TestStructure:
 
 
 class TestCommand:
+    @pytest.mark.slow(5)
     def test_writes_page_and_markdown(self, tmp_path: Path) -> None:
         for name, start in (("a.html", "<!DOCTYPE html>"), ("a.MD", "# Diagnosis of frame")):
             file = tmp_path / name

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from diagnosis_problems import case_of, catalogue, effects_named, measured
 
 from femubench import Diagnosis, Model, diagnose
 from femubench.core.challenge.answer import Answer
@@ -20,9 +19,6 @@ from femubench.core.diagnosis.symmetry import mirror_places, symmetries
 from femubench.core.diagnosis.verdict import credible, places_of
 from femubench.core.inference.posterior import Posterior
 from femubench.fem import GroundSpring, Place, PointMass
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import case_of, catalogue, effects_named, measured
 
 FRAME = structure_named("ladder").frame
 MODEL = Model.of(FRAME)

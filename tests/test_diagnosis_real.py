@@ -12,9 +12,11 @@ import femubench.scenarios
 from femubench import Case, Diagnosis, diagnose, read_case
 from femubench.core.score.scoring import score_model
 
+pytestmark = pytest.mark.slow(20)
+
 HELD_OUT_HFRAME = (911.64, 979.89)  # Hz
 # The larger of the two takes as long as all the rest.
-SOLID = ("frame-solid", pytest.param("hframe-solid", marks=pytest.mark.sweep))
+SOLID = ("frame-solid", pytest.param("hframe-solid", marks=pytest.mark.nightly))
 
 
 @cache

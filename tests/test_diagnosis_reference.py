@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnosis_problems import case_of, catalogue, measured
 
 from femubench import Case, InputError, Measurement, Model, diagnose, read_case
 from femubench.core.case.writing import write_case
@@ -17,9 +17,6 @@ from femubench.core.fem.frame import Factor, JointSpring, RigidEnd
 from femubench.core.inference.examine import examine
 from femubench.core.modal.eigen import DENSE_LIMIT
 from femubench.fem import Frame
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import case_of, catalogue, measured
 
 ROOT = Path(__file__).parents[1]
 FRAME = structure_named("portal").frame
@@ -68,6 +65,7 @@ def damaged() -> tuple[Frame, Frame]:
     return built, replace(built, factors=(*built.factors, Factor("E", ("floor/2",), 0.5)))
 
 
+@pytest.mark.slow(10)
 def test_the_difference_is_named_where_the_drawing_is_wrong(damaged: tuple[Frame, Frame]) -> None:
     built, broken = damaged
     found = diagnose(case_with(broken, 1, built))
@@ -83,12 +81,14 @@ def test_the_difference_is_named_where_the_drawing_is_wrong(damaged: tuple[Frame
     assert parameter.value == pytest.approx(0.5, abs=0.1)
 
 
+@pytest.mark.slow(20)
 def test_a_structure_as_it_was_lacks_nothing(damaged: tuple[Frame, Frame]) -> None:
     built, _ = damaged
     verdicts = [diagnose(case_with(built, seed, built)).verdict for seed in range(2, 5)]
     assert verdicts == ["none"] * len(verdicts)
 
 
+@pytest.mark.slow(20)
 def test_without_the_reference_the_drawing_is_to_blame(damaged: tuple[Frame, Frame]) -> None:
     """Its joints stand between the data and the loss."""
     _, broken = damaged
@@ -97,6 +97,7 @@ def test_without_the_reference_the_drawing_is_to_blame(damaged: tuple[Frame, Fra
     assert found.verdict != "named" or named != {("local-stiffness-loss", "floor/2")}
 
 
+@pytest.mark.slow(5)
 def test_what_is_there_from_the_first_day_is_no_difference(damaged: tuple[Frame, Frame]) -> None:
     built, broken = damaged
     case = case_with(broken, 1, built)
@@ -245,6 +246,7 @@ class TestCaseFolder:
         assert len(str(fault.value).splitlines()) == 1
 
 
+@pytest.mark.slow(5)
 def test_a_large_model_foresees_what_it_holds_out(damaged: tuple[Frame, Frame]) -> None:
     """Of a large model some modes are solved, more of them for more data."""
     fine = replace(FRAME, members=tuple(replace(m, elements=30) for m in FRAME.members))

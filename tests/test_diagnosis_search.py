@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 from math import comb, exp, factorial, log
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 import pytest
+from diagnosis_problems import (
+    catalogue,
+    coordinates,
+    effects_named,
+    measured,
+    part_at,
+    problem_of,
+)
 
 from femubench import Model
 from femubench.core.challenge.structures import structure_named
@@ -25,16 +31,6 @@ from femubench.core.inference.prior import log_prior, textbook_bases
 from femubench.core.inference.settings import settings
 from femubench.effect import FrameEffect, Parameter
 from femubench.fem import Frame, PointMass
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import (
-    catalogue,
-    coordinates,
-    effects_named,
-    measured,
-    part_at,
-    problem_of,
-)
 
 FRAME = structure_named("ladder").frame
 MODEL = Model.of(FRAME)

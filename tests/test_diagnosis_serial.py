@@ -6,12 +6,12 @@ import copy
 import json
 import math
 import re
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import diagnosis_toys as toys
 import numpy as np
 import pytest
 
@@ -22,9 +22,6 @@ from femubench.core.errors import InputError
 from femubench.core.schema.diagnosis import Evidence, Gain, Rival
 from femubench.reports.cells import chance
 from femubench.reports.diagnosis import diagnosis_markdown, diagnosis_text, summary_lines
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import diagnosis_toys as toys
 
 VERDICTS = ("named", "none", "unknown", "ambiguous", "not-confirmed")
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from diagnosis_problems import case_of, catalogue, effects_named, measured
 
 from femubench import Case, Diagnosis, InputError, Measurement, Model, diagnose
 from femubench.core.case.modes import NO_SENSORS
@@ -30,9 +29,6 @@ from femubench.core.inference.posterior import Posterior
 from femubench.core.inference.search import adequacy
 from femubench.effect import Effect
 from femubench.fem import Frame, Joint, Material, Member, Place, Section, Support
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import case_of, catalogue, effects_named, measured
 
 FrameBuilder = Callable[..., Frame]
 FRAME = structure_named("ladder").frame
@@ -560,6 +556,7 @@ def test_frequencies_alone_will_do() -> None:
     assert {row.kind for row in found.residuals} == {"frequency"}
 
 
+@pytest.mark.slow(5)
 def test_data_of_another_structure_are_no_reason_to_name_anything() -> None:
     case = trial("density", "all", 0.01)
     rng = np.random.default_rng(2)

@@ -34,6 +34,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.nightly
 def test_every_page_is_there(site: Path) -> None:
     texts = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("scenarios/*/README.md")]
     for text in texts:
@@ -41,6 +42,7 @@ def test_every_page_is_there(site: Path) -> None:
     assert 'url=docs/index.html"' in (site / "index.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.nightly
 def test_nothing_is_loaded_from_elsewhere(site: Path) -> None:
     assert LOADED.search('<script async src="https://cdn.example/x.js">')
     files = [*site.rglob("*.html"), *site.rglob("*.css")]
@@ -49,6 +51,7 @@ def test_nothing_is_loaded_from_elsewhere(site: Path) -> None:
         assert LOADED.findall(file.read_text(encoding="utf-8")) == [], file
 
 
+@pytest.mark.nightly
 def test_reference_names_every_public_name(site: Path) -> None:
     for info in [None, *iter_modules(femubench.__path__)]:
         if info is not None and (info.ispkg or info.name.startswith("_")):

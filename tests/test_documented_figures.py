@@ -8,20 +8,9 @@ test_sweep_noise, docs/diagnosis-accuracy.md in test_sweep_diagnosis.
 from __future__ import annotations
 
 import re
-import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
-
-import femubench
-from femubench import Run
-from femubench.core.library.cases import read_cases
-from femubench.core.plugin.loader import load_plugins
-from femubench.core.schema.results import Nominal
-from femubench.results import JobResult, leaderboard, tell_apart
-
-sys.path.insert(0, str(Path(__file__).parent))
 from printed_boards import (
     ROOT,
     as_printed,
@@ -31,12 +20,16 @@ from printed_boards import (
     text_of,
 )
 
+import femubench
+from femubench import Run
+from femubench.core.library.cases import read_cases
+from femubench.core.plugin.loader import load_plugins
+from femubench.core.schema.results import Nominal
+from femubench.results import JobResult, leaderboard, tell_apart
+
+pytestmark = pytest.mark.nightly
 PAGES = ("README.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md"))))
 NUMBERS = {"eleven": 11, "twelve": 12, "seventeen": 17, "twenty-three": 23, "twenty-five": 25}
-QUICK = (
-    *("unchanged", "textbook", "baruch", "berman", "global", "local", "bayesian", "physical"),
-    *("eigensensitivity", "sparse", "diagnosed"),
-)
 
 
 @pytest.fixture(scope="module")
@@ -70,13 +63,6 @@ def test_the_leaderboard(run: Run) -> None:
     assert_board_is_that_of(run, "README.md")
 
 
-def test_the_run_kept_is_what_runs_today(run: Run) -> None:
-    """On the structures of the papers; all cases under the marker `sweep`."""
-    found = femubench.rank(["frame", "hframe"], list(QUICK), jobs=2)
-    assert_same_errors(run, found)
-
-
-@pytest.mark.sweep
 def test_all_of_the_run_kept_is_what_runs_today(run: Run) -> None:
     assert_same_errors(run, femubench.rank(jobs=2))
 

@@ -79,6 +79,7 @@ def test_same_text_every_time(figure: Figure) -> None:
     assert drawn(figure) == drawn(figure)
 
 
+@pytest.mark.slow(5)
 def test_same_text_in_another_process() -> None:
     here = "\n".join(drawn(figure) for figure in (MATRIX, BARS))
     code = (

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import scipy.linalg as la
+from diagnosis_problems import case_of, catalogue, effects_named, measured
+from effect_checks import as_matrices, changed_matrices
 
 from femubench import Model, NotApplicable, Sensors, diagnose, solve_modes
 from femubench.core.challenge.structures import structure_named
@@ -46,10 +46,6 @@ from femubench.plugins.effects.joint_mass import JointMass
 from femubench.plugins.effects.mass_eccentricity import MassEccentricity
 from femubench.plugins.effects.mass_offset import MassOffset
 from femubench.plugins.effects.temperature import Temperature, slope_of
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import case_of, catalogue, effects_named, measured
-from effect_checks import as_matrices, changed_matrices
 
 FrameBuilder = Callable[..., Frame]
 EXACT = 1e-9
@@ -379,6 +375,7 @@ def test_known_eccentricity_is_gone_on_from(models: dict[str, Model]) -> None:
         assert_agree(effect, known, place, [0.003])
 
 
+@pytest.mark.slow(5)
 @pytest.mark.parametrize(
     ("name", "place", "widths", "told"),
     [

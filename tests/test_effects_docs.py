@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from distributions import install_metadata
 
 from femubench import Model, solve_modes
 from femubench.core.change.hypothesis import hypotheses_of
@@ -99,12 +100,8 @@ def bedding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     (source,) = re.findall(r"```python\n# my_bedding\.py\n(.*?)```", TEXT, re.DOTALL)
     table = tomllib.loads(project)["project"]
     (tmp_path / "my_bedding.py").write_text(source, encoding="utf-8")
-    info = tmp_path / f"my_bedding-{table['version']}.dist-info"
-    info.mkdir()
-    head = f"Metadata-Version: 2.1\nName: {table['name']}\nVersion: {table['version']}\n"
-    (info / "METADATA").write_text(head, encoding="utf-8")
-    points = [f"{name} = {module}" for name, module in table["entry-points"]["femubench"].items()]
-    (info / "entry_points.txt").write_text("\n".join(["[femubench]", *points]), encoding="utf-8")
+    points = table["entry-points"]["femubench"]
+    install_metadata(tmp_path, table["name"], points, table["version"])
     monkeypatch.syspath_prepend(tmp_path)
     (found,) = distributions(path=[str(tmp_path)])
     plugins = load_plugins(list(found.entry_points))

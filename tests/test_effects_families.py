@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from diagnosis_problems import case_of, effects_named, measured
+from effect_checks import check_exact, check_neutral
 
 from femubench import InputError, Model, diagnose, read_case
 from femubench.core.case.case import Case
@@ -19,10 +20,6 @@ from femubench.effect import elements_of, members_at, members_of, set_places, sp
 from femubench.fem import Frame, MemberSet, Structure, rectangular_tube, round_tube
 from femubench.plugins.effects.material import Density, MemberMass, MemberStiffness, YoungsModulus
 from femubench.plugins.effects.wall_thickness import WallThickness
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import case_of, effects_named, measured
-from effect_checks import check_exact, check_neutral
 
 FrameBuilder = Callable[..., Frame]
 RUNGS, SIDES = ("AD", "BE", "CF"), ("AB", "BC", "DE", "EF")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnosis_problems import case_of, measured
+from effect_checks import compare
 
 from femubench import Model, diagnose
 from femubench.fem import (
@@ -22,10 +22,6 @@ from femubench.fem import (
 )
 from femubench.plugins.effects.joint_flexibility import JointFlexibility
 from femubench.plugins.effects.joint_rotation import JointRotation
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import case_of, measured
-from effect_checks import compare
 
 TUBE, STEEL = rectangular_tube(0.06, 0.04, 0.003), Material(207e9, 0.3, 7850.0)
 
@@ -58,6 +54,7 @@ def test_a_spring_at_the_axis_is_found_with_its_stiffness(seed: int) -> None:
     assert arm.value < 2.0 * arm.std < 0.5
 
 
+@pytest.mark.slow(5)
 def test_a_spring_at_the_face_needs_no_more_than_its_stiffness() -> None:
     """The data do not ask for a free arm: the simple explanation is not worse."""
     frame, effect = portal(4), JointRotation()
@@ -133,6 +130,7 @@ def test_joints_of_one_type_and_elements_between_two_are_left_to_others() -> Non
     assert effect.places(Model.of(replace(portal(4), joints=weld))) == ()
 
 
+@pytest.mark.slow(5)
 def test_all_joints_that_give_are_found_as_one_cause() -> None:
     """Tees half as stiff as corners: one cause with a factor a type, not two or four."""
     effect = JointFlexibility()

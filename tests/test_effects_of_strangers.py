@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
 from blind_sweep import SweepCase, run_task
+from distributions import install_metadata
 from stranger_effects import CAUTION, SUMMARY, Bare, Plain, Skin
 
 import femubench
@@ -37,10 +33,7 @@ OURS = ("youngs-modulus", "density", "torsion-constant")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Install the package of the stranger, as pip would."""
     folder = tmp_path_factory.mktemp("site")
-    info = folder / "strangers-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: strangers\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[femubench]\nstrangers = stranger_effects\n")
+    install_metadata(folder, "strangers", {"strangers": "stranger_effects"})
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
         draw.registered_effects.cache_clear()
@@ -62,6 +55,7 @@ def found(blind: BlindCase) -> Diagnosis:
     return diagnose(blind.case, known(Skin.name, *OURS))
 
 
+@pytest.mark.slow(5)
 def test_it_keeps_the_rules() -> None:
     plugins = load_plugins()
     assert plugins.broken == ()

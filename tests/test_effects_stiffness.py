@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from effect_checks import changed_matrices, check_exact, check_neutral, compare
 
 from femubench import Model, NotApplicable, solve_modes
 from femubench.core.case.nodes import MatrixGeometry
@@ -47,9 +46,6 @@ from femubench.plugins.effects.material import Density, MemberMass, MemberStiffn
 from femubench.plugins.effects.rotary_inertia import RotaryInertia
 from femubench.plugins.effects.shear_deformation import ShearDeformation
 from femubench.plugins.effects.torsion_constant import TorsionConstant, shape_torsion_constant
-
-sys.path.insert(0, str(Path(__file__).parent))
-from effect_checks import changed_matrices, check_exact, check_neutral, compare
 
 FrameBuilder = Callable[..., Frame]
 EXACT: dict[type, tuple[float, ...]] = {

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnosis_problems import case_of, measured
+from effect_checks import changed_matrices, check_neutral, compare
 from scipy.optimize import brentq
 
 from femubench import Measurement, Model, Sensors, diagnose
@@ -30,10 +30,6 @@ from femubench.fem import (
     solid_rectangle,
 )
 from femubench.plugins.effects.support_flexibility import SupportFlexibility
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import case_of, measured
-from effect_checks import changed_matrices, check_neutral, compare
 
 FrameBuilder = Callable[..., Frame]
 EFFECT = SupportFlexibility()
@@ -222,6 +218,7 @@ def test_a_foot_that_turns_is_no_damage_beside_it(seed: int) -> None:
     assert found.causes[0] is cause
 
 
+@pytest.mark.slow(5)
 def test_one_soft_foot_of_two_is_found_in_a_finer_model(hframe: FrameBuilder) -> None:
     feet = tuple(Support(Place(joint=j), ("x", "z", "ry")) for j in ("L1", "L2"))
     nominal = replace(hframe(mesh=(8, 4, 8)), supports=feet)

@@ -214,6 +214,7 @@ def can_mount() -> bool:
     return bool(shutil.which("unshare")) and subprocess.run(words, check=False).returncode == 0
 
 
+@pytest.mark.slow(5)
 @pytest.mark.skipif(not can_mount(), reason="no user namespaces to mount a small disk in")
 @pytest.mark.parametrize(
     ("kib", "code", "told"),
@@ -230,7 +231,6 @@ def test_a_disk_that_is_full(kib: int, code: int, told: str, tmp_path: Path) -> 
         capture_output=True,
         text=True,
         check=False,
-        timeout=300,
     )
     assert done.returncode == code
     first, *rest = done.stderr.splitlines()

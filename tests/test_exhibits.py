@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import os
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from effect_checks import as_matrices
 from scipy.sparse.csgraph import connected_components
 
 from femubench.core.case.case import Case
@@ -32,9 +32,6 @@ from femubench.core.run.jobs import _parameter
 from femubench.core.score.scoring import score_model
 from femubench.core.update.strategy import UpdateResult
 from femubench.scenarios import HERE
-
-sys.path.insert(0, str(Path(__file__).parent))
-from effect_checks import as_matrices
 
 STRATEGIES = load_plugins().strategies
 KEY = "0123456789abcdef"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import sys
 from collections import Counter
 from collections.abc import Callable
 from contextlib import redirect_stdout
@@ -16,17 +15,15 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 from hypothesis import HealthCheck, given, settings, strategies as st
+from mutations import changed_json, edits, json_edits, mutated
+from seeds import CASES, matrix_case, run_text, store_text, universal_case
+from watch import watched
 
 from femubench import FemubenchError, InputError, read_case
 from femubench.core.cli.main import bench
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.schema.records import read_run
 from femubench.results import Store
-
-sys.path.insert(0, str(Path(__file__).parent / "fuzz"))
-from mutations import changed_json, edits, json_edits, mutated
-from seeds import CASES, matrix_case, run_text, store_text, universal_case
-from watch import watched
 
 FEW, MANY = 0.012, 1.0  # share of the inputs in the tests of every day
 INPUTS = {
@@ -205,12 +202,13 @@ def check(folder: Path, share: float, format: str) -> None:
     (results_format if format in ("run", "store") else case_format)(folder, share, format)
 
 
+@pytest.mark.slow(20)
 @pytest.mark.parametrize("format", FORMATS)
 def test_a_few(tmp_path: Path, format: str) -> None:
     check(tmp_path, FEW, format)
 
 
-@pytest.mark.fuzz
+@pytest.mark.nightly
 @pytest.mark.parametrize("format", FORMATS)
 def test_many(tmp_path: Path, format: str) -> None:
     check(tmp_path, MANY, format)

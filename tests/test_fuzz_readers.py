@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import resource
 import shutil
-import sys
 from collections import Counter
 from contextlib import nullcontext, redirect_stdout, suppress
 from io import StringIO
@@ -13,16 +12,13 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
+from bytes_changed import broken
+from test_model_readers import FORMATS, JOB, WRITERS, Files, base, rounded
+from watch import watched
 
 from femubench import FemubenchError
 from femubench.core.case.model_files import ModelFiles, read_model
 from femubench.core.plugin.loader import load_plugins
-
-sys.path.insert(0, str(Path(__file__).parent / "fuzz"))
-sys.path.insert(0, str(Path(__file__).parent))
-from bytes_changed import broken
-from test_model_readers import FORMATS, JOB, WRITERS, Files, base, rounded
-from watch import watched
 
 FEW, MANY, MANY_APART = 6, 3000, 60
 LARGEST = 2**30  # bytes that reading may take
@@ -126,7 +122,7 @@ def test_a_few(kind: str, tmp_path: Path) -> None:
     assert check(kind, tmp_path, count, 0).total() == count
 
 
-@pytest.mark.fuzz
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", [*WRITERS, "calculix", "ansys", *REAL])
 def test_many(kind: str, tmp_path: Path) -> None:
     count = MANY_APART if kind in APART else MANY

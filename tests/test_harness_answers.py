@@ -480,7 +480,7 @@ def test_members_in_billions_of_elements_are_not_meshed() -> None:
     assert "more than the" in verdict_on(forged(many))["reason"]
 
 
-@pytest.mark.parametrize("count", [2000, pytest.param(20_000, marks=pytest.mark.fuzz)])
+@pytest.mark.parametrize("count", [2000, pytest.param(20_000, marks=pytest.mark.nightly)])
 def test_broken_answers_are_read_or_refused_in_one_line(count: int) -> None:
     """No other exception, no module, no memory beyond that of the bytes."""
     numbers, whole = random.Random(5), forged(lambda head, arrays: None)

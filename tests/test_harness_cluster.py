@@ -31,7 +31,9 @@ from femubench.core.schema.run_options import Where
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
 
-JOBS = 200  # of the run with two kills; 10 000 in `make sweep`
+pytestmark = pytest.mark.slow(40)
+
+JOBS = 200  # of the run with two kills; 10 000 in `make nightly`
 ROOT = Path(__file__).parents[1]
 QUIET = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
 
@@ -96,7 +98,7 @@ def test_a_run_whose_workers_are_killed_twice_ends_like_one_of_this_machine(
     check_kills(open_two, JOBS, tmp_path)
 
 
-@pytest.mark.sweep
+@pytest.mark.nightly
 def test_ten_thousand_jobs_with_two_kills(open_two: DaskWorkers, tmp_path: Path) -> None:
     check_kills(open_two, 10_000, tmp_path)
 
@@ -300,7 +302,7 @@ kill -9 -- "-$1"
 """
 
 
-@pytest.mark.sweep
+@pytest.mark.nightly
 def test_jobs_of_a_stand_in_for_slurm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its `sbatch` runs a job script at once; one of the two jobs is taken away."""
     for name, text in (("sbatch", SUBMIT), ("scancel", CANCEL)):

@@ -85,6 +85,7 @@ class Served:
         self._socket.close()
 
 
+@pytest.mark.slow(40)
 @needed
 def test_a_scanner_finds_nothing_in_the_sandbox(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -94,6 +95,7 @@ def test_a_scanner_finds_nothing_in_the_sandbox(
     assert result.provenance["sandbox"] == "namespaces"
 
 
+@pytest.mark.slow(20)
 def test_the_same_scanner_finds_what_was_planted_without(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

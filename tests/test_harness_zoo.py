@@ -30,6 +30,8 @@ sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
 import zoo
 
+pytestmark = pytest.mark.slow(20)
+
 GOOD = (toys.Unchanged(), toys.Softer(), toys.Grounded())
 MEMORY = 400 * MIB
 

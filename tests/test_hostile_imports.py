@@ -179,6 +179,7 @@ def faults(said: str) -> dict[str, str]:
     return dict(re.findall(r"^bench: plugin '(\S+)' \(\S+ 1\.0\)(?: in \S+)?: (.*)$", said, re.M))
 
 
+@pytest.mark.slow(20)
 def test_the_list_shows_what_each_did_to_itself_alone(hostile: Path, tmp_path: Path) -> None:
     code, plain, _, _ = bench("plugins", "list", cwd=tmp_path)
     again, listed, said, modules = bench("plugins", "list", site=hostile, cwd=tmp_path)
@@ -197,6 +198,7 @@ def test_the_list_shows_what_each_did_to_itself_alone(hostile: Path, tmp_path: P
     assert not list(hostile.glob("*.left"))
 
 
+@pytest.mark.slow(20)
 def test_a_run_of_others_is_as_without_them(hostile: Path, tmp_path: Path) -> None:
     found = []
     for name, site in (("plain", None), ("beside", hostile)):
@@ -323,6 +325,7 @@ def fine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     sys.modules.pop(MODULE, None)
 
 
+@pytest.mark.slow(20)
 def test_no_command_imports_a_stranger(fine: Path, tmp_path: Path) -> None:
     store = ("--store", str(tmp_path / "store"))
     file = tmp_path / "run.json"
@@ -417,6 +420,7 @@ def test_its_version_changes_with_its_source(fine: Path) -> None:
     assert MODULE not in sys.modules
 
 
+@pytest.mark.slow(10)
 def test_faults_of_folders_and_reports_are_told(fine: Path, tmp_path: Path) -> None:
     plugins = load_plugins()
     with pytest.raises(InputError, match=r"^the licence is missing$"):

@@ -36,6 +36,7 @@ def found(small: Any) -> Identification:
     return identify(small.measured)
 
 
+@pytest.mark.slow(5)
 def test_all_modes_of_a_full_set_are_found() -> None:
     truth = frf_set(1)
     judged = score(truth, identify(truth.measured))
@@ -43,6 +44,7 @@ def test_all_modes_of_a_full_set_are_found() -> None:
     assert judged.extra == 0
 
 
+@pytest.mark.slow(5)
 def test_stated_deviations_are_those_of_repeats(small: Any) -> None:
     """The scatter over several structures, in stated deviations; chance gives 0.7 to 1.3."""
     scores = [score(s, identify(s.measured)) for s in (frf_set(k, **SMALL) for k in range(20, 25))]
@@ -197,6 +199,7 @@ def test_files_hold_the_same(
         assert read.responses.xyz == pytest.approx(part.responses.xyz, abs=1e-6)
 
 
+@pytest.mark.slow(5)
 def test_the_command_writes_tables_that_a_case_reads(tmp_path: Path, small: Any) -> None:
     file = write_universal(tmp_path / "test.uff", small.measured)
     done = CliRunner().invoke(bench, ["identify", str(file), "--output", str(tmp_path / "out")])

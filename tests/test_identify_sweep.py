@@ -10,7 +10,7 @@ from benchmarks.identify_sweep import one
 from tests.identify_score import NAMES, covered
 
 
-@pytest.mark.sweep
+@pytest.mark.nightly
 def test_a_hundred_fresh_sets() -> None:
     with ProcessPoolExecutor(2) as pool:
         scores = list(pool.map(one, [(seed, 3) for seed in range(1000, 1100)]))

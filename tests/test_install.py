@@ -21,6 +21,8 @@ from zipfile import ZipFile
 
 import pytest
 
+pytestmark = pytest.mark.slow(20)
+
 ROOT = Path(__file__).parents[1]
 ROOMS = ("core", "papers", "plugins", "reports", "scenarios")
 FILES = ("LICENSE", "Makefile", "README.md", "pyproject.toml", "setup.py", ".gitignore")

@@ -62,6 +62,7 @@ def under(**kernel: str) -> Any:
     return json.loads(answer.stdout)
 
 
+@pytest.mark.slow(10)
 def test_two_kernels_give_one_answer() -> None:
     """The processor's own and one that every x86-64 has; where there is no other, the same."""
     one, two = under(), under(OPENBLAS_CORETYPE="Nehalem")
@@ -132,6 +133,7 @@ def test_a_drawn_shape_has_one_sign() -> None:
     np.testing.assert_allclose(*found, atol=1e-9)
 
 
+@pytest.mark.slow(5)
 def test_mirrored_places_are_said_to_tie() -> None:
     """Frequencies alone cannot tell the front of a table from its back."""
     said = diagnose(draw_case(4005, "C", structure="table", effect="member-mass").case)

@@ -160,6 +160,7 @@ class TestEveryCommandOfTheReadme:
         assert found.causes[0].effect == "torsion-constant"
         assert found.sentence in " ".join(str(femubench.report(found)).split())
 
+    @pytest.mark.slow(5)
     def test_identify(self) -> None:
         measured = frf_set(4, modes=4, pairs=0, references=1, step=0.5, band=(20.0, 200.0)).measured
         write_universal(Path("test.uff"), measured)
@@ -358,6 +359,7 @@ class TestRank:
         assert labelled(Plain(2.0)).name == "duck:size=2.0"
         assert labelled(Plain()).name == "duck"
 
+    @pytest.mark.slow(5)
     @pytest.mark.parametrize("how", ["script", "stdin"])
     def test_a_class_of_a_script_or_notebook_needs_no_guard(self, folder: Path, how: str) -> None:
         """It is sent with its code, and the script itself does not run again in a worker."""
@@ -443,6 +445,7 @@ class TestOptionsOfARun:
             femubench.study("study.toml", seeds=1)  # type: ignore[call-arg]
 
 
+@pytest.mark.slow(10)
 def test_the_page_of_the_docs_runs() -> None:
     """All its snippets are one script, as a reader types them."""
     text = (ROOT / "docs" / "library.md").read_text(encoding="utf-8")

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
+from look_checks import look, measured, texts
 
 from femubench.core.effect.attachments import total_mass
 from femubench.core.fem.frame import (
@@ -37,9 +36,6 @@ from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.typing import FloatArray
 from femubench.plugins.effects.torsion_constant import estimated_torsion_constant, is_round
-
-sys.path.insert(0, str(Path(__file__).parent))
-from look_checks import look, measured, texts
 
 FrameBuilder = Callable[..., Frame]
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from look_checks import look, measured, texts
 
 from femubench.core.effect.attachments import total_mass
 from femubench.core.fem.frame import Factor, Frame, Place, PointMass, Preload
@@ -18,9 +17,6 @@ from femubench.core.fem.structure import Structure
 from femubench.core.fit.mesh_error import mesh_bias, refined
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.typing import FloatArray
-
-sys.path.insert(0, str(Path(__file__).parent))
-from look_checks import look, measured, texts
 
 FrameBuilder = Callable[..., Frame]
 

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from look_checks import look, measured, midpoints, texts
 
 from femubench.core.fem.frame import Factor, Frame, Place, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
-
-sys.path.insert(0, str(Path(__file__).parent))
-from look_checks import look, measured, midpoints, texts
 
 FrameBuilder = Callable[..., Frame]
 

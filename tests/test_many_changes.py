@@ -75,6 +75,7 @@ def elastic_gap(found: Modes, expected: Modes) -> float:
     return float(np.abs(ratio - 1.0).max())
 
 
+@pytest.mark.slow(5)
 def test_a_hundred_changes_are_those_of_full_solutions(small: Model) -> None:
     many = many_changes(small, COUNT)
     proven = 0

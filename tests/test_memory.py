@@ -46,9 +46,10 @@ def tested() -> tuple[Model, Measurement]:
 def every_strategy() -> list[object]:
     """Return all strategies, those that take minutes here as part of the sweep."""
     names = [name for name in sorted(load_plugins().strategies) if not name.startswith(OTHERS)]
-    return [n if n in QUICK else pytest.param(n, marks=pytest.mark.sweep) for n in names]
+    return [n if n in QUICK else pytest.param(n, marks=pytest.mark.nightly) for n in names]
 
 
+@pytest.mark.slow(5)
 @pytest.mark.parametrize("name", every_strategy())
 def test_no_strategy_makes_a_dense_matrix(name: str, tested: tuple[Model, Measurement]) -> None:
     model, measurement = tested

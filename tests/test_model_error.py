@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnosis_problems import effects_named, measured, part_at, problem_of
 from scipy.stats import multivariate_normal
 
 from femubench import Model
@@ -28,9 +27,6 @@ from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.prior import Base
 from femubench.effect import member_length, total_mass
 from femubench.fem import FloatArray, Frame, PointMass
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import effects_named, measured, part_at, problem_of
 
 FRAME = structure_named("portal").frame
 MODEL = Model.of(FRAME)

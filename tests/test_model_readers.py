@@ -320,6 +320,7 @@ def test_calculix_jobs_are_written(tmp_path: Path) -> None:
     check_same(model, back)
 
 
+@pytest.mark.slow(5)
 def test_ansys_files_have_the_frequencies_of_ansys(tmp_path: Path) -> None:
     # What the package brings is read in place; the frequencies are those of its documentation.
     package = find_spec("ansys.mapdl.reader")
@@ -355,10 +356,11 @@ def plates(tmp_path_factory: pytest.TempPathFactory) -> Path:
     deck = (folder / "plates.inp").read_text().replace(", SOLVER=MATRIXSTORAGE", "")
     (folder / "frequencies.inp").write_text(deck)
     for job in ("plates", "plates_left", "plates_right", "frequencies"):
-        subprocess.run([CCX, job], cwd=folder, check=True, capture_output=True, timeout=100)
+        subprocess.run([CCX, job], cwd=folder, check=True, capture_output=True)
     return folder
 
 
+@pytest.mark.slow(5)
 def test_a_solid_has_the_frequencies_of_calculix(plates: Path) -> None:
     model = femubench.read_model(plates / "plates.inp", unit="mm")
     assert model.size == 2655
@@ -397,6 +399,7 @@ def fresh_plates(folder: Path) -> Path:
     return Path(shutil.copytree(PLATES, folder / "plates"))
 
 
+@pytest.mark.slow(20)
 def test_five_commands_lead_from_a_job_to_a_ranking(tmp_path: Path) -> None:
     told = run_documented(fresh_plates(tmp_path), last=" -s unchanged -s berman --nominal drawn")
     case = femubench.read_case(tmp_path / "plates" / "case", readers=READERS)
@@ -407,7 +410,7 @@ def test_five_commands_lead_from_a_job_to_a_ranking(tmp_path: Path) -> None:
     assert ranked[:2] == [("1", "berman"), ("2", "unchanged")]
 
 
-@pytest.mark.sweep
+@pytest.mark.nightly
 def test_five_commands_rank_all_strategies(tmp_path: Path) -> None:
     told = run_documented(fresh_plates(tmp_path))
     assert "diagnosed" in told.splitlines()[2]

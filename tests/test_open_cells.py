@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
-import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from equation_readings import Reading, expanded, nominal_of, predicted, solution, system
+from ladder_settings import FRAME, patterns
+from nearest_model import nearest_with
+from open_cells import COLUMNS, PAGE, column, deviation, grid
+from open_cells_numbering import EACH, MEMBERS
 
 from femubench import InputError, Strategy, read_case, solve_modes
 from femubench.core.plugin.variants import strategy_of
@@ -17,13 +20,6 @@ from femubench.papers.frame import readings
 from femubench.plugins.strategies.generic import GenericAdjusted, GenericLS
 from femubench.plugins.strategies.nobari import Nobari
 from femubench.plugins.strategies.physical import Physical
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-from equation_readings import Reading, expanded, nominal_of, predicted, solution, system
-from ladder_settings import FRAME, patterns
-from nearest_model import nearest_with
-from open_cells import COLUMNS, PAGE, column, deviation, grid
-from open_cells_numbering import EACH, MEMBERS
 
 STRATEGIES: dict[str, Strategy] = {
     s.name: s for s in (Physical(), Nobari(), GenericLS(), GenericAdjusted())
@@ -78,6 +74,7 @@ def test_that_is_what_the_printed_frequencies_would_need() -> None:
     assert there > 0.9 * nominal
 
 
+@pytest.mark.slow(5)
 def test_nearest_model_with_the_measured_frequencies_is_near_least_squares() -> None:
     _, met = predicted(Reading(iterations=1))
     _, least, there, _ = nearest_with(Reading(), met)

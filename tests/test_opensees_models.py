@@ -10,12 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from test_peer import opensees_environment
 
 import femubench
 from femubench import fem
-
-sys.path.insert(0, str(Path(__file__).parent))
-from test_peer import opensees_environment
 
 Told = tuple[dict[str, Any], Path]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import re
-import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from synthetic_run import synthetic_run
 
 from femubench.core.score.comparison import Against, compare_runs
 from femubench.core.score.statistics import Groups
@@ -34,10 +34,6 @@ from femubench.results import (
     run_to_json,
     tell_apart,
 )
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-
-from synthetic_run import synthetic_run
 
 ASSETS = Path(__file__).parents[1] / "reports" / "page" / "assets"
 SMALL = synthetic_run(6, 8, seeds=2)
@@ -209,6 +205,7 @@ class TestStatistics:
         ]
         assert p == 1.0
 
+    @pytest.mark.slow(5)
     def test_many_overlapping_groups_become_stretches(self) -> None:
         run = synthetic_run(120, 30)
         found = outcome_of(run)

@@ -24,6 +24,8 @@ from femubench.papers.frame.common import CASE, TRUTH, rigid_modes, strain_modes
 from femubench.papers.printed import printed
 from femubench.reproduction import Cell, Extra, Study, Workbench
 
+pytestmark = pytest.mark.slow(20)
+
 Key = tuple[str, str, str]
 MEASURED = np.array([226.8, 275.2, 537.4])
 

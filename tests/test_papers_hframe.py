@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from printed_boards import text_of
 
 from femubench import Model, read_case
 from femubench.core.library.report import rendering
@@ -27,8 +26,7 @@ from femubench.papers.printed import printed
 from femubench.reproduction import VERDICTS, Bars, Cell, Study, Workbench
 from femubench.scenarios import HERE
 
-sys.path.insert(0, str(Path(__file__).parent))
-from printed_boards import text_of
+pytestmark = pytest.mark.slow(20)
 
 Cells = dict[tuple[str, str, str], Cell]
 PAIRS = (*((k, k) for k in range(1, 7)), (8, 7))  # the twin's MAC is none of the test's

@@ -6,11 +6,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
+import diagnosis_toys
+import harness_toys
 import numpy as np
 import pytest
+from diagnosis_toys import STRUCTURE, data_of
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
@@ -36,11 +38,6 @@ from femubench.modal import mac
 from femubench.plot import wireframe_of
 from femubench.results import Block, PairedMode
 from femubench.scenarios import HERE
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import diagnosis_toys
-import harness_toys
-from diagnosis_toys import STRUCTURE, data_of
 
 
 @pytest.fixture(scope="module")

@@ -13,6 +13,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from distributions import install_metadata
 
 from femubench import (
     Measurement,
@@ -60,12 +61,7 @@ def distribution(folder: Path, name: str, source: str, *, version: str = "1.0") 
     """Put an installed distribution with one plugin module there, as pip would."""
     module = f"{name.replace('-', '_')}_plugin"
     (folder / f"{module}.py").write_text(textwrap.dedent(source), encoding="utf-8")
-    info = folder / f"{module}-{version}.dist-info"
-    info.mkdir()
-    metadata = f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n"
-    (info / "METADATA").write_text(metadata, encoding="utf-8")
-    entry_points = f"[femubench]\n{name}-entry = {module}\n"
-    (info / "entry_points.txt").write_text(entry_points, encoding="utf-8")
+    install_metadata(folder, name, {f"{name}-entry": module}, version)
 
 
 @pytest.fixture

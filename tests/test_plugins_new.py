@@ -26,6 +26,8 @@ from femubench.core.library.new_package import KINDS, write_package
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import KINDS as COLLECTIONS
 
+pytestmark = pytest.mark.slow(10)
+
 SITE = Path(str(femubench.__file__)).parents[1]
 LONGEST = "a-method-that-has-got-a-rather-long-name"
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
+import harness_toys as toys
 import numpy as np
 import pytest
 
@@ -18,9 +17,6 @@ from femubench.core.update.posterior_sampling import StretchMove
 from femubench.core.update.quadratic_fit import QuadraticFit, coefficients_of
 from femubench.plugins.strategies.sampling import BayesianSampling
 from femubench.update import Discrepancy
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
 
 CASE = toys.tiny_case()
 
@@ -48,6 +44,7 @@ def test_a_quadratic_function_is_met_and_others_have_their_error() -> None:
     assert coefficients_of(3) == 10
 
 
+@pytest.mark.slow(5)
 def test_the_posterior_is_that_of_exact_solutions() -> None:
     """Weighed draws of a wider distribution, every one solved, give the same mean and spread."""
     measurement, discrepancy = CASE.used_measurement(), Discrepancy(0.02, 0.01)
@@ -75,6 +72,7 @@ def test_the_posterior_is_that_of_exact_solutions() -> None:
         assert parameter.std / parameter.after == pytest.approx(std[k], rel=0.25)
 
 
+@pytest.mark.slow(5)
 def test_the_discrepancy_grows_with_what_the_model_cannot_follow() -> None:
     measurement = CASE.used_measurement()
     spoiled = replace(measurement, frequencies=measurement.frequencies * [1.0, 1.25, 0.8])

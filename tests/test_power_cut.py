@@ -16,7 +16,8 @@ from femubench.core.run.store import Store
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block, JobResult
 
-RUN, JOBS, CUTS = "20260101T000000Z-000000", 30, 200
+RUN, JOBS = "20260101T000000Z-000000", 30
+CUTS, FEW = 200, 20  # all of them in `make nightly`
 META = {"run": RUN, "seeds": [*range(JOBS)], "cases": {"corner": {}}, "strategies": ["a"]}
 PAGE = 512  # bytes that a disk writes whole
 
@@ -85,7 +86,9 @@ class Later:
         Later.due.append(self._call)
 
 
-@pytest.mark.parametrize("seed", range(CUTS))
+@pytest.mark.parametrize(
+    "seed", [*range(FEW), *(pytest.param(n, marks=pytest.mark.nightly) for n in range(FEW, CUTS))]
+)
 def test_nothing_acknowledged_is_lost(
     seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

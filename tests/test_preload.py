@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import scipy.linalg as la
+from diagnosis_problems import case_of, measured
+from effect_checks import check_neutral, compare
 
 from femubench import diagnose
 from femubench.core.errors import ModelError
@@ -44,10 +44,6 @@ from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
 from femubench.plugins.effects.gravity_stiffness import GravityStiffness
-
-sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import case_of, measured
-from effect_checks import check_neutral, compare
 
 STEEL = Material(210e9, 0.3, 7850.0)
 SECTION = Section(A=4e-4, Iy=3e-9, Iz=5e-8, J=2e-9, Jp=5.3e-8)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
+import harness_toys as toys
 import pytest
 from click.testing import CliRunner, Result
+from run_edits import called, failed, moved, renamed, scaled, versioned
 
 from femubench.core.cli.main import bench
 from femubench.core.publish import publishing
@@ -20,10 +21,6 @@ from femubench.core.publish.submissions import slug
 from femubench.core.run.runner import run_jobs
 from femubench.core.schema.records import read_run, run_from_json, run_to_json
 from femubench.results import leaderboard
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
-from run_edits import called, failed, moved, renamed, scaled, versioned
 
 Data = dict[str, Any]
 HOSTILE = "../../<script>alert(1)</script>\"'\x1b[2J"

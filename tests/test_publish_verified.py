@@ -16,6 +16,8 @@ from femubench.core.library.rank import rank
 from femubench.core.library.report import report
 from femubench.core.run.provenance import plan_digest
 
+pytestmark = pytest.mark.slow(10)
+
 Data = dict[str, Any]
 Edit = Callable[[Data], object]
 

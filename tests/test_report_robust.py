@@ -11,10 +11,11 @@ import webbrowser
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
+from synthetic_run import synthetic_run
+from test_page_data import data_in
 
 from femubench.core.cli.main import bench
 from femubench.core.run.upkeep import exported
@@ -23,22 +24,12 @@ from femubench.reports.htmls import HtmlReporter
 from femubench.reports.runs import MarkdownReporter, TerminalReporter
 from femubench.results import Run, Store, results_frame, run_to_json
 
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-
-from synthetic_run import synthetic_run
-
 RUN = synthetic_run(4, 6)
 RUN_ID = RUN.meta["run"]
 EVIL = "<script>alert(1)</script>"
 TITLE = "\"quoted\" & 'so' </table></script> | `x` [l](javascript:alert(1))"
 
 Report = Callable[..., Result]
-
-
-def data_in(html: str) -> dict[str, Any]:
-    (text,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', html, re.S)
-    found: dict[str, Any] = json.loads(text)
-    return found
 
 
 def stored(folder: Path, run: Run = RUN, *, end: bool = True) -> Path:
@@ -330,11 +321,8 @@ def folder_of(result: Result) -> Path:
     return Path(result.stderr.removeprefix("html: ").strip()).parent
 
 
+@pytest.mark.slow(5)
 def test_a_diagnosis_is_reported_too(tmp_path: Path) -> None:
-    from click.testing import CliRunner
-
-    from femubench.core.cli.main import bench
-
     file = tmp_path / "found.json"
     runner = CliRunner()
     words = ["diagnose", "frame", "--json", str(file), "-q", "--no-pairs"]

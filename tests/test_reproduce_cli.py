@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+import reproduction_toys as toys
 from click.testing import CliRunner, Result
 
 import femubench.papers
@@ -17,9 +17,6 @@ from femubench.core.cli.main import bench
 from femubench.core.errors import StrategyFailure
 from femubench.core.reproduction.study import cells_to_json
 from femubench.reproduction import VERDICTS, Page, Study, Workbench
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import reproduction_toys as toys
 
 Invoke = Callable[..., Result]
 KEYS = [
@@ -240,6 +237,7 @@ ORDER = (
 )
 
 
+@pytest.mark.slow(10)
 class TestRealPaper:
     """The ladder frame in earnest: everything that the study holds comes through."""
 

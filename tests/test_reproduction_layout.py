@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
+import reproduction_toys as toys
 
 from femubench import InputError
 from femubench.papers.printed import equations
@@ -18,9 +16,6 @@ from femubench.reproduction import (
     places_of,
     under,
 )
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import reproduction_toys as toys
 
 CELLS = toys.study().cells
 MATH = "<math><mi>x</mi></math>"

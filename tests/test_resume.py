@@ -317,7 +317,8 @@ def timed(script: Path) -> float:
     return time.monotonic() - before
 
 
-@pytest.mark.parametrize("kills", [FEW_KILLS, pytest.param(MANY_KILLS, marks=pytest.mark.sweep)])
+@pytest.mark.slow(40)
+@pytest.mark.parametrize("kills", [FEW_KILLS, pytest.param(MANY_KILLS, marks=pytest.mark.nightly)])
 def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(
     kills: int, tmp_path: Path
 ) -> None:

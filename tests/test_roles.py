@@ -62,6 +62,7 @@ def test_a_strategy_that_inherits_nothing_is_one() -> None:
     assert not issubclass(Duck, Strategy)
 
 
+@pytest.mark.slow(5)
 def test_it_is_ranked_and_passes_the_checks(here: Path) -> None:
     words = ["run", "rod", "-s", "duck", "-s", "unchanged", "-q", "--json", "run.json", "-j", "1"]
     assert CliRunner().invoke(bench, words).exit_code == 0
@@ -100,6 +101,7 @@ def test_an_effect_that_inherits_nothing_is_tabulated(tmp_path: Path) -> None:
     assert found.parameters[0].name == "softer"
 
 
+@pytest.mark.slow(20)
 def test_type_checkers_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     report, errors, code = api.run(["--strict", str(DUCK)])

@@ -44,6 +44,7 @@ def regenerated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
+@pytest.mark.slow(5)
 @pytest.mark.parametrize("file", DATA, ids=str)
 def test_data_are_what_their_generator_writes(regenerated: Path, file: Path) -> None:
     stored, made = pd.read_csv(HERE / file), pd.read_csv(regenerated / file)

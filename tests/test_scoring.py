@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
+import harness_toys as toys
 import numpy as np
 import pytest
 
@@ -29,9 +28,6 @@ from femubench.core.score.scoring import (
     score_model,
 )
 from femubench.results import ranks_by_floor, scored_on
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
 
 
 @pytest.fixture(scope="module")

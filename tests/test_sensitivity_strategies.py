@@ -203,6 +203,7 @@ def test_global_gives_the_factor_that_its_residual_asks_for(ladder: Any, residua
         assert abs(factor / nearest_factor(other, LADDER_HZ, nominal) - 1.0) > 1e-3
 
 
+@pytest.mark.slow(5)
 def test_spring_comes_nearer_to_the_data_the_weaker_its_damping(hframe_case: Any) -> None:
     costs = [
         Spring(options=UpdateOptions(damping=damping)).update(*hframe_case, RNG).history[-1]["cost"]
@@ -583,6 +584,7 @@ def test_the_linear_gaussian_limit_has_the_closed_form(ladder: Any) -> None:
     )
 
 
+@pytest.mark.slow(5)
 def test_the_stated_deviations_are_right(ladder: Any) -> None:
     """Truths from the prior, data from the truths: (theta_hat - theta) / std is a unit normal."""
     rng = np.random.default_rng(21)

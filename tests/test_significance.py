@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
+import harness_toys as toys
 import numpy as np
 import pytest
 from scipy.stats import t as student
@@ -27,9 +26,6 @@ from femubench.results import (
     run_to_json,
     tell_apart,
 )
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
 
 TRIALS = 400
 BLOCKS = ("used", "higher", "modified")

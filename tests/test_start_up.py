@@ -122,6 +122,7 @@ def names(requirements: list[str]) -> set[str]:
     return {re.split(r"[^\w-]", text)[0].lower().replace("-", "_") for text in requirements}
 
 
+@pytest.mark.slow(10)
 def test_dependencies_are_what_is_imported() -> None:
     found = {entry for path in FILES for entry in third_party(path)}
     extras = PROJECT["optional-dependencies"]

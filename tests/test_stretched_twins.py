@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import harness_toys as toys
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from twin_toys import Ratios
 
 import femubench
 from femubench import read_case
@@ -36,10 +37,6 @@ from truths.stretch import stretch_of
 from truths.stretch_file import HELD_OUT_SEED, SUITE, distance, file_of, held_out, main, solid_of
 from truths.structure import STEEL, Change, Lump, Member, Spring, Structure
 from truths.suite import structures
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
-from twin_toys import Ratios
 
 FILES = sorted(SUITE.glob(f"*/{FILE}"))
 NAMES = [file.parent.name for file in FILES]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-import sys
 import tomllib
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
+from printed_boards import as_printed, assert_board_is_that_of, assert_same_errors, stored, text_of
 
 import femubench
 from femubench import read_case
@@ -18,9 +18,6 @@ from femubench.core.score.predictive import Forecasts
 from femubench.core.score.scoring import reference_of
 from femubench.results import leaderboard, structures_of, tell_apart
 from truths.published import write_garteur
-
-sys.path.insert(0, str(Path(__file__).parent))
-from printed_boards import as_printed, assert_board_is_that_of, assert_same_errors, stored, text_of
 
 ROOT = Path(__file__).parents[1]
 SUITE = ROOT / "scenarios" / "suite"
@@ -122,6 +119,6 @@ def test_what_the_documents_say_of_the_board() -> None:
     assert int((data["skill"] < 0.0).sum()) == 11
 
 
-@pytest.mark.sweep
+@pytest.mark.nightly
 def test_the_run_kept_is_what_runs_today() -> None:
     assert_same_errors(stored("suite"), femubench.rank("suite", jobs=2))

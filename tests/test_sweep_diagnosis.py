@@ -7,17 +7,13 @@ records and draws them.
 from __future__ import annotations
 
 import multiprocessing
-import sys
 from concurrent.futures import ProcessPoolExecutor
-from pathlib import Path
 
 import pytest
+from blind_sweep import BARS, Goal, Record, SweepCase, run_task, tasks
 from threadpoolctl import threadpool_limits
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-from blind_sweep import BARS, Goal, Record, SweepCase, run_task, tasks
-
-pytestmark = pytest.mark.sweep
+pytestmark = pytest.mark.nightly
 
 
 def diagnosed(task: SweepCase) -> Record:

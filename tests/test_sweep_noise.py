@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
+from printed_boards import assert_board_is_that_of, assert_same_errors, stored
 
 import femubench
-
-sys.path.insert(0, str(Path(__file__).parent))
-from printed_boards import assert_board_is_that_of, assert_same_errors, stored
 
 
 def test_the_board_in_the_docs_is_that_of_the_run_kept() -> None:
@@ -19,7 +14,7 @@ def test_the_board_in_the_docs_is_that_of_the_run_kept() -> None:
     assert_board_is_that_of(run, "docs/scoring.md")
 
 
-@pytest.mark.sweep
+@pytest.mark.nightly
 def test_the_run_kept_is_what_runs_today() -> None:
     kept = stored("noise")
     assert_same_errors(kept, femubench.rank(list(kept.meta["cases"]), seeds=3))

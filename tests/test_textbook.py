@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
+import harness_toys as toys
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from effect_checks import as_matrices
 
 import femubench
 from femubench import NotApplicable
@@ -20,11 +21,6 @@ from femubench.effect import textbook_model, textbook_values
 from femubench.fem import bredt
 from femubench.results import run_from_json, run_to_json, score_model
 from tests.test_cli import put_distribution
-
-sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
-from effect_checks import as_matrices
 
 EFFECTS = registered_effects()
 

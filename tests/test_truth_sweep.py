@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import shutil
-import sys
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+import truth_sweep as sweep
 
 from femubench import read_case
 from femubench.core.challenge.truth_file import KnownCase, TrueCause, held
 from femubench.core.diagnosis import diagnose as diagnosing
 from truths.truth_text import truth_text
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-import truth_sweep as sweep
 
 ROOT = Path(__file__).parents[1]
 LOOSE = TrueCause("a loose joint", "joint-rotation", "J1", ("joint-rotation@J9", "joint-offset@J1"))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import tomllib
 from collections import Counter
 from collections.abc import Callable
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from small_suite import SUPPORTED, write_suite
 
 from femubench import Case, InputError, read_case, solve_modes
 from femubench.core.challenge.posing import overlay
@@ -21,9 +21,6 @@ from femubench.fem import FloatArray
 from truths import faults
 from truths.faults import FAULT_KINDS, Draft, Structure, drafts, files_of, visibility, write_faults
 from truths.posing import FAULTS, SUITE
-
-sys.path.insert(0, str(Path(__file__).parent))
-from small_suite import SUPPORTED, write_suite
 
 Drawn = tuple[Structure, KnownCase, Draft]
 

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from small_suite import write_suite
 
 from femubench import InputError, read_case
 from femubench.core.challenge.truth_file import KnownCase, TrueCause, held, read_truth
 from truths.posing import DEFECTS, SUITE, pose
 from truths.truth_text import truth_text
-
-sys.path.insert(0, str(Path(__file__).parent))
-from small_suite import write_suite
 
 CAUSES = (
     TrueCause("a loose joint", "joint-rotation", "J5", ("joint-rotation@T",), 1.25e5, "N m/rad"),

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import pytest
-
-from femubench.results import Block, JobResult, Run
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 from ablation import effects_of
 from tuning import tuned
 from unseen import mean_ratio, unseen_logs
+
+from femubench.results import Block, JobResult, Run
 
 CASES = {"a": "one", "b": "two", "b-changed": "two", "c": "three"}
 REFERENCE = {"used": 1.0, "higher": 2.0, "modified": 4.0}

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import harness_toys as toys
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from twin_toys import Chance, Drawn, Memory
 
 import femubench
 from femubench.core.case.case import Case
@@ -56,10 +57,6 @@ from femubench.core.twin.similarity import Similarity, matrix_factors, similar_c
 from femubench.core.twin.twins import FAMILIES, Twin, again, twin_of, twins_of
 from femubench.core.typing import SparseArray
 from femubench.results import leaderboard
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
-from twin_toys import Chance, Drawn, Memory
 
 BY = Similarity(length=1.3, modulus=0.7, density=1.4)
 COMPUTED = ["frame-solid", "hframe-solid", "frame-beam", "suite/bracket", "suite/tower"]

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import inspect
 import pickle
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 
+import harness_toys as toys
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -27,9 +26,6 @@ from femubench.core.score.scoring import judge, reference_of
 from femubench.fem import FloatArray
 from femubench.results import leaderboard, run_from_json, run_to_json
 from femubench.update import MOST_SAMPLES, Uncertainty
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
 
 CASE = toys.tiny_case()
 

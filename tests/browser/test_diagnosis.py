@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import diagnosis_toys as toys
+
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
 from femubench.core.schema.diagnosis import Rival
 from femubench.reports.diagnosis import diagnosis_html
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "toys"))
-import diagnosis_toys as toys
 
 
 def page_of(tmp_path: Path, data: dict[str, Any]) -> Path:

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+import reproduction_toys as toys
 
 from femubench.core.library.reproduce import write_studies
 from femubench.reproduction import Choice, Convention, Equation
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "toys"))
-import reproduction_toys as toys
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,9 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,125 +29,144 @@ MARK = "femubench-zoo-animal"
 _SLEEPER = [sys.executable, "-c", f"import time; time.sleep(900)  # {MARK}"]
 
 
+ANIMALS: list[type[Animal]] = []
+# What the test has put up for burglars: a port, names, words.
+TARGET: dict[str, Any] = {}
+ESCAPED = ("failed", "RuntimeError: escaped")
+_LIBC = ctypes.CDLL(None, use_errno=True)
+
+
 class Animal(Strategy):
-    """Base of the zoo: `harm` does it, `ends` tells status and the beginning of the reason."""
+    """Base of the zoo: `harm` does it, `ends` is its status and the beginning of the reason."""
 
     citation = "none"
-    ends = ("ok", "")
+    ends: tuple[str, str]
     # The same without a sandbox: None where it would do harm to this machine.
-    loose: tuple[str, str] | None = ("same", "")
+    loose: tuple[str, str] | None
+    act: Callable[[Any], Any]
 
-    def harm(self, model: Model) -> Model:
-        """Do it; return a model."""
-        return model
+    def __init__(self) -> None:
+        self.target = dict(TARGET)
+
+    def harm(self, model: Model) -> Any:
+        """Do it; return another model, a result, or None for the model as it is."""
+        return self.act(model)
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator
     ) -> UpdateResult:
         """Do harm."""
-        return UpdateResult(self.harm(model))
+        found = self.harm(model)
+        return (
+            found
+            if isinstance(found, UpdateResult)
+            else UpdateResult(model if found is None else found)
+        )
 
 
-class Segfault(Animal):
-    name = "segfault"
-    ends = ("crashed", "the worker process was ended by SIGSEGV")
+class Burglar(Animal):
+    """Tries what a sandbox prevents; `act` returns whether it could."""
 
-    def harm(self, model: Model) -> Model:
-        ctypes.string_at(0)
-        return model
-
-
-class Exit(Animal):
-    name = "exit"
-    ends = ("crashed", "the worker process ended with exit code 0")
-
-    def harm(self, model: Model) -> Model:
-        os._exit(0)
+    def harm(self, model: Model) -> None:
+        """Try it."""
+        try:
+            found = self.act(self.target)
+        except OSError:
+            found = False
+        if found:
+            raise RuntimeError(f"escaped: {self.name}")
 
 
-class EndlessLoop(Animal):
-    name = "endless-loop"
-    ends = ("timeout", "no result within ")
+def animal(
+    status: str = "ok",
+    reason: str = "",
+    *,
+    loose: tuple[str, str] | None = ("same", ""),
+    base: type[Animal] = Animal,
+) -> Callable[[Callable[[Any], Any]], type[Animal]]:
+    """Return what makes an animal of a function, whose name it has, for a worker to import.
 
-    def harm(self, model: Model) -> Model:
-        while True:
-            pass
+    Arguments:
+        status, reason: with which it ends, the reason by its beginning.
+        loose: the same without a sandbox; None where it would do harm to this machine.
+    """
+
+    def make(act: Callable[[Any], Any]) -> type[Animal]:
+        named = {"name": act.__name__.strip("_").replace("_", "-"), "__module__": __name__}
+        ends = {"ends": (status, reason), "loose": loose, "act": staticmethod(act)}
+        ANIMALS.append(type(act.__name__, (base,), {**named, **ends}))
+        return ANIMALS[-1]
+
+    return make
 
 
-class DeafLoop(Animal):
+burglar = partial(animal, loose=ESCAPED, base=Burglar)
+
+
+@animal("crashed", "the worker process was ended by SIGSEGV")
+def segfault(model: Model) -> None:
+    ctypes.string_at(0)
+
+
+@animal("crashed", "the worker process ended with exit code 0")
+def exit_(model: Model) -> None:
+    os._exit(0)
+
+
+@animal("timeout", "no result within ")
+def endless_loop(model: Model) -> None:
+    while True:
+        pass
+
+
+@animal("timeout", "no result within ")
+def deaf_loop(model: Model) -> None:
     """Does not listen to signals that can be ignored."""
-
-    name = "deaf-loop"
-    ends = ("timeout", "no result within ")
-
-    def harm(self, model: Model) -> Model:
-        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGALRM):
-            signal.signal(number, signal.SIG_IGN)
-        while True:
-            time.sleep(0.1)
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGALRM):
+        signal.signal(number, signal.SIG_IGN)
+    while True:
+        time.sleep(0.1)
 
 
-class Sleeper(Animal):
+@animal("timeout", "no result within ")
+def sleeper(model: Model) -> None:
     """Stops itself."""
-
-    name = "sleeper"
-    ends = ("timeout", "no result within ")
-
-    def harm(self, model: Model) -> Model:
-        os.kill(os.getpid(), signal.SIGSTOP)
-        return model
+    os.kill(os.getpid(), signal.SIGSTOP)
 
 
-class MemoryHog(Animal):
-    name = "memory-hog"
-    ends = ("failed", "out of memory: ")
-
-    def harm(self, model: Model) -> Model:
-        kept = []
-        while True:
-            kept.append(np.ones(2**22))
+@animal("failed", "out of memory: ")
+def memory_hog(model: Model) -> None:
+    kept = []
+    while True:
+        kept.append(np.ones(2**22))
 
 
-class MemoryHogs(Animal):
+@animal("crashed", "used ")
+def memory_hogs(model: Model) -> None:
     """Shares its hunger among children, each of them modest."""
-
-    name = "memory-hogs"
-    ends = ("crashed", "used ")
-
-    def harm(self, model: Model) -> Model:
-        for _ in range(8):
-            if os.fork() == 0:
-                kept = mmap.mmap(-1, 2**27)
-                kept.write(b"x" * 2**27)
-                time.sleep(60.0)
-        time.sleep(60.0)
-        return model
+    for _ in range(8):
+        if os.fork() == 0:
+            kept = mmap.mmap(-1, 2**27)
+            kept.write(b"x" * 2**27)
+            time.sleep(60.0)
+    time.sleep(60.0)
 
 
-class Chatterbox(Animal):
+@animal("crashed", "printed more than ")
+def chatterbox(model: Model) -> None:
     """Prints a gigabyte."""
-
-    name = "chatterbox"
-    ends = ("crashed", "printed more than ")
-
-    def harm(self, model: Model) -> Model:
-        line = b"x" * 2**20
-        for _ in range(1024):
-            os.write(1, line)
-        return model
+    line = b"x" * 2**20
+    for _ in range(1024):
+        os.write(1, line)
 
 
-class DiskFiller(Animal):
+@animal("failed", "OSError: [Errno 27] File too large")
+def disk_filler(model: Model) -> None:
     """Writes one endless file."""
-
-    name = "disk-filler"
-    ends = ("failed", "OSError: [Errno 27] File too large")
-
-    def harm(self, model: Model) -> Model:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (2**20, 2**20))  # so that the test is quick
-        with open("filler", "wb", buffering=0) as stream:
-            while True:
-                stream.write(b"x" * 2**18)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2**20, 2**20))  # so that the test is quick
+    with open("filler", "wb", buffering=0) as stream:
+        while True:
+            stream.write(b"x" * 2**18)
 
 
 class _Payload(Exception):  # noqa: N818
@@ -158,12 +178,9 @@ class _Payload(Exception):  # noqa: N818
         raise RuntimeError("not for you")
 
 
-class UnpicklableError(Animal):
-    name = "unpicklable-error"
-    ends = ("failed", "_Payload: 1")
-
-    def harm(self, model: Model) -> Model:
-        raise _Payload(1, 2)
+@animal("failed", "_Payload: 1")
+def unpicklable_error(model: Model) -> None:
+    raise _Payload(1, 2)
 
 
 class _Bomb:
@@ -173,483 +190,307 @@ class _Bomb:
         return os.system, (f"touch {Path.home()}/{MARK}",)
 
 
-class Trojan(Animal):
+@animal("failed", "the result cannot be read: ")
+def trojan(model: Model) -> None:
     """Hands back something that would run a command in the process that reads it."""
-
-    name = "trojan"
-    ends = ("failed", "the result cannot be read: ")
-
-    def harm(self, model: Model) -> Model:
-        code = pickle.dumps(_Bomb())
-        answers._sealed = lambda *_: b"o" + code
-        return model
+    code = pickle.dumps(_Bomb())
+    answers._sealed = lambda *_: b"o" + code
 
 
-class Vandal(Animal):
+@animal()
+def vandal(model: Model) -> None:
     """Breaks the libraries of its own process for all who come after."""
+    import scipy.linalg
+    import scipy.sparse.linalg
 
-    name = "vandal"
-    ends = ("ok", "")
+    def broken(*_: object, **__: object) -> None:
+        raise RuntimeError("broken by a vandal")
 
-    def harm(self, model: Model) -> Model:
-        import scipy.linalg
-        import scipy.sparse.linalg
-
-        def broken(*_: object, **__: object) -> None:
-            raise RuntimeError("broken by a vandal")
-
-        for module in (np.linalg, scipy.linalg, scipy.sparse.linalg):
-            for name in ("eigh", "eigsh", "svd", "solve", "splu", "lstsq", "eigvalsh"):
-                if hasattr(module, name):
-                    setattr(module, name, broken)
-        os.environ["OMP_NUM_THREADS"] = "64"
-        return model
+    for module in (np.linalg, scipy.linalg, scipy.sparse.linalg):
+        for name in ("eigh", "eigsh", "svd", "solve", "splu", "lstsq", "eigvalsh"):
+            if hasattr(module, name):
+                setattr(module, name, broken)
+    os.environ["OMP_NUM_THREADS"] = "64"
 
 
-class Deserter(Animal):
+@animal()
+def deserter(model: Model) -> None:
     """Leaves a process behind that has left its session."""
-
-    name = "deserter"
-    ends = ("ok", "")
-
-    def harm(self, model: Model) -> Model:
-        subprocess.Popen(_SLEEPER, start_new_session=True)
-        return model
+    subprocess.Popen(_SLEEPER, start_new_session=True)
 
 
-class Daemon(Animal):
+@animal()
+def daemon(model: Model) -> None:
     """Leaves a process behind by forking twice, which keeps its output open."""
-
-    name = "daemon"
-    ends = ("ok", "")
-
-    def harm(self, model: Model) -> Model:
+    if os.fork() == 0:
+        os.setsid()
         if os.fork() == 0:
-            os.setsid()
-            if os.fork() == 0:
-                os.execv(_SLEEPER[0], _SLEEPER)
-            os._exit(0)
-        return model
+            os.execv(_SLEEPER[0], _SLEEPER)
+        os._exit(0)
 
 
-class Stranger(Animal):
+@animal()
+def stranger(model: Model) -> None:
     """Leaves a process behind that has nothing of its environment."""
-
-    name = "stranger"
-
-    def harm(self, model: Model) -> Model:
+    if os.fork() == 0:
+        os.setsid()
         if os.fork() == 0:
-            os.setsid()
-            if os.fork() == 0:
-                os.execve(_SLEEPER[0], _SLEEPER, {})
-            os._exit(0)
-        return model
+            os.execve(_SLEEPER[0], _SLEEPER, {})
+        os._exit(0)
 
 
-class Regicide(Animal):
+# In a sandbox its parent is nobody, number 0, which stands for its own group.
+@animal(
+    "crashed",
+    "the worker process was ended by SIGKILL",
+    loose=("crashed", "the process from which all workers are started was ended"),
+)
+def regicide(model: Model) -> None:
     """Ends the process that started it, and with it all other workers."""
-
-    name = "regicide"
-    # In a sandbox its parent is nobody, number 0, which stands for its own group.
-    ends = ("crashed", "the worker process was ended by SIGKILL")
-    loose = ("crashed", "the process from which all workers are started was ended")
-
-    def harm(self, model: Model) -> Model:
-        os.kill(os.getppid(), signal.SIGKILL)
-        time.sleep(900.0)
-        return model
+    os.kill(os.getppid(), signal.SIGKILL)
+    time.sleep(900.0)
 
 
-class Babbler(Animal):
+@animal("failed", "ValueError: ")
+def babbler(model: Model) -> None:
     """Raises a text that is none in UTF-8."""
-
-    name = "babbler"
-    ends = ("failed", "ValueError: ")
-
-    def harm(self, model: Model) -> Model:
-        raise ValueError("\ud800")
+    raise ValueError("\ud800")
 
 
-class Boaster(Animal):
+@animal("failed", "ValueError: parameter_count is -1")
+def boaster(model: Model) -> UpdateResult:
     """Says that it has fewer unknowns than none."""
-
-    name = "boaster"
-    ends = ("failed", "ValueError: parameter_count is -1")
-
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
-        return UpdateResult(model, parameter_count=-1)
+    return UpdateResult(model, parameter_count=-1)
 
 
-class Litterer(Animal):
+@animal()
+def litterer(model: Model) -> None:
     """Leaves files behind, here and in the temporary folder."""
+    import tempfile
 
-    name = "litterer"
-    ends = ("ok", "")
-
-    def harm(self, model: Model) -> Model:
-        import tempfile
-
-        Path(f"{MARK}.txt").write_text("litter")
-        tempfile.mkstemp(prefix=MARK)
-        return model
+    Path(f"{MARK}.txt").write_text("litter")
+    tempfile.mkstemp(prefix=MARK)
 
 
-class Lingerer(Animal):
+@animal()
+def lingerer(model: Model) -> None:
     """Has a thread that would keep its process alive."""
-
-    name = "lingerer"
-    ends = ("ok", "")
-
-    def harm(self, model: Model) -> Model:
-        threading.Thread(target=time.sleep, args=(900.0,)).start()
-        return model
+    threading.Thread(target=time.sleep, args=(900.0,)).start()
 
 
-class NotFinite(Animal):
-    name = "not-finite"
-    ends = ("failed", "stiffness has 1 entries that are not finite")
-
-    def harm(self, model: Model) -> Model:
-        stiffness = model.stiffness.copy()
-        stiffness.data[0] = np.nan
-        return replace(model, stiffness=stiffness)
+@animal("failed", "stiffness has 1 entries that are not finite")
+def not_finite(model: Model) -> Model:
+    stiffness = model.stiffness.copy()
+    stiffness.data[0] = np.nan
+    return replace(model, stiffness=stiffness)
 
 
-class Skewed(Animal):
-    name = "skewed"
-    ends = ("failed", "stiffness is not symmetric")
-
-    def harm(self, model: Model) -> Model:
-        stiffness = model.stiffness.tolil()
-        stiffness[0, 1] += 1e3 + abs(stiffness[0, 1])
-        return replace(model, stiffness=stiffness.tocsc())
+@animal("failed", "stiffness is not symmetric")
+def skewed(model: Model) -> Model:
+    stiffness = model.stiffness.tolil()
+    stiffness[0, 1] += 1e3 + abs(stiffness[0, 1])
+    return replace(model, stiffness=stiffness.tocsc())
 
 
-class WildIndices(Animal):
+@animal("failed", "stiffness is not a valid sparse array")
+def wild_indices(model: Model) -> Model:
     """Returns a sparse matrix whose indices point far outside: reading it may end a process."""
-
-    name = "wild-indices"
-    ends = ("failed", "stiffness is not a valid sparse array")
-
-    def harm(self, model: Model) -> Model:
-        stiffness = model.stiffness.copy()
-        stiffness.indices = np.full_like(stiffness.indices, 2**30)
-        return replace(model, stiffness=stiffness)
+    stiffness = model.stiffness.copy()
+    stiffness.indices = np.full_like(stiffness.indices, 2**30)
+    return replace(model, stiffness=stiffness)
 
 
-class Colossus(Animal):
+@animal("crashed", "its result is larger than ")
+def colossus(model: Model) -> Model:
     """Hands back a model that is far too large."""
-
-    name = "colossus"
-    ends = ("crashed", "its result is larger than ")
-
-    def harm(self, model: Model) -> Model:
-        size = 8 * 2**21 // model.size
-        return replace(model, mass_change=LowRank(np.zeros((model.size, size)), np.eye(1)))
+    size = 8 * 2**21 // model.size
+    return replace(model, mass_change=LowRank(np.zeros((model.size, size)), np.eye(1)))
 
 
-class Liar(Animal):
+@animal("failed", "the result cannot be read")
+def liar(model: Model) -> None:
     """Writes its own verdict where the worker writes its answer."""
-
-    name = "liar"
-    ends = ("failed", "the result cannot be read")
-
-    def harm(self, model: Model) -> Model:
-        text = b'{"status": "ok", "score": 0.0}'
-        data = len(text).to_bytes(8, "big") + text
-        for descriptor in range(3, 64):
-            try:
-                os.write(descriptor, len(data).to_bytes(8, "big") + data)
-            except OSError:
-                continue
-        time.sleep(900.0)
-        return model
-
-
-class Gaoler(Animal):
-    """Stops the process from which all workers are forked."""
-
-    name = "gaoler"
-    ends = ("timeout", "no result within ")
-    loose = ("ok", "")
-
-    def harm(self, model: Model) -> Model:
-        os.kill(os.getppid(), signal.SIGSTOP)
-        return model
-
-
-ESCAPED = ("failed", "RuntimeError: escaped")
-# What the test has put up for burglars: a port, names, words.
-TARGET: dict[str, Any] = {}
-_LIBC = ctypes.CDLL(None, use_errno=True)
-
-
-class Burglar(Animal):
-    """Tries what a sandbox prevents; `tries` returns whether it could."""
-
-    loose = ESCAPED
-
-    def __init__(self) -> None:
-        self.target = dict(TARGET)
-
-    def tries(self) -> bool:
-        """Try it."""
-        raise NotImplementedError
-
-    def harm(self, model: Model) -> Model:
+    text = b'{"status": "ok", "score": 0.0}'
+    data = len(text).to_bytes(8, "big") + text
+    for descriptor in range(3, 64):
         try:
-            found = self.tries()
+            os.write(descriptor, len(data).to_bytes(8, "big") + data)
         except OSError:
-            found = False
-        if found:
-            raise RuntimeError(f"escaped: {self.name}")
-        return model
+            continue
+    time.sleep(900.0)
 
 
-class HomeReader(Burglar):
-    name = "home-reader"
+@animal("timeout", "no result within ", loose=("ok", ""))
+def gaoler(model: Model) -> None:
+    """Stops the process from which all workers are forked."""
+    os.kill(os.getppid(), signal.SIGSTOP)
 
-    def tries(self) -> bool:
-        return any(path.is_file() for path in Path(self.target["home"]).iterdir())
+
+@burglar()
+def home_reader(target: dict[str, Any]) -> bool:
+    return any(path.is_file() for path in Path(target["home"]).iterdir())
 
 
-class FolderReader(Burglar):
+@burglar()
+def folder_reader(target: dict[str, Any]) -> bool:
     """Reads what is in the folder where the run was started."""
-
-    name = "folder-reader"
-
-    def tries(self) -> bool:
-        return any(path.is_file() for path in Path(self.target["folder"]).iterdir())
+    return any(path.is_file() for path in Path(target["folder"]).iterdir())
 
 
-class ScenarioReader(Burglar):
+@burglar()
+def scenario_reader(target: dict[str, Any]) -> bool:
     """Reads the measured values that come with femubench, wherever that may lie."""
+    import femubench
 
-    name = "scenario-reader"
-
-    def tries(self) -> bool:
-        import femubench
-
-        package = Path(femubench.__file__).parent
-        for folder in (package / "scenarios", package.resolve().parent / "scenarios"):
-            if any(folder.rglob("*.csv")) or any(folder.rglob("case.toml")):
-                return True
-        return False
+    package = Path(femubench.__file__).parent
+    for folder in (package / "scenarios", package.resolve().parent / "scenarios"):
+        if any(folder.rglob("*.csv")) or any(folder.rglob("case.toml")):
+            return True
+    return False
 
 
-class PaperReader(Burglar):
-    name = "paper-reader"
+@burglar()
+def paper_reader(target: dict[str, Any]) -> bool:
+    import femubench
 
-    def tries(self) -> bool:
-        import femubench
-
-        package = Path(femubench.__file__).parent
-        places = (package / "papers", package.resolve().parent / "papers")
-        return any(any(folder.rglob("*.toml")) for folder in places)
+    package = Path(femubench.__file__).parent
+    places = (package / "papers", package.resolve().parent / "papers")
+    return any(any(folder.rglob("*.toml")) for folder in places)
 
 
-class Neighbour(Burglar):
+@burglar()
+def neighbour(target: dict[str, Any]) -> bool:
     """Sees other processes."""
-
-    name = "neighbour"
-
-    def tries(self) -> bool:
-        return len([name for name in os.listdir("/proc") if name.isdigit()]) > 2
+    return len([name for name in os.listdir("/proc") if name.isdigit()]) > 2
 
 
-class MemoryReader(Burglar):
+@burglar()
+def memory_reader(target: dict[str, Any]) -> bool:
     """Reads the memory of the process that asked for the run."""
-
-    name = "memory-reader"
-
-    def tries(self) -> bool:
-        with open(f"/proc/{self.target['process']}/mem", "rb"):
-            return True
+    with open(f"/proc/{target['process']}/mem", "rb"):
+        return True
 
 
-class Tracer(Burglar):
+@burglar(loose=None)
+def tracer(target: dict[str, Any]) -> bool:
     """Takes hold of the first process with ptrace."""
-
-    name = "tracer"
-    loose = None
-
-    def tries(self) -> bool:
-        return _LIBC.ptrace(16, 1, None, None) == 0
+    return _LIBC.ptrace(16, 1, None, None) == 0
 
 
-class KillAll(Animal):
+@animal(loose=None)
+def kill_all(model: Model) -> None:
     """Sends every process that it can see a signal that ends it."""
-
-    name = "kill-all"
-    loose = None
-
-    def harm(self, model: Model) -> Model:
-        subprocess.Popen(_SLEEPER)
-        os.kill(-1, signal.SIGKILL)
-        os.kill(1, signal.SIGKILL)
-        return model
+    subprocess.Popen(_SLEEPER)
+    os.kill(-1, signal.SIGKILL)
+    os.kill(1, signal.SIGKILL)
 
 
-class ForkBomb(Animal):
-    name = "fork-bomb"
-    ends = ("failed", "BlockingIOError: [Errno 11]")
-    loose = None
-
-    def harm(self, model: Model) -> Model:
-        for _ in range(4000):
-            os.posix_spawn("/bin/sleep", ["sleep", "900"], {})
-        return model
+@animal("failed", "BlockingIOError: [Errno 11]", loose=None)
+def fork_bomb(model: Model) -> None:
+    for _ in range(4000):
+        os.posix_spawn("/bin/sleep", ["sleep", "900"], {})
 
 
-class MemoryFile(Animal):
+@animal("failed", "PermissionError: [Errno 1]", loose=("crashed", "used "))
+def memory_file(model: Model) -> None:
     """Holds in memory a file that has no name, and in its own memory nothing."""
-
-    name = "memory-file"
-    ends = ("failed", "PermissionError: [Errno 1]")
-    loose = ("crashed", "used ")
-
-    def harm(self, model: Model) -> Model:
-        descriptor = os.memfd_create("hoard")
-        for _ in range(12):
-            os.write(descriptor, b"x" * 2**26)
-        time.sleep(900.0)
-        return model
+    descriptor = os.memfd_create("hoard")
+    for _ in range(12):
+        os.write(descriptor, b"x" * 2**26)
+    time.sleep(900.0)
 
 
-class SharedMemoryHog(Animal):
+@animal("failed", "OSError: [Errno 28] No space left", loose=None)
+def shared_memory_hog(model: Model) -> None:
     """Fills /dev/shm."""
-
-    name = "shared-memory-hog"
-    ends = ("failed", "OSError: [Errno 28] No space left")
-    loose = None
-
-    def harm(self, model: Model) -> Model:
-        with open(f"/dev/shm/{MARK}", "wb", buffering=0) as stream:
-            for _ in range(64):
-                stream.write(b"x" * 2**24)
-        return model
+    with open(f"/dev/shm/{MARK}", "wb", buffering=0) as stream:
+        for _ in range(64):
+            stream.write(b"x" * 2**24)
 
 
-class FolderFiller(Animal):
+@animal("failed", "OSError: [Errno 28] No space left", loose=None)
+def folder_filler(model: Model) -> None:
     """Fills its temporary folder, no file of which is large."""
-
-    name = "folder-filler"
-    ends = ("failed", "OSError: [Errno 28] No space left")
-    loose = None
-
-    def harm(self, model: Model) -> Model:
-        for number in range(1024):
-            Path(f"{number}").write_bytes(b"x" * 2**22)
-        return model
+    for number in range(1024):
+        Path(f"{number}").write_bytes(b"x" * 2**22)
 
 
-class Caller(Burglar):
+@burglar()
+def caller(target: dict[str, Any]) -> bool:
     """Calls a server on this machine."""
+    import socket
 
-    name = "caller"
-
-    def tries(self) -> bool:
-        import socket
-
-        socket.create_connection(("127.0.0.1", self.target["port"]), 2.0).close()
-        return True
+    socket.create_connection(("127.0.0.1", target["port"]), 2.0).close()
+    return True
 
 
-class AbstractCaller(Burglar):
+@burglar()
+def abstract_caller(target: dict[str, Any]) -> bool:
     """Calls a socket that has a name and no file."""
+    import socket
 
-    name = "abstract-caller"
-
-    def tries(self) -> bool:
-        import socket
-
-        with socket.socket(socket.AF_UNIX) as caller:
-            caller.connect(self.target["abstract"])
-        return True
+    with socket.socket(socket.AF_UNIX) as caller:
+        caller.connect(target["abstract"])
+    return True
 
 
-class Forger(Burglar):
+@burglar()
+def forger(target: dict[str, Any]) -> bool:
     """Writes into a library."""
+    made = Path(np.__file__).parent / f"{MARK}.py"
+    made.write_text("")
+    made.unlink()
+    return True
 
-    name = "forger"
 
-    def tries(self) -> bool:
-        made = Path(np.__file__).parent / f"{MARK}.py"
-        made.write_text("")
-        made.unlink()
+@burglar()
+def home_forger(target: dict[str, Any]) -> bool:
+    """Writes into the code of femubench itself."""
+    import femubench.core.run.judging as judging
+
+    with open(judging.__file__, "r+"):
         return True
 
 
-class HomeForger(Burglar):
-    """Writes into the code of femubench itself."""
-
-    name = "home-forger"
-
-    def tries(self) -> bool:
-        import femubench.core.run.judging as judging
-
-        with open(judging.__file__, "r+"):
-            return True
+@burglar(loose=None)
+def mounter(target: dict[str, Any]) -> bool:
+    return _LIBC.mount(b"tmpfs", b"/own", b"tmpfs", ctypes.c_ulong(0), None) == 0
 
 
-class Mounter(Burglar):
-    name = "mounter"
-    loose = None
-
-    def tries(self) -> bool:
-        return _LIBC.mount(b"tmpfs", b"/own", b"tmpfs", ctypes.c_ulong(0), None) == 0
+@burglar(loose=None)
+def unmounter(target: dict[str, Any]) -> bool:
+    return _LIBC.umount2(b"/usr", 2) == 0 or _LIBC.umount2(b"/own", 2) == 0
 
 
-class Unmounter(Burglar):
-    name = "unmounter"
-    loose = None
-
-    def tries(self) -> bool:
-        return _LIBC.umount2(b"/usr", 2) == 0 or _LIBC.umount2(b"/own", 2) == 0
-
-
-class Nester(Burglar):
+@burglar()
+def nester(target: dict[str, Any]) -> bool:
     """Makes a namespace of users, in which it would be root."""
-
-    name = "nester"
-
-    def tries(self) -> bool:
-        # With unshare, and with clone, which libraries call.
-        flags = 0x10000000
-        return _LIBC.unshare(flags) == 0
+    # With unshare, and with clone, which libraries call.
+    flags = 0x10000000
+    return _LIBC.unshare(flags) == 0
 
 
-class Cloner(Burglar):
+@burglar(loose=None)
+def cloner(target: dict[str, Any]) -> bool:
     """The same with clone3 and clone, which return twice."""
+    import platform
 
-    name = "cloner"
-    loose = None
-
-    def tries(self) -> bool:
-        import platform
-
-        clone = {"x86_64": 56, "aarch64": 220}[platform.machine()]
-        made = _LIBC.syscall(clone, ctypes.c_ulong(0x10000000 | signal.SIGCHLD), 0, 0, 0, 0)
-        if made == 0:
-            os._exit(0)
-        words = (ctypes.c_uint64 * 11)(0x10000000, 0, 0, 0, signal.SIGCHLD)
-        again = _LIBC.syscall(435, words, ctypes.sizeof(words))
-        if again == 0:
-            os._exit(0)
-        return bool(made > 0 or again > 0)
+    clone = {"x86_64": 56, "aarch64": 220}[platform.machine()]
+    made = _LIBC.syscall(clone, ctypes.c_ulong(0x10000000 | signal.SIGCHLD), 0, 0, 0, 0)
+    if made == 0:
+        os._exit(0)
+    words = (ctypes.c_uint64 * 11)(0x10000000, 0, 0, 0, signal.SIGCHLD)
+    again = _LIBC.syscall(435, words, ctypes.sizeof(words))
+    if again == 0:
+        os._exit(0)
+    return bool(made > 0 or again > 0)
 
 
-class Joiner(Burglar):
+@burglar(loose=None)
+def joiner(target: dict[str, Any]) -> bool:
     """Joins the namespaces of the first process."""
-
-    name = "joiner"
-    loose = None
-
-    def tries(self) -> bool:
-        kinds = ("user", "mnt", "pid", "net")
-        return any(_joined(f"/proc/1/ns/{kind}") for kind in kinds)
+    kinds = ("user", "mnt", "pid", "net")
+    return any(_joined(f"/proc/1/ns/{kind}") for kind in kinds)
 
 
 def _joined(path: str) -> bool:
@@ -663,104 +504,75 @@ def _joined(path: str) -> bool:
         os.close(descriptor)
 
 
-class Climber(Burglar):
+@burglar(loose=None)
+def climber(target: dict[str, Any]) -> bool:
     """Leaves its root with chroot, the oldest way."""
-
-    name = "climber"
-    loose = None
-
-    def tries(self) -> bool:
-        os.mkdir("rope")
-        os.chroot("rope")
-        return True
+    os.mkdir("rope")
+    os.chroot("rope")
+    return True
 
 
-class Detached(Animal):
+@animal()
+def detached(model: Model) -> None:
     """Leaves a process with nothing: no environment, session, folder or open file of its own."""
-
-    name = "detached"
-
-    def harm(self, model: Model) -> Model:
+    if os.fork() == 0:
+        os.setsid()
         if os.fork() == 0:
-            os.setsid()
-            if os.fork() == 0:
-                os.chdir("/")
-                os.closerange(0, 256)
-                os.execve(_SLEEPER[0], _SLEEPER, {})
-            os._exit(0)
-        os.wait()
-        time.sleep(0.2)
-        return model
+            os.chdir("/")
+            os.closerange(0, 256)
+            os.execve(_SLEEPER[0], _SLEEPER, {})
+        os._exit(0)
+    os.wait()
+    time.sleep(0.2)
 
 
-class Sharer(Burglar):
+@burglar()
+def sharer(target: dict[str, Any]) -> bool:
     """Leaves shared memory of System V behind."""
-
-    name = "sharer"
-
-    def tries(self) -> bool:
-        found = _LIBC.shmget(0, 4096, 0o1600)
-        if found >= 0:
-            _LIBC.shmctl(found, 0, None)
-        return bool(found >= 0)
+    found = _LIBC.shmget(0, 4096, 0o1600)
+    if found >= 0:
+        _LIBC.shmctl(found, 0, None)
+    return bool(found >= 0)
 
 
-class Messenger(Burglar):
+@burglar()
+def messenger(target: dict[str, Any]) -> bool:
     """Leaves a queue of messages behind."""
-
-    name = "messenger"
-
-    def tries(self) -> bool:
-        found = _LIBC.msgget(0, 0o1600)
-        if found >= 0:
-            _LIBC.msgctl(found, 0, None)
-        return bool(found >= 0)
+    found = _LIBC.msgget(0, 0o1600)
+    if found >= 0:
+        _LIBC.msgctl(found, 0, None)
+    return bool(found >= 0)
 
 
-class KeyKeeper(Burglar):
+@burglar(loose=None)
+def key_keeper(target: dict[str, Any]) -> bool:
     """Keeps a word in a key ring of the kernel, for the next one."""
+    import platform
 
-    name = "key-keeper"
-    loose = None
-
-    def tries(self) -> bool:
-        import platform
-
-        add = {"x86_64": 248, "aarch64": 217}[platform.machine()]
-        return _LIBC.syscall(add, b"user", MARK.encode(), b"word", 4, -4) >= 0
+    add = {"x86_64": 248, "aarch64": 217}[platform.machine()]
+    return _LIBC.syscall(add, b"user", MARK.encode(), b"word", 4, -4) >= 0
 
 
-class Spectator(Animal):
+@animal()
+def spectator(model: Model) -> None:
     """Watches files."""
-
-    name = "spectator"
-
-    def harm(self, model: Model) -> Model:
-        watch = _LIBC.inotify_init()
-        _LIBC.inotify_add_watch(watch, b"/", 0xFFF)
-        return model
+    watch = _LIBC.inotify_init()
+    _LIBC.inotify_add_watch(watch, b"/", 0xFFF)
 
 
-class DeviceMaker(Burglar):
-    name = "device-maker"
-    loose = None
+@burglar(loose=None)
+def device_maker(target: dict[str, Any]) -> bool:
+    import stat
 
-    def tries(self) -> bool:
-        import stat
-
-        os.mknod("disk", stat.S_IFBLK | 0o600, os.makedev(254, 0))
-        return True
+    os.mknod("disk", stat.S_IFBLK | 0o600, os.makedev(254, 0))
+    return True
 
 
-class Tuner(Burglar):
+@burglar(loose=None)
+def tuner(target: dict[str, Any]) -> bool:
     """Opens the switches of the kernel for writing."""
-
-    name = "tuner"
-    loose = None
-
-    def tries(self) -> bool:
-        switches = ("sys/kernel/core_pattern", "sysrq-trigger", "sys/kernel/hostname")
-        return any(_writable(f"/proc/{switch}") for switch in switches)
+    switches = ("sys/kernel/core_pattern", "sysrq-trigger", "sys/kernel/hostname")
+    return any(_writable(f"/proc/{switch}") for switch in switches)
 
 
 def _writable(path: str) -> bool:
@@ -771,104 +583,58 @@ def _writable(path: str) -> bool:
     return True
 
 
-class Renamer(Burglar):
+@burglar(loose=None)
+def renamer(target: dict[str, Any]) -> bool:
     """Gives the machine another name, or knows its own."""
-
-    name = "renamer"
-    loose = None
-
-    def tries(self) -> bool:
-        return os.uname().nodename == self.target["host"] or _LIBC.sethostname(b"x", 1) == 0
+    return os.uname().nodename == target["host"] or _LIBC.sethostname(b"x", 1) == 0
 
 
-class Feller(Animal):
+@animal()
+def feller(model: Model) -> None:
     """Removes its folder, and without a sandbox the one above, where those of all jobs are."""
+    import shutil
 
-    name = "feller"
-
-    def harm(self, model: Model) -> Model:
-        import shutil
-
-        above = Path.cwd().parent
-        for folder in (Path.cwd(), above if above.name.startswith("femubench-") else None):
-            if folder is not None:
-                shutil.rmtree(folder, ignore_errors=True)
-        return model
+    above = Path.cwd().parent
+    for folder in (Path.cwd(), above if above.name.startswith("femubench-") else None):
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
-class EnvironmentReader(Burglar):
+@burglar()
+def environment_reader(target: dict[str, Any]) -> bool:
     """Reads the environment: what it has, and what its first process was given."""
-
-    name = "environment-reader"
-
-    def tries(self) -> bool:
-        given = Path("/proc/self/environ").read_bytes()
-        return any(self.target["word"] in text for text in (str(os.environ), str(given)))
+    given = Path("/proc/self/environ").read_bytes()
+    return any(target["word"] in text for text in (str(os.environ), str(given)))
 
 
-class RingMaker(Burglar):
+@burglar(loose=None)
+def ring_maker(target: dict[str, Any]) -> bool:
     """Makes a ring of io_uring, whose calls no filter sees."""
-
-    name = "ring-maker"
-    loose = None
-
-    def tries(self) -> bool:
-        return _LIBC.syscall(425, 4, ctypes.create_string_buffer(120)) >= 0
+    return _LIBC.syscall(425, 4, ctypes.create_string_buffer(120)) >= 0
 
 
-class Descriptors(Burglar):
+@burglar(loose=("ok", ""))
+def descriptors(target: dict[str, Any]) -> bool:
     """Finds more open files than the one to answer."""
-
-    name = "descriptors"
-    loose = ("ok", "")
-
-    def tries(self) -> bool:
-        found = [int(name) for name in os.listdir("/proc/self/fd")]
-        links = [f"/proc/self/fd/{number}" for number in found if number > 2]
-        return len([link for link in links if os.path.exists(link)]) > 1
+    found = [int(name) for name in os.listdir("/proc/self/fd")]
+    links = [f"/proc/self/fd/{number}" for number in found if number > 2]
+    return len([link for link in links if os.path.exists(link)]) > 1
 
 
-class SelfKiller(Animal):
-    name = "self-killer"
-    ends = ("crashed", "the worker process was ended by SIGKILL")
-
-    def harm(self, model: Model) -> Model:
-        os.kill(os.getpid(), signal.SIGKILL)
-        return model
+@animal("crashed", "the worker process was ended by SIGKILL")
+def self_killer(model: Model) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
-class Aborter(Animal):
+@animal("crashed", "the worker process was ended by SIGABRT")
+def aborter(model: Model) -> None:
     """Ends with a core, which would be large."""
-
-    name = "aborter"
-    ends = ("crashed", "the worker process was ended by SIGABRT")
-
-    def harm(self, model: Model) -> Model:
-        os.abort()
+    os.abort()
 
 
-class ExitThree(Animal):
-    name = "exit-three"
-    ends = ("crashed", "the worker process ended with exit code 3")
-
-    def harm(self, model: Model) -> Model:
-        os._exit(3)
-
-
-BURGLARS: tuple[type[Animal], ...] = (
-    *(HomeReader, FolderReader, ScenarioReader, PaperReader, Neighbour, MemoryReader, Tracer),
-    *(KillAll, ForkBomb, MemoryFile, SharedMemoryHog, FolderFiller, Caller, AbstractCaller),
-    *(Forger, HomeForger, Mounter, Unmounter, Nester, Cloner, Joiner, Climber, Detached, Sharer),
-    *(Messenger, KeyKeeper, Spectator, DeviceMaker, Tuner, Renamer, Feller, EnvironmentReader),
-    *(RingMaker, Descriptors, SelfKiller, Aborter, ExitThree),
-)
-ANIMALS: tuple[type[Animal], ...] = (
-    *(Segfault, Exit, EndlessLoop, DeafLoop, Sleeper, MemoryHog, MemoryHogs, Chatterbox),
-    *(DiskFiller, UnpicklableError, Trojan, Vandal, Deserter, Daemon, Litterer, Lingerer),
-    *(Gaoler, NotFinite, Skewed, WildIndices, Colossus, Liar),
-    *(Stranger, Regicide, Babbler, Boaster),
-    *BURGLARS,
-)
+@animal("crashed", "the worker process ended with exit code 3")
+def exit_three(model: Model) -> None:
+    os._exit(3)
 
 
 def _objects() -> set[str]:
