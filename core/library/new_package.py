@@ -5,8 +5,6 @@ from __future__ import annotations
 import builtins
 import keyword
 import re
-import secrets
-import shutil
 import sys
 from collections.abc import Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, distribution
@@ -16,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from femubench.core.case.example import write_example
 from femubench.core.case.files import CASE_FILE
+from femubench.core.case.writing import new_folder
 from femubench.core.errors import InputError
 from femubench.core.plugin import validation
 from femubench.core.plugin.markers import PROJECT
@@ -75,26 +74,13 @@ def write_package(name: str, kind: str, output: Path, plugins: Plugins) -> tuple
         raise InputError("folder does not exist", file=folder.parent, expected="an existing folder")
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise InputError("is in the way", file=folder, expected="no such file, or an empty folder")
-    if folder.is_dir() and any(folder.iterdir()):
-        raise InputError("is not empty", file=folder, expected="a new or an empty folder")
-    # Made beside its place, so that one rename puts it there.
-    part = output / f".{name}.{secrets.token_hex(6)}"
-    try:
-        part.mkdir()
+    with new_folder(folder) as fresh:
         for path, text in _files(name, kind, trial_of(name, plugins)):
-            target = part / path
+            target = fresh / path
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(text, encoding="utf-8")
         if kind == "scenario":
-            _write_case(part / "src" / module_of(name) / "case", name)
-        if folder.is_dir():
-            folder.rmdir()  # an empty one: not every system renames onto it
-        part.rename(folder)
-    except OSError as fault:
-        what = f"cannot be written: {fault.strerror}"
-        raise InputError(what, file=folder, expected="a folder of yours") from None
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+            _write_case(fresh / "src" / module_of(name) / "case", name)
     return tuple(sorted(path for path in folder.rglob("*") if path.is_file()))
 
 

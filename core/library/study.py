@@ -73,8 +73,7 @@ class StudyPlan(Plan):
                 start = time.process_time()
                 reference_of(self.starts.yardstick(case))
                 judging[origin] = time.process_time() - start
-        seconds, longest, strange = forecast(left, self.axes, known.values(), judging)
-        return Forecast(self.jobs, self.jobs - len(left), seconds, longest, strange)
+        return forecast(self.jobs, left, self.axes, known.values(), judging)
 
     def limited(self, given: Mapping[str, Any]) -> StudyPlan:
         """Return the plan with limits and what the store has of it, as `split_keywords` gives them.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
 
@@ -36,15 +36,17 @@ class Forecast:
 
 
 def forecast(
-    left: Iterable[tuple[str, str]],
+    jobs: int,
+    left: Sequence[tuple[str, str]],
     axes: StudyAxes,
     before: Iterable[JobResult],
     judging: Mapping[str, float],
-) -> tuple[float, float, Counter[Pair]]:
-    """Return the seconds of jobs and of the longest, and how many jobs nothing is known of.
+) -> Forecast:
+    """Return what a study will take.
 
     Arguments:
-        left: case and strategy of the jobs, as the run names them.
+        jobs: of the study.
+        left: case and strategy of those that are left, as the run names them.
         axes: of the study.
         before: earlier results.
         judging: seconds that it takes to judge a model, by case without conditions.
@@ -67,4 +69,4 @@ def forecast(
             continue
         one = median(known) + judging[plain]
         total, longest = total + count * one, max(longest, one)
-    return total, longest, unknown
+    return Forecast(jobs, jobs - len(left), total, longest, unknown)
