@@ -11,7 +11,7 @@ import numpy as np
 from femubench.core.case.faults import KeyPath, at_key
 from femubench.core.case.files import CaseFiles
 from femubench.core.case.schema import CaseSpec, parse_spec
-from femubench.core.case.tables import Cells, plain_number, read_cells, whole_number
+from femubench.core.case.tables import CsvTable, plain_number, read_table, whole_number
 from femubench.core.errors import InputError
 from femubench.core.typing import IntArray
 
@@ -65,7 +65,7 @@ class FrameTables:
             path = self.files.path(name)
         optional = [c for k in KEYS[key] if k in OPTIONAL for c in columns_of(k)]
         required = [c for k in KEYS[key] if k not in OPTIONAL for c in columns_of(k)]
-        cells = read_cells(path)
+        cells = read_table(path)
         cells.check_columns(tuple(required), optional)
         if not cells.cells:
             raise InputError("no rows", file=path, expected=f"one of the {key} at least")
@@ -86,7 +86,7 @@ class FrameTables:
         return file, int(lines[row]), column
 
 
-def _entries(key: str, cells: Cells) -> Iterator[dict[str, Any]]:
+def _entries(key: str, cells: CsvTable) -> Iterator[dict[str, Any]]:
     """Yield the keys of every row; empty cells of optional keys are left out."""
     at = {name: i for i, name in enumerate(cells.columns)}
     places = {k: [at[c] for c in columns_of(k)] for k in KEYS[key] if columns_of(k)[0] in at}

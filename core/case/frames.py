@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -37,7 +37,7 @@ from femubench.core.fem.frame import (
     Support,
     Vector,
 )
-from femubench.core.fem.mesh import locate, nearest_place
+from femubench.core.fem.mesh import locate, nearest_place, place_xyz
 from femubench.core.fem.sections import SHAPES, Section, constant_kappa
 from femubench.core.fem.sensors import moved_names
 from femubench.core.typing import FloatArray
@@ -104,24 +104,18 @@ def _from_numbers(spec: SectionSpec, plane: Plane) -> Section:
     return Section(**dict.fromkeys(CONSTANTS, 0.0) | given)
 
 
+@dataclass(frozen=True)
 class FrameSite:
     """The site of a frame: joints, and stations of members; checks raise Misfit."""
 
-    def __init__(self, frame: Frame) -> None:
-        self.frame = frame
-        self.joints = {joint.name: joint.xyz for joint in frame.joints}
-        self.members = {member.name: member.ends for member in frame.members}
+    frame: Frame
 
     def point(self, place: Place) -> Vector:
         """Return where a place lies in m."""
-        if place.joint is not None:
-            if place.joint not in self.joints:
-                raise Misfit(f"there is no joint {place.joint!r}", "a joint or member@station")
-            return self.joints[place.joint]
-        if place.member not in self.members or place.s is None:
-            raise Misfit(f"there is no member {place.member!r}", "a joint or member@station")
-        first, second = (np.array(self.joints[name]) for name in self.members[place.member])
-        x, y, z = (float(v) for v in (1.0 - place.s) * first + place.s * second)
+        try:
+            x, y, z = (float(v) for v in place_xyz(self.frame, place))
+        except ModelError as error:
+            raise Misfit(str(error), "a joint or member@station") from None
         return x, y, z
 
     def check_direction(self, place: Place, direction: str) -> None:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import permutations, product
 from pathlib import Path
 from typing import NamedTuple
@@ -50,10 +51,6 @@ class Alignment:
         turn = np.eye(3) if frame is None else parse_frame(frame)
         known = None if unit is None else METRES[unit]
         return cls(known, turn, TOLERANCE if tolerance is None else tolerance)
-
-    def limit(self, site: Site) -> float:
-        """Return how far from a structure a sensor may be in m."""
-        return max(self.tolerance * size_of(site.points), ON_MEMBER)
 
     def direction(self, name: str) -> str:
         """Return a direction of the test as one of the model."""
@@ -105,150 +102,133 @@ def size_of(points: FloatArray) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
 
 
-def unit_of(xyz: FloatArray, site: Site, alignment: Alignment) -> LengthUnit:
-    """Return the unit in which coordinates fit the structure, by its size: m where that may be.
+@dataclass(frozen=True)
+class Placement:
+    """Coordinates of a test beside the structure.
 
     Arguments:
-        xyz: of the test, finite, (k, 3).
         site: the structure.
         alignment: how the test lies beside it.
+        every: all coordinates of the test as they were given, finite, (k, 3).
     """
-    fitting = _units_by_size(xyz, site)
-    if "m" in fitting or not fitting:
-        return "m"
-    turned = xyz @ alignment.turn.T
-    gap = {unit: float(np.median(_gaps(turned * METRES[unit], site))) for unit in fitting}
-    best = min(fitting, key=gap.__getitem__)
-    # One wrong coordinate may make any unit fit by size.
-    return best if gap[best] <= _NEAR * size_of(site.points) else "m"
 
+    site: Site
+    alignment: Alignment
+    every: FloatArray
 
-def _units_by_size(xyz: FloatArray, site: Site) -> list[LengthUnit]:
-    ratio = size_of(xyz) / (size_of(site.points) or 1.0)
-    return [u for u, metres in METRES.items() if _EXTENT[0] <= ratio * metres <= _EXTENT[1]]
+    @cached_property
+    def size(self) -> float:
+        """Return the size of the structure in m."""
+        return size_of(self.site.points)
 
+    @cached_property
+    def limit(self) -> float:
+        """Return how far from the structure a sensor may be in m."""
+        return max(self.alignment.tolerance * self.size, ON_MEMBER)
 
-def _gaps(xyz: FloatArray, site: Site) -> FloatArray:
-    feet = np.array([foot for _, foot in site.nearest(xyz)])
-    return np.asarray(np.linalg.norm(feet - xyz, axis=1))
+    @cached_property
+    def _units(self) -> list[LengthUnit]:
+        """Return the units in which the test is about as large as the structure."""
+        ratio = size_of(self.every) / (self.size or 1.0)
+        return [u for u, metres in METRES.items() if _EXTENT[0] <= ratio * metres <= _EXTENT[1]]
 
+    def _gaps(self, xyz: FloatArray) -> FloatArray:
+        feet = np.array([foot for _, foot in self.site.nearest(xyz)])
+        return np.asarray(np.linalg.norm(feet - xyz, axis=1))
 
-def matches_of(
-    labels: Sequence[str], xyz: FloatArray, site: Site, alignment: Alignment, unit: float
-) -> list[Match]:
-    """Return the nearest place of every sensor, near enough or not.
+    def detect_unit(self) -> LengthUnit:
+        """Return the unit in which the test fits the structure: m where that may be."""
+        if "m" in self._units or not self._units:
+            return "m"
+        turned = self.every @ self.alignment.turn.T
+        gap = {unit: float(np.median(self._gaps(turned * METRES[unit]))) for unit in self._units}
+        best = min(self._units, key=gap.__getitem__)
+        # One wrong coordinate may make any unit fit by size.
+        return best if gap[best] <= _NEAR * self.size else "m"
 
-    Arguments:
-        labels: of the sensors.
-        xyz: of the test, finite, (k, 3).
-        site: the structure.
-        alignment: how the test lies beside it.
-        unit: of the coordinates in m.
-    """
-    points = unit * xyz @ alignment.turn.T
-    found = zip(labels, points, site.nearest(points), strict=True)
-    # What sits where it should keeps its coordinates to the last bit.
-    return [
-        Match(label, place, at if np.linalg.norm(foot - at) <= ON_MEMBER else foot, at)
-        for label, at, (place, foot) in found
-    ]
+    def match_labels(self, labels: Sequence[str]) -> list[Match]:
+        """Return the nearest place of every sensor, near enough or not."""
+        points = (self.alignment.unit or 1.0) * self.every @ self.alignment.turn.T
+        found = zip(labels, points, self.site.nearest(points), strict=True)
+        # What sits where it should keeps its coordinates to the last bit.
+        return [
+            Match(label, place, at if np.linalg.norm(foot - at) <= ON_MEMBER else foot, at)
+            for label, at, (place, foot) in found
+        ]
 
+    def check_near(self, match: Match) -> None:
+        """Check that a sensor is not too far from the structure.
 
-def check_near(match: Match, site: Site, alignment: Alignment, every: FloatArray) -> None:
-    """Check that a sensor is not too far from the structure.
+        Raises:
+            Misfit: naming the nearest place and the distance.
+        """
+        if match.distance <= self.limit:
+            return
+        at, foot = (", ".join(f"{v:.6g}" for v in point) for point in (match.measured, match.xyz))
+        what = (
+            f"sensor {match.sensor!r} at ({at}) lies {match.distance:.3g} m off the structure, "
+            f"nearest {match.place} at ({foot})"
+        )
+        tolerance = f"(tolerance = {self.alignment.tolerance:g} of its size)"
+        raise Misfit(what, f"at most {self.limit:.3g} m {tolerance}{self._advice()}")
 
-    Arguments:
-        match: of the sensor.
-        site: the structure.
-        alignment: how the test lies beside it.
-        every: all coordinates of the test as they were given, for advice, (k, 3).
+    def check_span(self, matches: Sequence[Match], file: str) -> tuple[str, ...]:
+        """Return what to say of sensors that lie close together beside the size of the structure.
 
-    Raises:
-        Misfit: naming the nearest place and the distance.
-    """
-    limit = alignment.limit(site)
-    if match.distance <= limit:
-        return
-    at, foot = (", ".join(f"{v:.6g}" for v in point) for point in (match.measured, match.xyz))
-    what = (
-        f"sensor {match.sensor!r} at ({at}) lies {match.distance:.3g} m off the structure, nearest "
-        f"{match.place} at ({foot})"
-    )
-    expected = f"at most {limit:.3g} m (tolerance = {alignment.tolerance:g} of its size)"
-    raise Misfit(what, f"{expected}{_advice(every, site, alignment)}")
+        Raises:
+            Misfit: when they are moved, and lie closer together than they may be moved.
+        """
+        span = size_of(np.array([match.measured for match in matches]))
+        if not ON_MEMBER < span < _EXTENT[0] * self.size:
+            return ()
+        what = f"the sensors span {span:.3g} m, the structure {self.size:.3g} m"
+        question = "is one of the units wrong?"
+        if span <= self.limit and any(match.distance > ON_MEMBER for match in matches):
+            advice = self._advice() if self._units else f"; {question}"
+            tolerance = f"(tolerance = {self.alignment.tolerance:g} of its size)"
+            raise Misfit(what, f"more than {self.limit:.3g} m {tolerance}{advice}")
+        return (f"{file}: {what}: {question}",)
 
+    def check_apart(self, found: Sequence[tuple[Match, str]]) -> None:
+        """Check that no two sensors of different places went to one place and direction.
 
-def span_told(
-    matches: Sequence[Match], file: str, site: Site, alignment: Alignment, every: FloatArray
-) -> tuple[str, ...]:
-    """Return what to say of sensors that lie close together beside the size of the structure.
+        Arguments:
+            found: every match and its direction.
 
-    Arguments:
-        matches: of all sensors.
-        file: that lists them.
-        site, alignment, every: as in `check_near`.
+        Raises:
+            Misfit: naming both sensors and the place.
+        """
+        taken: dict[tuple[str, str], Match] = {}
+        for match, direction in found:
+            way = direction.lstrip("+-")
+            other = taken.setdefault((match.place, way), match)
+            if np.linalg.norm(other.measured - match.measured) > ON_MEMBER:
+                what = (
+                    f"sensors {other.sensor!r} and {match.sensor!r} both lie nearest to "
+                    f"{match.place}, direction {way} ({other.distance:.3g} and "
+                    f"{match.distance:.3g} m away)"
+                )
+                raise Misfit(what, f"a finer model, or one of the two left out{self._advice()}")
 
-    Raises:
-        Misfit: when they are moved, and lie closer together than they may be moved.
-    """
-    span = size_of(np.array([match.measured for match in matches]))
-    size, limit = size_of(site.points), alignment.limit(site)
-    if not ON_MEMBER < span < _EXTENT[0] * size:
-        return ()
-    what = f"the sensors span {span:.3g} m, the structure {size:.3g} m"
-    question = "is one of the units wrong?"
-    if span <= limit and any(match.distance > ON_MEMBER for match in matches):
-        fitting = bool(_units_by_size(every, site))
-        advice = _advice(every, site, alignment) if fitting else f"; {question}"
-        expected = f"more than {limit:.3g} m (tolerance = {alignment.tolerance:g} of its size)"
-        raise Misfit(what, f"{expected}{advice}")
-    return (f"{file}: {what}: {question}",)
-
-
-def _advice(every: FloatArray, site: Site, alignment: Alignment) -> str:
-    """Return the unit and the frame of axes with which all points of a test would fit."""
-    limit, units = alignment.limit(site), _units_by_size(every, site)
-    if not units and len(every) > 1:
-        sizes = f"{size_of(every):.3g} as they stand, the structure {size_of(site.points):.3g} m"
-        return f"; the sensors span {sizes}: is one of the units wrong?"
-    for unit in units:
-        for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
-            turn = np.zeros((3, 3))
-            turn[range(3), list(order)] = signs
-            points = METRES[unit] * every @ turn.T
-            if np.linalg.det(turn) > 0.0 and _gaps(points, site).max() <= limit:
-                axes = zip(order, signs, strict=True)
-                frame = ",".join(f"{'-' if s < 0 else ''}{'xyz'[k]}" for k, s in axes)
-                other = METRES[unit] != (alignment.unit or 1.0)
-                keys = [f'unit = "{unit}"'] if other else []
-                keys += [] if np.array_equal(turn, alignment.turn) else [f'frame = "{frame}"']
-                return f"; with {' and '.join(keys)} all fit" if keys else ""
-    return ""
-
-
-def check_apart(
-    found: Sequence[tuple[Match, str]], site: Site, alignment: Alignment, every: FloatArray
-) -> None:
-    """Check that no two sensors of different places went to one place and direction.
-
-    Arguments:
-        found: every match and its direction.
-        site, alignment, every: as in `check_near`, for advice.
-
-    Raises:
-        Misfit: naming both sensors and the place.
-    """
-    taken: dict[tuple[str, str], Match] = {}
-    for match, direction in found:
-        way = direction.lstrip("+-")
-        other = taken.setdefault((match.place, way), match)
-        if np.linalg.norm(other.measured - match.measured) > ON_MEMBER:
-            what = (
-                f"sensors {other.sensor!r} and {match.sensor!r} both lie nearest to {match.place}, "
-                f"direction {way} ({other.distance:.3g} and {match.distance:.3g} m away)"
-            )
-            expected = "a finer model, or one of the two left out"
-            raise Misfit(what, f"{expected}{_advice(every, site, alignment)}")
+    def _advice(self) -> str:
+        """Return the unit and the frame of axes with which all points of the test would fit."""
+        if not self._units and len(self.every) > 1:
+            sizes = f"{size_of(self.every):.3g} as they stand, the structure {self.size:.3g} m"
+            return f"; the sensors span {sizes}: is one of the units wrong?"
+        for unit in self._units:
+            for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+                turn = np.zeros((3, 3))
+                turn[range(3), list(order)] = signs
+                points = METRES[unit] * self.every @ turn.T
+                if np.linalg.det(turn) > 0.0 and self._gaps(points).max() <= self.limit:
+                    axes = zip(order, signs, strict=True)
+                    frame = ",".join(f"{'-' if s < 0 else ''}{'xyz'[k]}" for k, s in axes)
+                    other = METRES[unit] != (self.alignment.unit or 1.0)
+                    keys = [f'unit = "{unit}"'] if other else []
+                    same = np.array_equal(turn, self.alignment.turn)
+                    keys += [] if same else [f'frame = "{frame}"']
+                    return f"; with {' and '.join(keys)} all fit" if keys else ""
+        return ""
 
 
 def fitted_sensors(
@@ -280,15 +260,27 @@ def fitted_sensors(
     kept: list[tuple[Match, str]] = []
     told: tuple[str, ...] = ()
     if rows:
-        xyz = read.xyz[rows]
-        unit = unit_of(xyz, site, alignment)
+        test = Placement(site, alignment, read.xyz[rows])
+        unit = test.detect_unit()
         scale = METRES[unit] if alignment.unit is None else alignment.unit
-        matches = matches_of([read.labels[i] for i in rows], xyz, site, alignment, scale)
-        ways = [alignment.direction(read.directions[i]) for i in rows]
-        found_as = replace(alignment, unit=scale)
-        kept, told = _fitting(list(zip(matches, ways, strict=True)), file, site, found_as, xyz)
+        test = replace(test, alignment=replace(alignment, unit=scale))
+        matches = test.match_labels([read.labels[i] for i in rows])
+        try:
+            told = test.check_span(matches, file.name)
+            for i, match in zip(rows, matches, strict=True):
+                test.check_near(match)
+                way = alignment.direction(read.directions[i])
+                with suppress(WrongDirection):
+                    site.check_sensor(tuple(match.xyz.tolist()), way)
+                    kept.append((match, way))
+            test.check_apart(kept)
+        except Misfit as misfit:
+            raise InputError(misfit.what, file=file, expected=misfit.expected) from None
         if alignment.unit is None and unit != "m":
-            told = (_detected(file.name, unit, size_of(xyz) / size_of(site.points)), *told)
+            ratio = size_of(test.every) / test.size
+            why = f"in m the sensors would span {ratio:.3g} times the structure."
+            told = (f"{file.name}: coordinates were taken in {unit}, since {why}", *told)
+        told = (*told, *told_of([match for match, _ in kept], file.name))
     if not kept:
         expected = "nodes with coordinates, in a direction that the model has"
         raise InputError("no sensor fits the structure", file=file, expected=expected)
@@ -297,40 +289,6 @@ def fitted_sensors(
     labels = tuple(match.sensor for match in found)
     sensors = Sensors(labels, places, tuple(way for _, way in kept))
     return Placed(sensors, found, told, scale * alignment.turn)
-
-
-def _fitting(
-    found: Sequence[tuple[Match, str]],
-    file: Path,
-    site: Site,
-    alignment: Alignment,
-    every: FloatArray,
-) -> tuple[list[tuple[Match, str]], tuple[str, ...]]:
-    """Return the matches whose direction the model has, and what to say of all places.
-
-    Raises:
-        InputError: for one too far.
-    """
-    kept: list[tuple[Match, str]] = []
-    try:
-        told = span_told([match for match, _ in found], file.name, site, alignment, every)
-        for match, direction in found:
-            check_near(match, site, alignment, every)
-            x, y, z = (float(v) for v in match.xyz)
-            with suppress(WrongDirection):
-                site.check_sensor((x, y, z), direction)
-                kept.append((match, direction))
-        check_apart(kept, site, alignment, every)
-    except Misfit as misfit:
-        raise InputError(misfit.what, file=file, expected=misfit.expected) from None
-    return kept, (*told, *told_of([match for match, _ in kept], file.name))
-
-
-def _detected(file: str, unit: str, ratio: float) -> str:
-    return (
-        f"{file}: coordinates were taken in {unit}, since in m the sensors would span {ratio:.3g} "
-        "times the structure."
-    )
 
 
 def told_of(matches: Sequence[Match], file: str) -> tuple[str, ...]:

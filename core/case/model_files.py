@@ -33,7 +33,7 @@ from femubench.core.case.nodes import (
     read_nodes,
 )
 from femubench.core.case.schema import FileSpec, FrameSpec, LengthUnit
-from femubench.core.case.tables import read_table
+from femubench.core.case.tables import SUFFIXES, read_table
 from femubench.core.case.units import from_si, in_si
 from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
@@ -41,7 +41,6 @@ from femubench.core.files import read_text, write_atomically
 from femubench.core.roles import Reader
 
 _PACKERS: dict[str, Callable[[bytes], bytes]] = {".gz": gzip.compress, ".bz2": bz2.compress}
-_TABLES = (".csv", ".txt")
 _LABELS = "dofs: a table row,node,direction,x,y,z"
 _PLACES = "dofs: a table node,x,y,z, or a file with nodes"
 
@@ -193,7 +192,7 @@ def _labelled(model: Model, paths: ModelFiles, readers: Sequence[Reader]) -> Mod
     geometry = model.geometry
     assert isinstance(geometry, MatrixGeometry)
     if paths.dofs is not None:
-        if paths.dofs.suffix.lower() not in _TABLES:
+        if paths.dofs.suffix.lower() not in SUFFIXES:
             geometry = _placed(geometry, _nodes_of(paths.dofs, readers), paths.dofs)
         elif "row" not in read_table(paths.dofs).columns:
             geometry = _placed(geometry, read_nodes(paths.dofs), paths.dofs)
@@ -215,7 +214,7 @@ def _nodes_of(file: Path, readers: Sequence[Reader]) -> dict[str, Sequence[float
     reader = _reader(file, readers)
     if not hasattr(reader, "read_nodes"):
         known = [s for r in readers if hasattr(r, "read_nodes") for s in r.suffixes]
-        expected = ", ".join([*_TABLES, *known])
+        expected = ", ".join([*SUFFIXES, *known])
         raise InputError("no nodes are read from this kind of file", file=file, expected=expected)
     with reading_with(reader, file):
         return dict(reader.read_nodes(file))

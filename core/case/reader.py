@@ -33,7 +33,7 @@ from femubench.core.case.repeats import with_covariance, with_repeats
 from femubench.core.case.response_files import read_responses
 from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, ModificationSpec
 from femubench.core.case.sensors import read_sensors
-from femubench.core.case.tables import read_table
+from femubench.core.case.tables import SUFFIXES, read_table
 from femubench.core.case.toml_text import located, spec_of
 from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import Frame
@@ -45,7 +45,6 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Reader
 from femubench.core.typing import FloatArray
 
-_TABLES = (".csv", ".txt")
 _MESHED = "a frame that can be meshed"
 _EXPECTED = {
     "joint_springs": "a shorter one",
@@ -174,7 +173,7 @@ class _Building:
         """Return the path of a file, and what a reader plugin reads in it, None for a table."""
         with at_key(*key):
             path = self.files.path(name)
-        if path.suffix.lower() in _TABLES:
+        if path.suffix.lower() in SUFFIXES:
             return path, None
         reader = reader_of(path, self.readers)
         if reader is None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from femubench.core.case.files import LARGEST_FILE
 from femubench.core.case.matrices import reading_with
-from femubench.core.case.tables import Complex, read_table
+from femubench.core.case.tables import SUFFIXES, Complex, read_table
 from femubench.core.errors import InputError
 from femubench.core.fem.sensors import DIRECTIONS, Sensors
 from femubench.core.files import check_regular, open_regular
@@ -21,7 +21,7 @@ from femubench.core.modal.signals import TimeSignals
 from femubench.core.roles import Reader
 from femubench.core.typing import AnyArray
 
-_TABLE, _ARRAYS = (".csv", ".txt"), ".npz"
+_ARRAYS = ".npz"
 _QUANTITY: Quantity = "accelerance"  # where a file does not say: what an accelerometer measures
 _LABELS = "labels such as 12:z, a name and a direction"
 
@@ -51,7 +51,7 @@ def read_responses(
         if not isinstance(found, Responses):
             what = f"{reader.name} gave {type(found).__name__}"
             raise InputError(what, file=file, expected="FrequencyResponses or TimeSignals")
-    elif name.endswith(_TABLE):
+    elif name.endswith(SUFFIXES):
         found = _of_table(file, known)
     elif name.endswith(_ARRAYS):
         found = _of_arrays(file, _arrays(file), known)

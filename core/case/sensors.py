@@ -11,10 +11,7 @@ from femubench.core.case.frames import Site
 from femubench.core.case.matching import (
     Alignment,
     Placed,
-    check_apart,
-    check_near,
-    matches_of,
-    span_told,
+    Placement,
     told_of,
 )
 from femubench.core.case.tables import RESERVED, CsvRow, parse_place, read_table
@@ -63,18 +60,19 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
             np.eye(3),
         )
     every = np.array([row.vector() for row in table.rows], dtype=float)
-    matches = tuple(matches_of(list(labels), every, site, alignment, alignment.unit or 1.0))
+    test = Placement(site, alignment, every)
+    matches = tuple(test.match_labels(list(labels)))
     for row, match in zip(table.rows, matches, strict=True):
         try:
-            check_near(match, site, alignment, every)
+            test.check_near(match)
         except Misfit as misfit:
             raise row.error("x", misfit.what, misfit.expected) from None
     directions = [alignment.direction(way) for way in directions]
     for row, match, way in zip(table.rows, matches, directions, strict=True):
         _check_sensor(row, match.xyz, way, site, "x")
     try:
-        close = span_told(matches, file.name, site, alignment, every)
-        check_apart(list(zip(matches, directions, strict=True)), site, alignment, every)
+        close = test.check_span(matches, file.name)
+        test.check_apart(list(zip(matches, directions, strict=True)))
     except Misfit as misfit:
         raise InputError(misfit.what, file=file, expected=misfit.expected) from None
     xyz = np.array([match.xyz for match in matches], dtype=float)

@@ -18,14 +18,13 @@ from femubench.core.case.model_files import further_files
 from femubench.core.case.reader import read_case
 from femubench.core.case.schema import LengthUnit
 from femubench.core.case.table_text import csv_bytes
-from femubench.core.case.tables import read_table
+from femubench.core.case.tables import SUFFIXES, read_table
 from femubench.core.case.writing import new_folder
 from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
 from femubench.core.files import check_regular
 from femubench.core.roles import Reader
 
-_TABLES = (".csv", ".txt")
 MATCHES, PICTURE = "matches.csv", "matches.png"
 
 
@@ -123,14 +122,14 @@ def _copied(given: Beginning, fresh: Path, readers: Sequence[Reader]) -> dict[Pa
 
 def _shared_out(modes: Path, readers: Sequence[Reader]) -> tuple[list[int], list[int]]:
     """Return the labels of the modes to use, and of the upper third, which is held out."""
-    if modes.suffix.lower() in _TABLES:
+    if modes.suffix.lower() in SUFFIXES:
         table = read_table(modes)
         table.check_columns(("mode", "frequency"), table.columns)
         found = [(row.number("frequency") or 0.0, row.whole("mode")) for row in table.rows]
     else:
         reader = reader_of(modes, readers)
         if reader is None:
-            known = ", ".join([*_TABLES, *(s for r in readers for s in r.suffixes)])
+            known = ", ".join([*SUFFIXES, *(s for r in readers for s in r.suffixes)])
             raise InputError("unknown kind of file", file=modes, expected=known)
         with reading_with(reader, modes):
             read = reader.read_modes(modes)

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from functools import cached_property
 from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
@@ -25,6 +26,7 @@ _REAL = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _NUMBER = re.compile(_REAL, re.ASCII)
 _COMPLEX = re.compile(rf"\(?(?:({_REAL})(?=[+-]))?({_REAL})[ijIJ]\)?", re.ASCII)
 _WHOLE = re.compile(r"\+?\d{1,9}", re.ASCII)
+SUFFIXES = (".csv", ".txt")
 RESERVED = ("mode", "frequency", "frequency_std", "damping")
 PLACES = "sensors: a table label,x,y,z,direction, or label,at,direction"
 
@@ -138,9 +140,24 @@ def whole_number(cell: str) -> int | str:
 
 
 @dataclass(frozen=True)
-class _Headed:
+class CsvTable:
+    """A CSV file: its column names, and line and cells of every row.
+
+    A table of a million rows is read by its cells alone; `rows` takes as much memory again.
+    """
+
     file: Path
     columns: tuple[str, ...]
+    lines: tuple[int, ...]
+    cells: tuple[list[str], ...]
+
+    @cached_property
+    def rows(self) -> tuple[CsvRow, ...]:
+        """Return the rows, whose cells are found by column."""
+        return tuple(
+            CsvRow(self.file, line, dict(zip(self.columns, cells, strict=True)))
+            for line, cells in zip(self.lines, self.cells, strict=True)
+        )
 
     def check_columns(self, required: tuple[str, ...], known: Collection[str] = ()) -> None:
         """Check that the required columns are there and no others but the known ones."""
@@ -155,40 +172,11 @@ class _Headed:
                 raise InputError(what, file=self.file, line=1, key=key, expected=listed)
 
 
-@dataclass(frozen=True)
-class CsvTable(_Headed):
-    """A CSV file: its column names and its rows."""
-
-    rows: tuple[CsvRow, ...]
-
-
-@dataclass(frozen=True)
-class Cells(_Headed):
-    """A CSV file as texts: its column names, and line and cells of every row."""
-
-    lines: tuple[int, ...]
-    cells: tuple[list[str], ...]
-
-
 def read_table(file: Path) -> CsvTable:
     """Return the content of a CSV file whose first row names the columns.
 
     Raises:
         InputError: for a ragged row, a column without name or named twice, a broken quotation.
-    """
-    plain = read_cells(file)
-    rows = (
-        CsvRow(file, line, dict(zip(plain.columns, cells, strict=True)))
-        for line, cells in zip(plain.lines, plain.cells, strict=True)
-    )
-    return CsvTable(file, plain.columns, tuple(rows))
-
-
-def read_cells(file: Path) -> Cells:
-    """Return the same as texts, for tables of a million rows.
-
-    Raises:
-        InputError: as `read_table`.
     """
     reader = csv.reader(StringIO(read_text(file, LARGEST_TEXT)), skipinitialspace=True)
     lines: list[int] = []
@@ -220,7 +208,7 @@ def read_cells(file: Path) -> Cells:
         raise InputError(what, file=file, line=reader.line_num, expected=expected) from None
     if not columns:
         raise InputError("empty file", file=file, expected="a row of column names")
-    return Cells(file, columns, tuple(lines), tuple(rows))
+    return CsvTable(file, columns, tuple(lines), tuple(rows))
 
 
 def _header(file: Path, line: int, cells: list[str]) -> tuple[str, ...]:

@@ -53,7 +53,6 @@ from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
 from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.modal.measurement import Measurement
-from femubench.core.typing import SparseArray
 
 
 @contextmanager
@@ -107,9 +106,7 @@ def check_written(fresh: Path, folder: Path, wanted: Case) -> None:
     except InputError as error:
         what = error.what.replace(str(fresh), str(folder))
         raise refused(folder, what, error.key, error.expected) from None
-    mass, stiffness = matrices_of(wanted.model)
-    matrices = ((mass, back.model.mass), (stiffness, back.model.stiffness))
-    if not all(alike(one, other, _SAME_MATRIX) for one, other in matrices):
+    if not back.model.has_matrices(*matrices_of(wanted.model), _SAME_MATRIX):
         what = "no keys of a frame give the matrices of this model"
         raise refused(folder, what, "model", "parameters that keys can say")
     for part in _SETTINGS:
@@ -165,15 +162,6 @@ def _differing(one: Measurement, other: Measurement) -> str | None:
         if not same:
             return f.name
     return None
-
-
-def alike(one: SparseArray, other: SparseArray, tolerance: float = 1e-12) -> bool:
-    """Tell whether two symmetric matrices agree, entry by entry, to a share of their diagonals."""
-    if one.shape != other.shape:
-        return False
-    apart = (one - other).tocoo()
-    size = np.sqrt(np.abs(one.diagonal()))
-    return bool(np.all(np.abs(apart.data) <= tolerance * size[apart.row] * size[apart.col]))
 
 
 def refused(folder: Path, what: str, key: str | None, expected: str | None) -> InputError:
@@ -347,5 +335,4 @@ def _matrices_changed(model: Model) -> bool:
     """Tell whether the matrices of a frame model are others than those of its frame."""
     if model.mass_change is not None or model.stiffness_change is not None:
         return True
-    mass, stiffness = model.frame_structure.matrices()
-    return not (alike(model.mass, mass) and alike(model.stiffness, stiffness))
+    return not model.has_matrices(*model.frame_structure.matrices())

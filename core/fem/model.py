@@ -182,6 +182,18 @@ class Model(Shown):
         shift = self.dofs.motions[:, :3]
         return float(np.einsum("nd,nd->d", shift, self.mass_times(shift)).max())
 
+    def has_matrices(
+        self, mass: SparseArray, stiffness: SparseArray, tolerance: float = 1e-12
+    ) -> bool:
+        """Tell whether both matrices agree with the model's, to a share of their diagonals."""
+        for own, other in ((self.mass, mass), (self.stiffness, stiffness)):
+            if own.shape != other.shape:
+                return False
+            apart, size = (own - other).tocoo(), np.sqrt(np.abs(own.diagonal()))
+            if not np.all(np.abs(apart.data) <= tolerance * size[apart.row] * size[apart.col]):
+                return False
+        return True
+
     @property
     def frame_structure(self) -> Structure:
         """Return the meshed frame.

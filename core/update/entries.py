@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -69,11 +70,16 @@ class EntryPattern:
             changes: of every entry, relative to its nominal size, (n_entries,).
         """
         values = self.values + np.abs(self.values) * changes
-        off = self.row != self.column
-        entries = np.concatenate([values, values[off]])
+        rows, columns, which = self._both_triangles
+        return sp.csc_array((values[which], (rows, columns)), shape=(self.size, self.size))
+
+    @cached_property
+    def _both_triangles(self) -> tuple[IntArray, IntArray, IntArray]:
+        """Return row, column and entry of all that is not zero in the full matrix."""
+        off = np.flatnonzero(self.row != self.column)
         rows = np.concatenate([self.row, self.column[off]])
         columns = np.concatenate([self.column, self.row[off]])
-        return sp.csc_array((entries, (rows, columns)), shape=(self.size, self.size))
+        return rows, columns, np.concatenate([np.arange(len(self)), off])
 
     def products(self, vectors: FloatArray, scale: FloatArray) -> SparseArray:
         """Return how scale * (K @ vectors) depends on the relative changes.
@@ -85,11 +91,7 @@ class EntryPattern:
         Returns:
             Sparse (n m, n_entries); row i m + j belongs to dof i of vector j.
         """
-        m, off = vectors.shape[1], self.row != self.column
-        entry = np.arange(len(self))
-        target = np.concatenate([self.row, self.column[off]])
-        source = np.concatenate([self.column, self.row[off]])
-        which = np.concatenate([entry, entry[off]])
+        m, (target, source, which) = vectors.shape[1], self._both_triangles
         factor = scale[target] * np.abs(self.values[which])
         data = factor[:, None] * vectors[source]
         rows = target[:, None] * m + np.arange(m)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -35,6 +35,7 @@ _DEPENDENT = 1e-8
 _NO_MODEL = 10.0  # more than any residual of a model
 _LONGEST = 0.5  # step of ln theta
 _HALVINGS = 6
+_ITERATIONS, _SMALL = 20, 1e-3
 _EVALUATIONS, _TOLERANCE = 30, 1e-6
 _MOST_FORCES = 4_000_000  # numbers, 32 MB
 _INSIDE = 0.999  # a start at a bound could not leave it
@@ -208,6 +209,37 @@ class ModalSpace:
         counted = seen_modes(self.measurement.shapes) & (self.shape_weight > 0.0)
         length = [np.linalg.norm(s) if c else np.inf for s, c in zip(shapes, counted, strict=True)]
         return np.asarray(shapes / np.array(length)[:, None])
+
+    def fit_penalised(
+        self,
+        weigh: Callable[[FloatArray, FloatArray], float],
+        solve: Callable[[FloatArray, FloatArray, float], FloatArray],
+        *,
+        squares: bool,
+    ) -> tuple[FloatArray, ModalFit, list[dict[str, float]], float]:
+        """Return coordinates, fit, history and weight, linearised anew until nothing moves.
+
+        Arguments:
+            weigh: from S (m, p) and b (m,) to the weight of the penalty.
+            solve: from S, b and the weight to the x / spread of least cost.
+            squares: whether the penalty is mu^2 |x|^2, else it is 2 mu sum |x_j|.
+        """
+        x = np.zeros(len(self.spread))
+        fit, history, weight = self.fit(x), list[dict[str, float]](), 0.0
+        for _ in range(_ITERATIONS):
+            right = fit.slope @ x - fit.residual
+            if not (fit.slope.T @ right).any():
+                break
+            slope = fit.slope * self.spread
+            weight = weigh(slope, right)
+            wanted, before = self.spread * solve(slope, right, weight), x
+            cost = {"squares": weight**2} if squares else {"sizes": 2.0 * weight}
+            x, fit = self.advance(x, fit, wanted, **cost)
+            moved = float(np.abs(x - before).max())
+            history.append({"cost": fit.cost, "step": moved, "weight": weight})
+            if moved < _SMALL:
+                break
+        return x, fit, history, weight
 
     def advance(
         self,

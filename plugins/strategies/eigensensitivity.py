@@ -17,9 +17,6 @@ from femubench.update import (
     tikhonov,
 )
 
-_ITERATIONS = 20
-_SMALL = 1e-3
-
 
 @dataclass(frozen=True)
 class Eigensensitivity(ParametricStrategy):
@@ -63,19 +60,5 @@ class Eigensensitivity(ParametricStrategy):
         """
         parts = parameterise(model, self.changes)
         space = modal_space(parts, measurement, shape_weight=self.shape_weight)
-        log = np.zeros(len(parts))
-        fit, history, weight = space.fit(log), [], 0.0
-        for _ in range(_ITERATIONS):
-            right = fit.slope @ log - fit.residual
-            if not right.any() or not fit.slope.any():
-                break
-            slope = fit.slope * space.spread
-            weight = l_curve_corner(slope, right)
-            wanted = space.spread * tikhonov(slope, right, weight)
-            before = log
-            log, fit = space.advance(log, fit, wanted, squares=weight**2)
-            moved = float(np.abs(log - before).max())
-            history.append({"cost": fit.cost, "step": moved, "weight": weight})
-            if moved < _SMALL:
-                break
+        log, fit, history, weight = space.fit_penalised(l_curve_corner, tikhonov, squares=True)
         return parametric_result(parts, log, history, weight=weight, paired_modes=float(fit.paired))

@@ -11,8 +11,6 @@ from femubench import Measurement, Model, UpdateResult
 from femubench.fem import FloatArray
 from femubench.update import ParametricStrategy, lasso, modal_space, parameterise, parametric_result
 
-_ITERATIONS = 20
-_SMALL = 1e-3
 _WEIGHTS = np.logspace(0.0, -5.0, 21)  # of the least weight at which nothing changes
 _ZERO = 1e-3  # a smaller ln(factor) is no change
 
@@ -52,20 +50,7 @@ class Sparse(ParametricStrategy):
         """
         parts = parameterise(model, self.changes)
         space = modal_space(parts, measurement, shape_weight=0.0)
-        log = np.zeros(len(parts))
-        fit, history, weight = space.fit(log), [], 0.0
-        for _ in range(_ITERATIONS):
-            right = fit.slope @ log - fit.residual
-            if not (fit.slope.T @ right).any():
-                break
-            slope = fit.slope * space.spread
-            weight = cross_validated_weight(slope, right)
-            wanted, before = space.spread * lasso(slope, right, weight), log
-            log, fit = space.advance(log, fit, wanted, sizes=2.0 * weight)
-            moved = float(np.abs(log - before).max())
-            history.append({"cost": fit.cost, "step": moved, "weight": weight})
-            if moved < _SMALL:
-                break
+        log, _, history, weight = space.fit_penalised(cross_validated_weight, lasso, squares=False)
         changed = float((np.abs(log) > _ZERO).sum())
         return parametric_result(parts, log, history, weight=weight, changed=changed)
 

@@ -20,7 +20,6 @@ from femubench.fem import (
     GroundSpring,
     Place,
     PointMass,
-    SparseArray,
     Structure,
 )
 from femubench.plugins.readers.bulk_data.cards import Card, Deck
@@ -89,8 +88,7 @@ def _changed(
     if structure.labels != nominal.labels or model.size != len(nominal.kinematics.node):
         raise _refusal(path)
     wanted: Structure = replace(nominal, properties=new)
-    mass, stiffness = wanted.matrices()
-    if not (_alike(model.mass, mass) and _alike(model.stiffness, stiffness)):
+    if not model.has_matrices(*wanted.matrices(), _KEPT):
         raise _refusal(path)
     for f in fields(BeamProperties):
         before, after = getattr(nominal.properties, f.name), getattr(new, f.name)
@@ -121,12 +119,6 @@ def _changed(
             what = f"bar {name!r} has a rotary inertia or a shear of its own"
             raise InputError(what, file=path, expected=_EXPECTED)
     return found
-
-
-def _alike(one: SparseArray, other: SparseArray) -> bool:
-    apart = (one - other).tocoo()
-    size = np.sqrt(np.abs(one.diagonal()))
-    return bool(np.all(np.abs(apart.data) <= _KEPT * size[apart.row] * size[apart.col]))
 
 
 def _parted(bar: Bar, ratio: Mapping[str, float], e: float) -> tuple[Numbers, Numbers]:
