@@ -109,17 +109,7 @@ def judge_answer(truth: Truth, answer: Answer, delta_chi2: Sequence[float]) -> J
         whole = tuple(part for parts in possible if len(parts) == 1 for part in parts)
         among = tuple(part for part in whole if part[0] in every)
         named += [among] if among and visible <= _effects(among) else []
-    placed = [
-        parts
-        for parts in named
-        if all(
-            any(
-                effect == cause.effect and match(frame, place, cause.place)
-                for cause in truth.causes
-            )
-            for effect, place in parts
-        )
-    ]
+    placed = [parts for parts in named if _sit_right(frame, parts, truth.causes)]
     found = len(every & frozenset(effect for parts in possible for effect, _ in parts))
     too_small = not visible
     if answer.verdict == "none":
@@ -163,6 +153,14 @@ def group_size(answer: Answer) -> int:
     if answer.verdict != "ambiguous":
         return 0
     return len({_effects(cause.parts) for cause in answer.causes if cause.side == "model"})
+
+
+def _sit_right(frame: Frame, parts: Parts, causes: Sequence[HiddenCause]) -> bool:
+    """Tell whether every effect named sits where it truly sits."""
+    return all(
+        any(effect == cause.effect and match(frame, place, cause.place) for cause in causes)
+        for effect, place in parts
+    )
 
 
 def _sizes(frame: Frame, answer: Answer, causes: Sequence[HiddenCause]) -> tuple[SizeError, ...]:

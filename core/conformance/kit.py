@@ -121,9 +121,8 @@ def check_apart(
     def put(function: Callable[..., Verdict]) -> Callable[..., Verdict]:
         def judge(bench: Bench) -> Verdict:
             subject = bench.subject
-            if code_alone and not is_foreign(
-                subject.base if isinstance(subject, Variant) else subject
-            ):
+            owner = subject.base if isinstance(subject, Variant) else subject
+            if code_alone and not is_foreign(owner):
                 return function(subject)
             return bench.apart(function, *bench.helpers)
 

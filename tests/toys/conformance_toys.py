@@ -497,7 +497,7 @@ def _tell(text: bytes) -> None:
         def dump_json(self, _: object) -> bytes:
             return text
 
-    trial._told = Words  # type: ignore[assignment]
+    trial._adapter = Words  # type: ignore[assignment]
 
 
 class ForgingWords(Good):
