@@ -279,7 +279,10 @@ def test_results_are_checked(key: str, value: object) -> None:
 def test_what_was_written_reads_back() -> None:
     run = run_from_json(json.loads(run_text()))
     assert run.meta == a_run().meta
-    assert [result.reason for result in run.results] == [r.reason for r in a_run().results]
+    line = schema.encode_result(run.results[0])
+    assert schema.decode_result(line) == run.results[0]
+    with pytest.raises(InputError, match=r"seed: out of bounds \(expected a whole number >= 0\)"):
+        schema.decode_result(line.replace(b'"seed":0', b'"seed":-1'))
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What is drawn of cases and jobs, in files beside a store that results do not depend on."""
+"""What is drawn of cases and jobs, in files next to a store that results do not depend on."""
 
 from __future__ import annotations
 
@@ -173,7 +173,7 @@ class Exhibits:
         path = self._path(key)
         if path is None or path.exists():
             return
-        # Pictures are worth no failed run: a full disk is told by the results.
+        # Pictures are worth no failed run: the results say that a disk is full.
         with suppress(OSError, OutputError, ValueError):
             plain = {"schema": _SCHEMA, **data}
             text = json.dumps(plain, allow_nan=False, separators=(",", ":"))

@@ -1,4 +1,4 @@
-"""Result files of strangers for a public leaderboard: checked, normalised, named by content."""
+"""Result files of anybody for a public leaderboard: checked, normalised, named by content."""
 
 from __future__ import annotations
 
@@ -196,7 +196,7 @@ def _meta(run: Run, file: Path) -> dict[str, Any]:
 
 
 def _check(result: JobResult, meta: Mapping[str, Any], file: Path, key: str) -> None:
-    """Check what a ranking among strangers rests on.
+    """Check what a ranking of results from anywhere rests on.
 
     Raises:
         InputError: for a job without key or digest, or an error that its modes do not give.

@@ -151,9 +151,9 @@ class LookWarning:
     Arguments:
         what: one sentence.
         where: member, section or ``all``.
-        effect: slug of the effect that would mend it; empty where there is none.
+        effect: slug of the effect that would correct it; empty where there is none.
         changes: from the model's elastic mode number (from 1) to the change of its frequency in
-            percent, were it mended.
+            percent, were it corrected.
     """
 
     what: str

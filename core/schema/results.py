@@ -78,7 +78,7 @@ class JobResult:
             the unseen blocks of (rms + 0.05 %) / (its rms + 0.05 %). Less is better.
         rank: within case, seed and nominal model; 1 is best.
         parameters, history, diagnostics: as the strategy gave them, in plain data.
-        traceback: of an exception, for whoever asks for it.
+        traceback: of an exception.
         key: of the job, from everything that decides on its result; empty where it is not known.
         provenance: versions, libraries, processor, commit and digests, in plain data.
         nominal: the model that the strategy started from; ``textbook`` too where the model as drawn
@@ -160,14 +160,14 @@ def rate(result: JobResult, score: float, rank: int) -> None:
 
 
 def origins_of(meta: Mapping[str, Any], *kinds: str) -> dict[str, str]:
-    """Return from the names of what ran beside the cases of a run to the cases they belong to.
+    """Return from the names of what ran with the cases of a run to the cases they belong to.
 
     Arguments:
         meta: of the run.
         kinds: ``of`` for twins, ``again`` for jobs that were run a second time; both by default.
     """
-    told = meta.get("twins") or {}
-    found = (told.get(kind) or {} for kind in kinds or ("of", "again"))
+    twins = meta.get("twins") or {}
+    found = (twins.get(kind) or {} for kind in kinds or ("of", "again"))
     return {name: case for named in found for name, case in named.items()}
 
 
@@ -189,8 +189,8 @@ class Run(Shown):
     @property
     def nominals(self) -> tuple[Nominal, ...]:
         """Return the models that strategies started from, the one that ranks first."""
-        told = {name for names in (self.meta.get("starts") or {}).values() for name in names}
-        found = told | {result.nominal for result in self.results}
+        asked = {name for names in (self.meta.get("starts") or {}).values() for name in names}
+        found = asked | {result.nominal for result in self.results}
         return tuple(name for name in reversed(NOMINALS) if name in found) or ("drawn",)
 
     @property

@@ -30,7 +30,7 @@ ANYTHING = 0.01
 
 @dataclass(frozen=True)
 class Forecasts:
-    """Predictions of unseen modes beside what was measured.
+    """Predictions of unseen modes and what was measured.
 
     Arguments:
         error: predicted minus measured frequency in percent of the measured one, (n,).

@@ -9,6 +9,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -486,18 +487,15 @@ class ForgingBytes(Good):
     def finish(self, model: Model) -> UpdateResult:
         from femubench.core.conformance import trial
 
-        trial.packed = lambda outcome, nominal: b"o" + bytes(100)
+        trial.pack_outcome = lambda outcome, nominal: b"o" + bytes(100)
         return super().finish(model)
 
 
 def _tell(text: bytes) -> None:
     from femubench.core.conformance import trial
 
-    class Words:
-        def dump_json(self, _: object) -> bytes:
-            return text
-
-    trial._adapter = Words  # type: ignore[assignment]
+    words = SimpleNamespace(encode=lambda found: text)
+    trial.msgspec = SimpleNamespace(json=words)  # type: ignore[assignment]
 
 
 class ForgingWords(Good):
