@@ -4,7 +4,7 @@ from femubench.core.drawing.element_change import element_norms, stiffness_diffe
 from femubench.core.roles import Reporter
 from femubench.core.run.frames import modes_frame, results_frame, run_from_json, run_to_json
 from femubench.core.run.runner import run_jobs
-from femubench.core.run.store import Store
+from femubench.core.run.store import Store, note_missing_jobs
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block, JobResult, Run
 from femubench.core.score import predictive
@@ -55,6 +55,7 @@ __all__ = [
     "is_test",
     "leaderboard",
     "modes_frame",
+    "note_missing_jobs",
     "predict_block",
     "predictive",
     "rank_results",

@@ -19,7 +19,7 @@ from femubench.core.roles import Strategy
 from femubench.core.run.executor import Executor, LocalProcesses, worker_count
 from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import home_of, plan_digest, run_meta
-from femubench.core.run.recording import Overwrite, Progress, Results, ended, recorded
+from femubench.core.run.recording import Overwrite, Progress, Results, begin_run, record_end
 from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Starts
 from femubench.core.run.stopping import stopping
@@ -105,8 +105,8 @@ def run_jobs(
         who, about = slots.strategies, {**starts.about(cases), **starts.beside.about(references)}
         yardsticks = {case.name: references[case.name] for case in cases}
         slots.meta = run_meta(cases, who, yardsticks, seeds, asked, about)
-        meta, known = recorded(stack, store, slots.meta, overwrite, resume)
-        ending = stack.enter_context(ended(store, meta["run"]))
+        meta, known = begin_run(stack, store, slots.meta, overwrite, resume)
+        ending = stack.enter_context(record_end(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress, told)
         wanted = stack.enter_context(stopping()).until(results.keep(known, place.workers))
         for one in place.computed(slots, wanted, references, limits, results.shelf):
