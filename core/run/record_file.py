@@ -255,14 +255,17 @@ def read_records(file: Path, faults: list[InputError]) -> Iterator[Record]:
     Raises:
         InputError: when the file cannot be read.
     """
-    number = 0
+    number, kind = 0, ""
     try:
         with closing(_connect(file)) as connection:
             for row in connection.execute("SELECT * FROM records ORDER BY number"):
                 if row[0] != number + 1 or not _is_whole(row):
                     raise sqlite3.DatabaseError(f"record {number + 1} is not as it was written")
-                number += 1
+                number, kind = number + 1, row[1]
                 yield _record_of(row, file)
+            # A damaged tree may look as if it ended early.
+            if kind != "end" and (wrong := _check_tree(connection)):
+                raise sqlite3.DatabaseError(wrong)
         return
     except _DAMAGE as error:
         why = error
@@ -309,6 +312,12 @@ def _salvage(file: Path) -> dict[int, Record]:
     return found
 
 
+def _check_tree(connection: sqlite3.Connection) -> str:
+    """Return what is wrong with the pages of a file; nothing where they are in order."""
+    (found,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+    return "" if found == "ok" else str(found)
+
+
 def find_faults(file: Path) -> list[InputError]:
     """Return what is damaged or missing in a file; every record is read to its end.
 
@@ -322,9 +331,8 @@ def find_faults(file: Path) -> list[InputError]:
         except InputError as fault:
             faults.append(fault)
     with suppress(*_DAMAGE), closing(_connect(file)) as connection:
-        lines = [line for (line,) in connection.execute("PRAGMA integrity_check")]
-        if lines != ["ok"] and not faults:
-            faults.append(InputError(f"damaged: {lines[0]}", file=file))
+        if (wrong := _check_tree(connection)) and not faults:
+            faults.append(InputError(f"damaged: {wrong}", file=file))
     content = read_bytes(file, LARGEST)
     digest = int.from_bytes(content[_DIGEST], "big")
     same = content[_CHANGES] == content[_VALID_FOR] and digest in (0, _digest_of(content))
