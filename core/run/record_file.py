@@ -285,15 +285,16 @@ def _salvage(file: Path) -> dict[int, Record]:
     that lead to others have to be whole.
     """
     content = bytearray(read_bytes(file, LARGEST))
+    content += bytes(-len(content) % _PAGE)  # of a file that was cut short
     pages = len(content) // _PAGE
     content[:_PAGE] = make_image(())[:_PAGE]
     content[28:32] = pages.to_bytes(4, "big")
-    starts = [start for start in range(_PAGE, pages * _PAGE, _PAGE) if content[start]]
+    starts = [start for start in range(_PAGE, len(content), _PAGE) if content[start]]
     for start in starts:
         content[start] = _LEAF
     found: dict[int, Record] = {}
     with closing(_connect(":memory:")) as connection:
-        connection.deserialize(bytes(content[: pages * _PAGE]))
+        connection.deserialize(bytes(content))
 
         def rows(question: str) -> list[Row]:
             with suppress(*_DAMAGE):
