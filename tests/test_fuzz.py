@@ -17,9 +17,10 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from femubench import FemubenchError, InputError, read_case
+from femubench import FemubenchError, read_case
 from femubench.core.cli.main import bench
 from femubench.core.plugin.loader import load_plugins
+from femubench.core.run.upkeep import convert_old_files, find_store_faults
 from femubench.core.schema.records import read_run
 from femubench.results import Store
 
@@ -158,16 +159,24 @@ def case_format(folder: Path, share: float, format: str) -> None:
 
 
 def results_format(folder: Path, share: float, format: str) -> None:
-    text = run_text() if format == "run" else store_text(folder / "store")
+    text = run_text() if format == "run" else store_text()
     file = folder / ("run.json" if format == "run" else "results.jsonl")
 
     count = 0
 
     def report() -> None:
         nonlocal count
-        run = read_run(file) if format == "run" else Store(folder).load()
-        if any("left out" in note for note in run.meta.get("notes") or ()):
-            raise InputError("left out", file=file)
+        if format == "run":
+            run = read_run(file)
+        else:
+            store = Store(folder)
+            for own in store.files:
+                own.unlink()
+            ((_, faults),) = convert_old_files(store).values()
+            run = store.load()
+            assert find_store_faults(store) == [] or faults == []
+            if faults:
+                raise faults[0]
         count += 1
         for reporter in REPORTERS:
             if reporter.name == "html" and count % _PAGE_SHARE != 1:
@@ -194,8 +203,8 @@ def results_format(folder: Path, share: float, format: str) -> None:
     tally = fuzz(format, share, make, read)
     for content in tally.refused:
         file.write_bytes(content)
-        words = [str(file)] if format == "run" else ["--store", str(folder)]
-        refused_by_command(["report", *words], lenient=format == "store")
+        words = ["report", file] if format == "run" else ["store", "repair", "--store", folder]
+        refused_by_command([*map(str, words)], lenient=format == "store")
 
 
 FORMATS = ["toml", "csv", "mtx", "universal", "run", "store"]

@@ -143,6 +143,9 @@ def test_a_file_that_was_cut_short_is_read_as_far_as_it_goes(tmp_path: Path) -> 
     store.append(META["run"], BAD)
     assert "failing" in [item.strategy for item in store.load().results]
     assert len(store.load().results) >= 6
+    store.repair(META["run"])
+    store.append(META["run"], replace(BAD, seed=77))
+    assert len(store.load().results) >= 7
     assert find_store_faults(store) == []
 
 

@@ -279,12 +279,23 @@ def read_records(file: Path, faults: list[InputError]) -> Iterator[Record]:
 
 
 def _salvage(file: Path) -> dict[int, Record]:
-    """Return all records that are whole anywhere in a damaged file, by number.
+    """Return all records that are whole anywhere in a damaged file or in its log, by number."""
+    contents = [read_bytes(file, LARGEST)]
+    with suppress(*_DAMAGE), closing(_connect(file)) as connection:
+        contents.append(connection.serialize())  # with what is in the log alone
+    return {
+        row[0]: _record_of(row, file)
+        for content in contents
+        for row in _rows_of(bytearray(content))
+    }
+
+
+def _rows_of(content: bytearray) -> Iterator[Row]:
+    """Yield all records that are whole in the content of a damaged file.
 
     Every page is read as if it were a table of its own, so that neither the first page nor those
     that lead to others have to be whole.
     """
-    content = bytearray(read_bytes(file, LARGEST))
     content += bytes(-len(content) % _PAGE)  # of a file that was cut short
     pages = len(content) // _PAGE
     content[:_PAGE] = make_image(())[:_PAGE]
@@ -292,7 +303,6 @@ def _salvage(file: Path) -> dict[int, Record]:
     starts = [start for start in range(_PAGE, len(content), _PAGE) if content[start]]
     for start in starts:
         content[start] = _LEAF
-    found: dict[int, Record] = {}
     with closing(_connect(":memory:")) as connection:
         connection.deserialize(bytes(content))
 
@@ -307,10 +317,8 @@ def _salvage(file: Path) -> dict[int, Record]:
             connection.execute(f"{root} WHERE name = 'records'")
             connection.execute("PRAGMA writable_schema = RESET")
             for number, *_ in rows("SELECT number FROM records"):
-                for row in rows(f"SELECT * FROM records WHERE number = {number}"):
-                    if _is_whole(row):
-                        found[row[0]] = _record_of(row, file)
-    return found
+                found = rows(f"SELECT * FROM records WHERE number = {number}")
+                yield from filter(_is_whole, found)
 
 
 def _check_tree(connection: sqlite3.Connection) -> str:

@@ -298,6 +298,7 @@ class Store:
         Raises:
             InputError: when something cannot be read or written.
         """
+        self._close(run_id)
         file, faults = self.file_of(run_id), find_faults(self.file_of(run_id))
         if faults:
             with report_write_errors(file):
@@ -345,7 +346,6 @@ class Store:
                 self._writer(run_id).append(record, at_once=at_once)
             except sqlite3.DatabaseError:
                 # What is damaged, of which a full disk is no part, takes no records.
-                self._close(run_id)
                 if not (self.file_of(run_id).exists() and self.repair(run_id)):
                     raise
                 self._writer(run_id).append(record, at_once=at_once)
