@@ -17,7 +17,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -96,10 +95,12 @@ def results_of(meta: dict[str, Any]) -> Iterator[JobResult]:
 def _block(percent: float, errors: list[float], first: int, strategy: str) -> Block:
     std = 0.5 if int(strategy[-2:]) % 2 else None
     modes = (
-        PairedMode(first + n, 100.0 * (first + n), 100.0 * (first + n) + e, 1.0 / (1.0 + e))
+        PairedMode(
+            first + n, 100.0 * (first + n), 100.0 * (first + n) + e, 1.0 / (1.0 + e), None, std
+        )
         for n, e in enumerate(errors)
     )
-    return Block(percent, 0.99, tuple(replace(m, predicted_std_hz=std) for m in modes))
+    return Block(percent, 0.99, tuple(modes))
 
 
 def make(folder: Path, results: int) -> Store:

@@ -17,12 +17,12 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from femubench import FemubenchError, read_case
+from femubench import FemubenchError, InputError, read_case
 from femubench.core.cli.main import bench
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.run.upkeep import convert_old_files, find_store_faults
-from femubench.core.schema.records import read_run
-from femubench.results import Store
+from femubench.core.run.upkeep import read_old_records
+from femubench.core.schema.records import read_run, result_to_json, run_from_json
+from femubench.results import Run
 
 sys.path.insert(0, str(Path(__file__).parent / "fuzz"))
 from mutations import changed_json, edits, json_edits, mutated
@@ -158,6 +158,17 @@ def case_format(folder: Path, share: float, format: str) -> None:
     case_files(folder, share, files, format, commands=True)
 
 
+def run_of_lines(file: Path) -> Run:
+    """Return the run that a store of version 0.1 holds."""
+    faults: list[InputError] = []
+    found = [record for _, record in read_old_records(file, faults)]
+    if faults:
+        raise faults[0]
+    results = [result_to_json(record.result()) for record in found if record.kind == "result"]
+    meta = {k: v for record in found if record.kind != "result" for k, v in record.meta().items()}
+    return run_from_json({"meta": meta, "results": results}, file=file)
+
+
 def results_format(folder: Path, share: float, format: str) -> None:
     text = run_text() if format == "run" else store_text()
     file = folder / ("run.json" if format == "run" else "results.jsonl")
@@ -169,14 +180,7 @@ def results_format(folder: Path, share: float, format: str) -> None:
         if format == "run":
             run = read_run(file)
         else:
-            store = Store(folder)
-            for own in store.files:
-                own.unlink()
-            ((_, faults),) = convert_old_files(store).values()
-            run = store.load()
-            assert find_store_faults(store) == [] or faults == []
-            if faults:
-                raise faults[0]
+            run = run_of_lines(file)
         count += 1
         for reporter in REPORTERS:
             if reporter.name == "html" and count % _PAGE_SHARE != 1:

@@ -197,7 +197,7 @@ def test_a_full_disk_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     (writer,) = store._writers.values()
     (pages,) = writer._ask("PRAGMA page_count")
     writer._ask(f"PRAGMA max_page_count = {pages}")
-    with pytest.raises(InputError, match="cannot be written: database or disk is full") as caught:
+    with pytest.raises(InputError, match="cannot be written: No space left on device") as caught:
         store.append(META["run"], replace(BAD, traceback="x" * 2000))
     assert str(store.file_of(META["run"])) in str(caught.value)
     assert "\n" not in str(caught.value)

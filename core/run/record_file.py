@@ -109,9 +109,10 @@ def _checksum(number: int, kind: str, key: str, status: str, data: bytes) -> int
 
 def _is_whole(row: Row) -> bool:
     number, kind, key, status, data, checksum = row
-    with suppress(TypeError, UnicodeError):  # what is damaged may be of any type
+    try:
         return _checksum(number, kind, key, status, data) == checksum
-    return False
+    except (TypeError, UnicodeError):  # what is damaged may be of any type
+        return False
 
 
 def _connect(file: Path | str) -> sqlite3.Connection:

@@ -38,7 +38,7 @@ def convert_old_files(store: Store) -> dict[Path, tuple[int, list[InputError]]]:
     for file in store.old_files:
         faults: list[InputError] = []
         runs: dict[str, list[Record]] = {}
-        for run, record in _read_lines(file, faults):
+        for run, record in read_old_records(file, faults):
             runs.setdefault(run, []).append(record)
         for run, records in runs.items():
             own = store.file_of(run)
@@ -49,7 +49,7 @@ def convert_old_files(store: Store) -> dict[Path, tuple[int, list[InputError]]]:
     return done
 
 
-def _read_lines(file: Path, faults: list[InputError]) -> Iterator[tuple[str, Record]]:
+def read_old_records(file: Path, faults: list[InputError]) -> Iterator[tuple[str, Record]]:
     """Yield the records of a file of JSON lines with their runs.
 
     In schema 1 one file holds all runs; in schema 2 one does a run, and each line ends with a
@@ -63,7 +63,9 @@ def _read_lines(file: Path, faults: list[InputError]) -> Iterator[tuple[str, Rec
             if schema not in (1, 2) or (schema == 2 and not is_whole(line)):
                 raise InputError("damaged", **where, expected="a record")
             run = data["run"] if schema == 1 else file.stem
-            yield str(run), _record_of(data)
+            record = _record_of(data)
+            record.file, record.number = file, number
+            yield str(run), record
         except InputError as fault:
             where["key"], where["expected"] = fault.key, fault.expected
             faults.append(InputError(fault.what, **where))
