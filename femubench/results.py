@@ -12,7 +12,7 @@ from femubench.core.run.frames import (
     run_to_json as run_to_json,
 )
 from femubench.core.run.runner import run_jobs as run_jobs
-from femubench.core.run.store import Store as Store
+from femubench.core.run.store import Store as Store, note_missing_jobs as note_missing_jobs
 from femubench.core.schema.paired_modes import PairedMode as PairedMode
 from femubench.core.schema.results import Block as Block, JobResult as JobResult, Run as Run
 from femubench.core.score import predictive as predictive

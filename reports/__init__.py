@@ -11,6 +11,7 @@ CLASSES = {
     "csv": "csvs:CsvReporter",
     "modes-csv": "csvs:ModesCsvReporter",
     "json": "jsons:JsonReporter",
+    "jsonl": "jsons:JsonLinesReporter",
     "parquet": "parquets:ParquetReporter",
 }
 

@@ -41,6 +41,22 @@ class JsonReporter:
         return json.dumps(plain, indent=1, allow_nan=False)
 
 
+class JsonLinesReporter:
+    """One line for the run and one a job, to search in and to read one by one."""
+
+    name = "jsonl"
+    suffix = ".jsonl"
+
+    def render(self, run: Run) -> str:
+        """Return a table of strict JSON on each line."""
+        plain = run_to_json(run)
+        results = [*plain["results"], *plain.get("beside", ())]
+        of_run = {"run": plain["meta"].get("run")}
+        lines = [{"record": "run", **of_run, "meta": plain["meta"]}]
+        lines += [{"record": "result", **of_run, "result": result} for result in results]
+        return "\n".join(json.dumps(line, allow_nan=False) for line in lines)
+
+
 def board_of(run: Run) -> list[dict[str, Any]]:
     """Return the rows of the leaderboard as plain data, best first."""
     board = leaderboard(run)

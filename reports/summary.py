@@ -14,6 +14,7 @@ from femubench.results import (
     PairedMode,
     Run,
     interval_kind,
+    note_missing_jobs,
     scored_on,
     structures_of,
 )
@@ -200,16 +201,9 @@ def notes_of(run: Run) -> list[str]:
     """Return what a reader has to know before anything else: what was left out, what is missing."""
     told = run.meta.get("notes")
     notes = [plain(note) for note in told] if isinstance(told, (list, tuple)) else []
-    starts = run.meta.get("starts") or {}
-    models = sum(len(starts.get(case, ("drawn",))) for case in cases_of(run))
-    jobs = models * len(strategies_of(run)) * len(seeds_of(run))
-    still = "finished" in run.meta and run.meta["finished"] is None
-    if still or run.meta.get("interrupted") is True:
-        how = "has not ended" if still else "was interrupted"
-        notes.append(f"the run {how}: {len(run.results)} of {jobs} jobs are there")
-    elif len(run.results) < jobs:
-        notes.append(f"{jobs - len(run.results)} of {jobs} jobs are missing and score as failures")
-    return notes
+    if missing := note_missing_jobs(run.meta, (*run.results, *run.beside)):
+        notes.append(plain(missing))  # the store may have said so
+    return list(dict.fromkeys(notes))
 
 
 def seeds_of(run: Run) -> list[int]:

@@ -25,6 +25,7 @@ from femubench.core.files import write_atomically
 from femubench.core.pace import Advance
 from femubench.core.run.store import Store
 from femubench.core.schema.quantities import parse_size, parse_timeouts, say_duration
+from tests.toys.store_edits import edit, records
 
 MODULE = "femubench.core.cli.{}"  # of a verb
 CASE = """\
@@ -342,18 +343,17 @@ class TestGoingOn:
         words = ("-s", "test-nothing", "-s", "test-fails", "--seeds", 2, "-j", 1)
         words += ("--nominal", "drawn")
         assert invoke("run", case, *words).exit_code == 1
-        (store,) = Store(tmp_path / "femubench-results").files
-        lines = store.read_text().splitlines()
+        store = Store(tmp_path / "femubench-results")
         # As if the power had failed after the first result.
-        store.write_text("\n".join(lines[:3]) + "\n" + lines[3][:40])
+        edit(*store.files, "DELETE FROM records WHERE number > 2")
         result = invoke("run", "--resume", "-j", 1)
         assert result.exit_code == 1
         assert "2 strategies, seeds 1-2" in " ".join(result.stdout.split())
-        records = [json.loads(line) for line in store.read_text().splitlines()]
-        assert [item["record"] for item in records].count("run") == 2
+        found = records(store)
+        assert [item["record"] for item in found].count("run") == 1
         jobs = [
             (item["result"]["strategy"], item["result"]["seed"])
-            for item in records
+            for item in found
             if item["record"] == "result"
         ]
         assert set(jobs) == {(n, s) for n in ("test-nothing", "test-fails") for s in (1, 2)}

@@ -117,7 +117,7 @@ def test_quiet_runs_tell_no_board(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_what_ends_before_the_run_begins_is_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runner, "recorded", lambda *_: lost())
+    monkeypatch.setattr(runner, "begin_run", lambda *_: lost())
     result = CliRunner().invoke(bench, list(RUN))
     assert (result.exit_code, result.stderr) == (1, "bench: the scheduler was lost\n")
 

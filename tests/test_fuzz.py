@@ -22,8 +22,9 @@ from watch import watched
 from femubench import FemubenchError, InputError, read_case
 from femubench.core.cli.main import bench
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.schema.records import read_run
-from femubench.results import Store
+from femubench.core.run.upkeep import read_old_records
+from femubench.core.schema.records import read_run, result_to_json, run_from_json
+from femubench.results import Run
 
 FEW, MANY = 0.012, 1.0  # share of the inputs in the tests of every day
 INPUTS = {
@@ -154,17 +155,29 @@ def case_format(folder: Path, share: float, format: str) -> None:
     case_files(folder, share, files, format, commands=True)
 
 
+def run_of_lines(file: Path) -> Run:
+    """Return the run that a store of version 0.1 holds."""
+    faults: list[InputError] = []
+    found = [record for _, record in read_old_records(file, faults)]
+    if faults:
+        raise faults[0]
+    results = [result_to_json(record.result()) for record in found if record.kind == "result"]
+    meta = {k: v for record in found if record.kind != "result" for k, v in record.meta().items()}
+    return run_from_json({"meta": meta, "results": results}, file=file)
+
+
 def results_format(folder: Path, share: float, format: str) -> None:
-    text = run_text() if format == "run" else store_text(folder / "store")
+    text = run_text() if format == "run" else store_text()
     file = folder / ("run.json" if format == "run" else "results.jsonl")
 
     count = 0
 
     def report() -> None:
         nonlocal count
-        run = read_run(file) if format == "run" else Store(folder).load()
-        if any("left out" in note for note in run.meta.get("notes") or ()):
-            raise InputError("left out", file=file)
+        if format == "run":
+            run = read_run(file)
+        else:
+            run = run_of_lines(file)
         count += 1
         for reporter in REPORTERS:
             if reporter.name == "html" and count % _PAGE_SHARE != 1:
@@ -191,8 +204,8 @@ def results_format(folder: Path, share: float, format: str) -> None:
     tally = fuzz(format, share, make, read)
     for content in tally.refused:
         file.write_bytes(content)
-        words = [str(file)] if format == "run" else ["--store", str(folder)]
-        refused_by_command(["report", *words], lenient=format == "store")
+        words = ["report", file] if format == "run" else ["store", "repair", "--store", folder]
+        refused_by_command([*map(str, words)], lenient=format == "store")
 
 
 FORMATS = ["toml", "csv", "mtx", "universal", "run", "store"]

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import errno
 import json
-import os
 import re
+import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -21,7 +20,7 @@ from femubench.core.errors import InputError
 from femubench.core.run.frames import modes_frame, results_frame, run_from_json, run_to_json
 from femubench.core.run.provenance import git_commit, new_run_id, versions
 from femubench.core.run.store import Store
-from femubench.core.run.upkeep import faults_of, repair, unsealed
+from femubench.core.run.upkeep import convert_old_files, find_store_faults
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.records import result_to_json
 from femubench.core.schema.results import Block, JobResult, Run, Status
@@ -129,56 +128,85 @@ def test_an_unfinished_run_is_loaded_as_far_as_it_went(tmp_path: Path) -> None:
     assert [item.strategy for item in run.results] == ["softer"]
 
 
-def test_a_truncated_last_line_is_left_out_and_told(tmp_path: Path) -> None:
-    store = stored(tmp_path)
+def test_a_file_that_was_cut_short_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+    results = [replace(GOOD, seed=seed, reason="x" * 900) for seed in range(9)]
+    store = stored(tmp_path, results=results)
     (file,) = store.files
-    whole = file.read_bytes().splitlines(keepends=True)
-    file.write_bytes(b"".join(whole[:-2]) + whole[-2][:40])
-    run = store.load()
-    assert [item.strategy for item in run.results] == ["softer"]
-    (note,) = run.meta["notes"]
-    assert note.startswith(f"{file}:4: the last line is cut short")
-    # The next record does not end up behind the torso.
+    whole = file.read_bytes()
+    for size in range(0, len(whole), 700):
+        file.write_bytes(whole[:size])
+        assert find_store_faults(store) != []
+        run = store.load()
+        assert {item.seed for item in run.results} <= {*range(9)}
+        assert len(run.results) >= size // 2048 - 3
+        assert any("damaged" in note for note in run.meta["notes"])
+    store.append(META["run"], BAD)
+    assert "failing" in [item.strategy for item in store.load().results]
+    assert len(store.load().results) >= 6
+    store.repair(META["run"])
+    store.append(META["run"], replace(BAD, seed=77))
+    assert len(store.load().results) >= 7
+    assert find_store_faults(store) == []
+
+
+FULL = """
+import errno, resource, signal, sys
+from dataclasses import replace
+from pathlib import Path
+from femubench.core.errors import InputError
+from femubench.core.run.store import Store
+sys.path.insert(0, sys.argv[2])
+from test_harness_store import BAD, META
+store = Store(sys.argv[1])
+store.begin({**META, "run": "other"})
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), resource.RLIM_INFINITY))
+for seed in range(100):
+    try:
+        store.append(META["run"], replace(BAD, seed=seed + 1, traceback="x" * 2000))
+    except InputError as error:
+        print(seed, error)
+        break
+resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+store.append(META["run"], replace(BAD, seed=1000))
+store.end(META["run"], {"finished": "2026-01-01T00:00:09+00:00", "interrupted": False})
+"""
+
+
+@pytest.mark.parametrize("size", [9_000, 20_000, 60_123])
+def test_a_record_that_does_not_fit_on_the_disk_leaves_no_trace(size: int, tmp_path: Path) -> None:
+    """Files may have so many bytes and no more, as on a full disk; then there is room again."""
+    store = Store(tmp_path)
+    store.begin(META)
+    store.append(META["run"], GOOD)
+    command = [sys.executable, "-c", FULL, str(tmp_path), str(Path(__file__).parent), str(size)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    count, _, message = done.stdout.strip().partition(" ")
+    assert "a record cannot be written: " in message
+    assert str(store.file_of(META["run"])) in message
+    assert 0 <= int(count) < 99
+    seeds = [item.seed for item in store.load(META["run"]).results]
+    assert seeds == [0, *range(1, int(count) + 1), 1000]
+    assert find_store_faults(store) == []
+
+
+def test_a_full_disk_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = Store(tmp_path)
+    store.begin(META)
+    store.append(META["run"], GOOD)
+    (writer,) = store._writers.values()
+    (pages,) = writer._ask("PRAGMA page_count")
+    writer._ask(f"PRAGMA max_page_count = {pages}")
+    with pytest.raises(InputError, match="cannot be written: No space left on device") as caught:
+        store.append(META["run"], replace(BAD, traceback="x" * 2000))
+    assert str(store.file_of(META["run"])) in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert [item.strategy for item in store.load().results] == ["softer"]
     store.append(META["run"], BAD)
     assert [item.strategy for item in store.load().results] == ["softer", "failing"]
-    assert store.load().meta["notes"] == []
 
 
-@pytest.mark.parametrize("end", [b"", b"*"])
-def test_a_last_line_without_its_end_is_kept(end: bytes, tmp_path: Path) -> None:
-    store = stored(tmp_path, results=[GOOD])
-    (file,) = store.files
-    file.write_bytes(file.read_bytes().rstrip(b"\n") + end)
-    store.append(META["run"], BAD)
-    assert len(store.load().results) == 2
-    assert store.load().meta["finished"] is not None
-    assert faults_of(store) == []
-
-
-def full(descriptor: int, data: bytes) -> int:
-    raise OSError(errno.ENOSPC, "No space left on device")
-
-
-def nearly_full(descriptor: int, data: bytes, real: Callable[[int, bytes], int] = os.write) -> int:
-    return real(descriptor, data[:10])
-
-
-@pytest.mark.parametrize("write", [full, nearly_full])
-def test_a_record_that_does_not_fit_on_the_disk_leaves_no_trace(
-    write: Callable[[int, bytes], int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    store = stored(tmp_path, results=[GOOD])
-    (file,) = store.files
-    before = file.read_bytes()
-    monkeypatch.setattr(os, "write", write)
-    with pytest.raises(InputError, match="cannot be written: No space left on device") as caught:
-        store.append(META["run"], BAD)
-    assert str(file) in str(caught.value)
-    assert "\n" not in str(caught.value)
-    assert file.read_bytes() == before
-
-
-def test_a_store_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+def test_a_store_that_cannot_be_made_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     store = Store(tmp_path / "file" / "store")
     with pytest.raises(InputError, match=r"file/store.*: .*written: Not a directory"):
@@ -199,48 +227,52 @@ def earlier(folder: Path, results: Sequence[JobResult] = (GOOD, BAD)) -> list[st
     ("line", "message"),
     [
         ("{not json}", r"results\.jsonl:2: not JSON"),
-        ('{"record": "song"}', r"results\.jsonl:2: record: not a record \(expected one of run"),
-        ('{"record": "run", "schema": 99, "run": "a"}', r":2: schema: schema 99 \(expected 1"),
-        ('{"record": "run", "schema": 1}', ":2: run: no run id"),
+        ('{"record": "song"}', r"results\.jsonl:2: damaged \(expected a record"),
+        ('{"record": "run", "schema": 99, "run": "a"}', r":2: damaged"),
+        ('{"record": "run", "schema": 1}', ":2: not a record: 'run'"),
+        ('{"schema": 1, "run": "r", "record": "result", "result": {"case": 3}}', r":2: result\.c"),
     ],
 )
-def test_a_store_of_an_earlier_version_is_read_and_its_damage_told(
-    tmp_path: Path, line: str, message: str
-) -> None:
+def test_runs_of_version_0_1_are_converted(tmp_path: Path, line: str, message: str) -> None:
     lines = earlier(tmp_path)
     (tmp_path / "results.jsonl").write_text("\n".join([lines[0], line, *lines[1:]]) + "\n")
-    run = Store(tmp_path).load()
-    assert run.results == rank_results([GOOD, BAD], META["reference"])
-    (note,) = run.meta["notes"]
-    assert re.search(message, note)
-
-
-def test_a_wrong_field_is_told_with_its_key(tmp_path: Path) -> None:
-    text = "\n".join(earlier(tmp_path)).replace('"measured_hz": 200.0', '"measured_hz": "high"')
-    (tmp_path / "results.jsonl").write_text(text)
-    run = Store(tmp_path).load()
-    assert [item.strategy for item in run.results] == ["failing"]
-    assert ":2: result.used.modes[1].measured_hz: " in run.meta["notes"][0]
-
-
-def test_a_store_of_an_earlier_version_goes_on_and_is_converted(tmp_path: Path) -> None:
-    (tmp_path / "results.jsonl").write_text("\n".join(earlier(tmp_path)) + "\n{}\n")
-    store, late = Store(tmp_path), replace(GOOD, strategy="late", key="ab")
-    store.append(META["run"], late)
-    before = store.load()
-    assert [item.strategy for item in before.results] == ["softer", "failing", "late"]
+    store = Store(tmp_path)
+    with pytest.raises(InputError, match=r"no results; .*`bench store repair` converts them"):
+        store.load()
     stored(tmp_path, "20260102T000000Z-bbbbbb")
-    assert unsealed(store) == 4
-    assert [item.lost for item in repair(store)] == [1]
-    assert store.load(META["run"]).results == before.results
+    (note,) = store.load().meta["notes"]
+    assert note.endswith("runs of an earlier version; `bench store repair` converts them "
+        "(results.jsonl)")  # fmt: skip
+    ((file, (count, faults)),) = convert_old_files(store).items()
+    assert (file.name, count, len(faults)) == ("results.jsonl", 4, 1)
+    assert re.search(message, str(faults[0]))
+    run = store.load(META["run"])
+    assert run.results == rank_results([GOOD, BAD], META["reference"])
+    assert (run.meta["finished"], run.meta["notes"]) == ("2026-01-01T00:00:09+00:00", [])
     assert store.runs() == (META["run"], "20260102T000000Z-bbbbbb")
-    assert (unsealed(store), faults_of(store)) == (0, [])
+    assert find_store_faults(store) == []
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        f"{META['run']}.jsonl",
-        "20260102T000000Z-bbbbbb.jsonl",
+        f"{META['run']}.sqlite",
+        "20260102T000000Z-bbbbbb.sqlite",
         "results.jsonl.converted",
-        "results.jsonl.damaged",
     ]
+
+
+LINES = Path(__file__).parent / "toys" / "schema-2.jsonl"
+
+
+def test_runs_of_json_lines_with_checksums_are_converted(tmp_path: Path) -> None:
+    lines = LINES.read_bytes().splitlines(keepends=True)
+    lines.insert(3, lines[2].replace(b"103.0", b"104.0"))
+    old = tmp_path / f"{META['run']}.jsonl"
+    old.write_bytes(b"".join(lines))
+    store = Store(tmp_path)
+    ((file, (count, faults)),) = convert_old_files(store).items()
+    assert (file, count, len(faults)) == (old, 5, 1)
+    assert str(faults[0]).startswith(f"{old}:4: damaged")
+    run = store.load()
+    assert run.results == rank_results([GOOD, BAD], META["reference"])
+    assert run.meta["finished"] == "2026-01-01T00:00:09+00:00"
 
 
 def test_a_run_id_that_is_no_file_name_is_refused(tmp_path: Path) -> None:
@@ -256,7 +288,7 @@ def test_an_empty_folder_has_no_runs(tmp_path: Path) -> None:
         Store(tmp_path).load()
 
 
-def test_many_writers_do_not_mix_their_lines(tmp_path: Path) -> None:
+def test_many_writers_do_not_mix_their_records(tmp_path: Path) -> None:
     store = Store(tmp_path)
     store.begin(META)
     long = replace(BAD, traceback="x" * 20_000)

@@ -30,6 +30,7 @@ from tests.frf_problems import frf_set, write_universal
 from tests.test_cli import put_case
 from tests.toys import reproduction_toys
 from tests.toys.duck import Duck
+from tests.toys.store_edits import change_data
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -124,15 +125,18 @@ class TestEveryCommandOfTheReadme:
     def test_store(self) -> None:
         run = femubench.rank("rod", "unchanged", jobs=2, store="s")
         assert "1 run, 0 faults" in call("store", "check", "--store", "s").output
-        call("store", "export", "--store", "s", "-o", "out")
-        lines = Path("out", f"{run.meta['run']}.jsonl").read_text().splitlines()
+        lines = call("report", "-f", "jsonl", "--store", "s").stdout.splitlines()
+        text = femubench.report(style="jsonl", store="s")
+        assert str(text).splitlines() == lines
         kept = [item["result"] for item in map(json.loads, lines) if "result" in item]
         assert {item["key"] for item in kept} == {result.key for result in run.results}
-        (file,) = Path("s").glob("*.jsonl")
-        file.write_bytes(file.read_bytes().replace(b'"status":"ok"', b'"status":"oj"', 1))
-        assert len(femubench.read_run(store="s").meta["notes"]) == 1
+        (file,) = Path("s").glob("*.sqlite")
+        change_data(file, '"status":"ok"', '"status":"oj"')
+        lost, missing = femubench.read_run(store="s").meta["notes"]
+        assert "sqlite:2: damaged" in lost
+        assert missing.startswith("1 of 2 jobs are missing and score as failures: rod unchanged")
         call("store", "repair", "--store", "s")
-        assert femubench.read_run(store="s").meta["notes"] == []
+        assert femubench.read_run(store="s").meta["notes"] == [missing]
 
     def test_publish(self) -> None:
         run = femubench.rank("rod", TWO, jobs=2)

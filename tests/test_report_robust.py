@@ -14,11 +14,12 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from store_edits import change_data, edit
 from synthetic_run import synthetic_run
 from test_page_data import data_in
 
 from femubench.core.cli.main import bench
-from femubench.core.run.upkeep import exported
+from femubench.core.run.record_file import read_records, write_file
 from femubench.reports.csvs import CsvReporter
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.runs import MarkdownReporter, TerminalReporter
@@ -28,6 +29,8 @@ RUN = synthetic_run(4, 6)
 RUN_ID = RUN.meta["run"]
 EVIL = "<script>alert(1)</script>"
 TITLE = "\"quoted\" & 'so' </table></script> | `x` [l](javascript:alert(1))"
+
+GOING = f"the run has not ended: 10 of {len(RUN.results)} jobs are there"
 
 Report = Callable[..., Result]
 
@@ -58,22 +61,8 @@ def report(folder: Path) -> Report:
     return call
 
 
-def lines_of(folder: Path) -> list[str]:
-    return Store(folder).file_of(RUN_ID).read_text(encoding="utf-8").splitlines()
-
-
-def put(folder: Path, lines: list[str], end: str = "\n") -> None:
-    Store(folder).file_of(RUN_ID).write_text("\n".join(lines) + end, encoding="utf-8")
-
-
-def put_earlier(folder: Path, change: Callable[[int, str], str]) -> list[str]:
-    """Write the store as version 0.1 did, with changed lines, and return these."""
-    records = [json.loads(line) for line in exported(Store(folder), RUN_ID, [])]
-    lines = [json.dumps({"schema": 1, **record}) for record in records]
-    lines = [change(place, line) for place, line in enumerate(lines)]
-    Store(folder).file_of(RUN_ID).unlink()
-    (folder / "results.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return lines
+def file_in(folder: Path) -> Path:
+    return Store(folder).file_of(RUN_ID)
 
 
 def told(report: Report, folder: Path) -> list[str]:
@@ -86,98 +75,68 @@ def told(report: Report, folder: Path) -> list[str]:
 
 class TestDamage:
     def test_a_run_that_is_still_going(self, report: Report, folder: Path) -> None:
-        lines = lines_of(folder)
-        put(folder, lines[:12])
-        (note,) = told(report, folder)
-        assert note == f"the run has not ended: 10 of {len(RUN.results)} jobs are there"
+        edit(file_in(folder), "DELETE FROM records WHERE number > 11")
+        note = told(report, folder)[-1]
+        assert note.startswith(f"{GOING}; not run: ")
+        assert note.endswith(f" and {len(RUN.results) - 15} more")
 
-    @pytest.mark.parametrize("name", ["terminal", "md", "json", "csv", "modes-csv", "parquet"])
+    @pytest.mark.parametrize(
+        "name", ["terminal", "md", "json", "jsonl", "csv", "modes-csv", "parquet"]
+    )
     def test_every_format_tells(self, report: Report, folder: Path, name: str) -> None:
         """In the text itself, or on stderr where it has no room for notes."""
-        put(folder, lines_of(folder)[:12])
+        edit(file_in(folder), "DELETE FROM records WHERE number > 11")
         result = report("-f", name)
         assert result.exit_code == 0
         shown, other = result.stdout, result.stderr
         if name not in ("terminal", "md"):
             shown, other = other, shown
-        said = f"the run has not ended: 10 of {len(RUN.results)} jobs are there"
-        assert said in " ".join(shown.split())
-        assert said not in other
+        assert GOING in " ".join(shown.split())
+        assert GOING not in other or name in ("json", "jsonl")  # in their meta data
 
-    def test_a_last_line_that_is_cut(self, report: Report, folder: Path) -> None:
-        lines = lines_of(folder)[:12]
-        put(folder, [*lines, lines[-1][:200]], end="")
+    def test_a_changed_record(self, report: Report, folder: Path) -> None:
+        change_data(file_in(folder), '"ok"', '"oj"', "number = 5")
         notes = told(report, folder)
-        assert any("13: the last line is cut short" in note for note in notes)
-        assert any("10 of" in note for note in notes)
-
-    @pytest.mark.parametrize(
-        ("line", "message"),
-        [
-            ('{"schema": 1, "record": "result", "run"', "not JSON"),
-            ("\x00\x01 nonsense", "not JSON"),
-            ('{"schema": 1, "record": "else"}', "not a record"),
-            ('{"schema": 0, "record": "result", "run": "x"}', "schema 0"),
-            ('{"schema": 2, "record": "result", "run": "x"}', "schema 2"),
-            ('{"schema": 1, "record": "result", "run": 5}', "no run id"),
-        ],
-    )
-    def test_a_broken_line_in_the_middle(
-        self, report: Report, folder: Path, line: str, message: str
-    ) -> None:
-        put_earlier(folder, lambda place, text: line if place == 5 else text)
-        notes = told(report, folder)
-        assert any(message in note and ":6" in note and "left out" in note for note in notes)
-        assert f"1 of {len(RUN.results)} jobs are missing and score as failures" in notes
-
-    def test_a_changed_bit(self, report: Report, folder: Path) -> None:
-        lines = lines_of(folder)
-        lines[5] = lines[5].replace("ok", "oj", 1)
-        put(folder, lines)
-        notes = told(report, folder)
-        assert any(":6: damaged" in note and "left out" in note for note in notes)
-        assert f"1 of {len(RUN.results)} jobs are missing and score as failures" in notes
+        assert any(":5: damaged" in note and "left out" in note for note in notes)
+        said = f"1 of {len(RUN.results)} jobs are missing and score as failures: "
+        assert any(note.startswith(said) for note in notes)
 
     def test_a_result_of_another_shape(self, report: Report, folder: Path) -> None:
-        def change(place: int, line: str) -> str:
-            record = json.loads(line)
-            if place == 3:
-                record["result"]["used"] = {"rms_percent": "much"}
-            return json.dumps(record)
-
-        put_earlier(folder, change)
+        file = file_in(folder)
+        records = [*read_records(file, [])]
+        records[4].data = re.sub(rb'("rms_percent":)[0-9.]+', rb'\1"much"', records[4].data)
+        write_file(file, records)
         assert any("rms_percent" in note and "left out" in note for note in told(report, folder))
 
-    def test_a_first_line_that_is_lost_leaves_the_run(self, report: Report, folder: Path) -> None:
-        put(folder, ["{broken", *lines_of(folder)[1:]])
-        notes = told(report, folder)
-        assert any(":1: damaged" in note for note in notes)
+    def test_a_first_record_that_is_lost_leaves_the_run(self, report: Report, folder: Path) -> None:
+        change_data(file_in(folder), "{", "[", "number = 1")
+        (note,) = told(report, folder)
+        assert "damaged: record 1 is not as it was written" in note
         page = data_in((folder / f"{RUN_ID}.html").read_text(encoding="utf-8"))
         assert len(page["results"]) == len(RUN.results)
         assert Store(folder).load().meta["cases"] == RUN.meta["cases"]
 
-    def test_both_first_lines_that_are_lost_leave_the_results(
+    def test_both_copies_of_the_start_that_are_lost_leave_the_results(
         self, report: Report, folder: Path
     ) -> None:
-        put(folder, ["{broken", "{broken", *lines_of(folder)[2:]])
-        assert len([note for note in told(report, folder) if "damaged" in note]) == 2
+        change_data(file_in(folder), "{", "[", "number = 1")
+        edit(file_in(folder), "DELETE FROM copies")
+        assert len([note for note in told(report, folder) if ":1: damaged" in note]) == 1
         page = data_in((folder / f"{RUN_ID}.html").read_text(encoding="utf-8"))
         assert len(page["results"]) == len(RUN.results)
 
+    def test_many_damaged_records_are_a_few_lines(self, report: Report, folder: Path) -> None:
+        edit(file_in(folder), "UPDATE records SET checksum = 0 WHERE number BETWEEN 4 AND 20")
+        notes = told(report, folder)
+        assert len(notes) == 5
+        assert notes[3].endswith("14 more records were left out")
+
     def test_a_store_of_an_older_version_is_one_line(self, report: Report, folder: Path) -> None:
-        lines = put_earlier(folder, lambda _, line: line.replace('"schema": 1', '"schema": 0'))
+        file_in(folder).rename(folder / "results.jsonl")
         result = report("-f", "html")
         assert result.exit_code == 2
-        assert "schema 0" in result.stderr
-        assert f"{len(lines) - 3} more lines were left out" in result.stderr
+        assert "`bench store repair` converts them (results.jsonl)" in result.stderr
         assert result.stderr.count("\n") == 1
-
-    def test_lines_of_older_runs_do_not_hide_this_one(self, report: Report, folder: Path) -> None:
-        old = ['{"schema": 0, "record": "result", "run": "old"}'] * 50
-        (folder / "results.jsonl").write_text("\n".join(old) + "\n", encoding="utf-8")
-        notes = told(report, folder)
-        assert len(notes) == 4
-        assert notes[-1].endswith("47 more lines were left out")
 
     def test_broken_exhibits(self, report: Report, folder: Path) -> None:
         drawn = folder / "exhibits"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import random
 import re
@@ -10,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,14 +17,15 @@ import pytest
 
 from femubench.core.errors import InputError
 from femubench.core.run import provenance as keys, slots, store as locks
+from femubench.core.run.record_file import read_records, write_file
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
-from femubench.core.schema import sealing
 from femubench.core.schema.results import JobResult, Run
 from femubench.core.score.repeatability import environment_differences, result_differences
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
+from store_edits import change_data, records
 
 TOYS = Path(__file__).parent / "toys"
 FEW_KILLS, MANY_KILLS, JOBS = 8, 50, 104
@@ -48,15 +47,6 @@ def stable(run: Run) -> dict[tuple[str, str, int], dict[str, Any]]:
 
 def by_name(run: Run) -> list[JobResult]:
     return sorted(run.results, key=lambda item: (item.case, item.strategy, item.seed))
-
-
-def records(store: Store) -> list[Mapping[str, Any]]:
-    """Return what was recorded, with the id of the run."""
-    return [
-        {**json.loads(line), "run": file.stem}
-        for file in store.files
-        for line in file.read_text().splitlines()
-    ]
 
 
 def some(store: Store, **options: Any) -> Run:
@@ -143,14 +133,14 @@ def test_a_damaged_record_keeps_nobody_from_going_on(tmp_path: Path) -> None:
     store = Store(tmp_path)
     first = some(store)
     file = store.file_of(first.meta["run"])
-    lines = file.read_bytes().splitlines(keepends=True)
-    place = next(i for i, line in enumerate(lines) if b'"softer"' in line and b'"result"' in line)
-    for damaged in (0, place):
-        lines[damaged] = lines[damaged].replace(b'"', b"'", 1)
-    file.write_bytes(b"".join(lines))
+    change_data(file, "{", "[", "kind = 'run'")
+    change_data(file, "{", "[", "CAST(data AS TEXT) LIKE '%\"softer\"%' AND kind = 'result'")
     loaded = store.load()
     assert {item.strategy for item in loaded.results} == {"unchanged", "failing"}
-    assert len(loaded.meta["notes"]) == 2
+    lost, note = loaded.meta["notes"]
+    assert lost.endswith("damaged (expected the record that was written): left out")
+    assert note.startswith("1 of 3 jobs are missing and score as failures: ")
+    assert "softer seed 0 drawn" in note
     done: list[str] = []
     again = some(store, resume=True, progress=lambda result, *_: done.append(result.strategy))
     assert done[0] == "unchanged"  # the one that is kept
@@ -234,7 +224,7 @@ def test_one_process_works_on_a_run(tmp_path: Path) -> None:
     with store.exclusive(run.meta["run"]), pytest.raises(InputError, match="another process"):
         some(store, resume=True)
     names = sorted(path.name for path in tmp_path.iterdir())
-    assert names == sorted(["exhibits", f"{run.meta['run']}.jsonl"])
+    assert names == sorted(["exhibits", f"{run.meta['run']}.sqlite"])
 
 
 def test_the_lock_of_an_interrupted_run_is_removed(tmp_path: Path) -> None:
@@ -255,7 +245,7 @@ def test_the_lock_of_a_file_that_was_removed_keeps_nobody_out(
             path.unlink()
 
     monkeypatch.setattr(locks.fcntl, "flock", late)
-    descriptor = locks.held(path)
+    descriptor = locks.hold_lock(path)
     assert os.path.samestat(os.fstat(descriptor), path.stat())
     os.close(descriptor)
 
@@ -359,7 +349,7 @@ def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(
     ]
     assert len(good) == len(set(good)) == JOBS  # no result was computed twice
     names = {path.name for path in stores["killed"].folder.iterdir()}
-    assert names == {"exhibits", f"{killed.meta['run']}.jsonl"}
+    assert names == {"exhibits", f"{killed.meta['run']}.sqlite"}
     kept = {key for key in good if stores["killed"].exhibits.of(key) is not None}
     assert len(kept) == 4  # of the first seed: two cases, two strategies
 
@@ -367,14 +357,17 @@ def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(
 def test_a_record_that_is_whole_but_wrong_is_computed_again(tmp_path: Path) -> None:
     store = Store(tmp_path)
     first = some(store)
-    file = store.file_of(first.meta["run"])
-    lines = file.read_bytes().splitlines(keepends=True)
-    place = next(i for i, line in enumerate(lines) if b'"softer"' in line and b'"result"' in line)
-    wrong = lines[place].rstrip(b"\n")[: -sealing.TAIL] + b"}"
-    assert b'"seconds":' in wrong
-    wrong = re.sub(rb'"seconds":[0-9.e-]+', b'"seconds":"long"', wrong, count=1)
-    lines[place] = sealing.sealed(wrong) + b"\n"
-    file.write_bytes(b"".join(lines))
+    file, (row,) = (
+        store.file_of(first.meta["run"]),
+        [
+            record
+            for record in read_records(store.file_of(first.meta["run"]), [])
+            if b'"softer"' in record.data and record.kind == "result"
+        ],
+    )
+    assert b'"seconds":' in row.data
+    row.data = re.sub(rb'"seconds":[0-9.e-]+', b'"seconds":"long"', row.data, count=1)
+    write_file(file, [row if r.number == row.number else r for r in read_records(file, [])])
     assert len(store.latest()) == len(store.by_key()) + 1
     again = some(store, resume=True)
     assert len(again.results) == len(first.results)

@@ -6,24 +6,29 @@ import json
 import os
 import random
 import signal
+import sqlite3
 import subprocess
 import sys
 import threading
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
 
 from femubench.core.cli.main import bench
 from femubench.core.errors import InputError
-from femubench.core.run import sealed_file
+from femubench.core.run import record_file
 from femubench.core.run.store import Store
-from femubench.core.run.upkeep import exported, faults_of, repair
+from femubench.core.run.upkeep import find_store_faults
 from femubench.core.schema.paired_modes import PairedMode
-from femubench.core.schema.records import run_from_json
+from femubench.core.schema.records import encode_result, run_from_json
 from femubench.core.schema.results import Block, JobResult, Run
+
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+from store_edits import change_data, edit
 
 FLIPS = 300
 RUN = "20260101T000000Z-000000"
@@ -70,43 +75,87 @@ def test_every_flipped_bit_is_noticed_and_changes_nothing(tmp_path: Path) -> Non
     store = stored(tmp_path)
     store.exhibits.put("ab" * 8, {"modes": [], "mac": {"rows": [], "columns": [], "values": []}})
     (file,), (picture,) = store.files, (tmp_path / "exhibits").iterdir()
-    assert faults_of(store) == []
+    assert find_store_faults(store) == []
     for turn in range(FLIPS):
         flipped = picture if turn % 30 == 0 else file
         content = bytearray(flipped.read_bytes())
-        place = draw.randrange(8 * len(content))
+        # Every fifth one is in the first page or the first of the tree, on which all others hang.
+        place = draw.randrange(8 * (2048 if turn % 5 == 1 else len(content)))
         content[place // 8] ^= 1 << place % 8
         before, _ = flipped.read_bytes(), flipped.write_bytes(content)
-        faults = faults_of(store)
+        faults = find_store_faults(store)
         assert faults, f"bit {place} of {flipped.name}"
         assert all(str(flipped) in str(fault) for fault in faults)
         run = store.load()
         assert set(map(repr, plain(run))) <= set(map(repr, RESULTS))
-        # Lost only where both records of the start have become one line.
-        assert run.meta.get("seeds", META["seeds"]) == META["seeds"]
+        assert run.meta["seeds"] == META["seeds"]  # of the start there is a copy
+        assert len(run.results) >= len(RESULTS) - 1
         if flipped == picture:
             assert store.exhibits.of("ab" * 8) is None
-        else:
-            # A line end that is lost makes one line of two.
-            assert len(run.results) >= len(RESULTS) - 2
-            assert run.meta["notes"]
+        elif plain(run) != list(RESULTS) or run.meta["finished"] is None:
+            assert any("damaged" in note for note in run.meta["notes"])
+        for other in tmp_path.glob("*.sqlite-*"):  # of a bit that says that there is a log
+            other.unlink()
         flipped.write_bytes(before)
 
 
 def test_a_lost_a_doubled_and_a_moved_record_are_noticed(tmp_path: Path) -> None:
     store = stored(tmp_path)
     (file,) = store.files
-    lines = file.read_bytes().splitlines(keepends=True)
-    for changed in (
-        [*lines[:5], *lines[6:]],
-        [*lines[:5], lines[4], *lines[5:]],
-        [*lines[:5], lines[6], lines[5], *lines[7:]],
-        lines[1:],
+    whole = file.read_bytes()
+    columns = "kind, key, status, data, checksum FROM records WHERE number"
+    swapped = [f"UPDATE records SET number = {n} WHERE number = {m}" for n, m in SWAP]
+    for changes, lost in (
+        (["DELETE FROM records WHERE number = 5"], 1),
+        ([f"INSERT INTO records SELECT 9, {columns} = 5"], 0),
+        (swapped, 2),
+        (["DELETE FROM records WHERE number = 1", "DELETE FROM copies"], 0),
     ):
-        file.write_bytes(b"".join(changed))
-        assert any("records are missing" in str(fault) for fault in faults_of(store))
-        repair(store)
-        assert faults_of(store) == []
+        edit(file, *changes)
+        assert find_store_faults(store) != []
+        assert plain(store.load()) != list(RESULTS) or not lost
+        assert len(store.load().results) == len(RESULTS) - lost
+        store.repair(RUN)
+        assert find_store_faults(store) == []
+        assert file.with_name(f"{file.name}.damaged").exists()
+        file.write_bytes(whole)
+
+
+SWAP = ((100, 4), (4, 5), (5, 100))
+
+
+@pytest.mark.parametrize("ended", [True, False])
+def test_the_jobs_that_are_missing_are_named(ended: bool, tmp_path: Path) -> None:
+    """Every deleted record, one by one, also the last one, which leaves no gap."""
+    store = stored(tmp_path)
+    (file,) = store.files
+    whole, last = file.read_bytes(), len(RESULTS) + 2
+    end = [] if ended else [f"DELETE FROM records WHERE number = {last}"]
+    for place, lost in enumerate(RESULTS, 2):
+        if ended and place == last - 1:  # the end takes its place
+            break
+        edit(file, f"DELETE FROM records WHERE number = {place}", *end)
+        name = f"corner {lost.strategy} seed {lost.seed} drawn"
+        said = "1 of 6 jobs are missing and score as failures: "
+        said = said if ended else "the run has not ended: 5 of 6 jobs are there; not run: "
+        assert store.load().meta["notes"][-1] == said + name
+        file.write_bytes(whole)
+    edit(file, f"DELETE FROM records WHERE number BETWEEN 2 AND {last - 1}", *end)
+    assert store.load().meta["notes"][-1].endswith("seed 0 drawn, corner b seed 0 drawn, corner a "
+        "seed 1 drawn, corner b seed 1 drawn, corner a seed 2 drawn and 1 more")  # fmt: skip
+
+
+def test_an_interrupted_run_names_what_was_not_run(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    about: dict[str, Any] = {"seed": 0, "number": 1, "cases": {}, "reference": {}}
+    twins = {**about, "of": {"corner~1": "corner"}, "again": {"corner+": "corner"}}
+    starts = {"corner": ["textbook", "drawn"]}
+    store.begin({**META, "seeds": [4], "strategies": ["a"], "starts": starts, "twins": twins})
+    store.append(RUN, replace(RESULTS[0], seed=4, nominal="textbook"))
+    store.end(RUN, {"finished": "2026-01-01T00:00:09+00:00", "interrupted": True})
+    (note,) = store.load().meta["notes"]
+    others = "corner a seed 4 drawn, corner~1 a seed 4 textbook, corner+ a seed 4 textbook"
+    assert note == f"the run was interrupted: 1 of 4 jobs are there; not run: {others}"
 
 
 def test_check_repair_and_resume_by_the_command(tmp_path: Path) -> None:
@@ -114,41 +163,60 @@ def test_check_repair_and_resume_by_the_command(tmp_path: Path) -> None:
     (file,) = store.files
     good = call("check", "--store", store.folder)
     assert (good.exit_code, good.output) == (0, f"{store.folder}: 1 run, 0 faults\n")
-    lines = file.read_bytes().splitlines(keepends=True)
-    lines[4] = damaged = lines[4].replace(b"corner", b"cornes")
-    file.write_bytes(b"".join(lines))
+    change_data(file, "corner", "cornes", "number = 4")
+    damaged = file.read_bytes()
     bad = call("check", "--store", store.folder)
     assert bad.exit_code == 1
-    assert bad.output.splitlines()[0].startswith(f"{file}:5: damaged")
+    assert bad.output.splitlines()[0].startswith(f"{file}:4: damaged")
     assert len(store.by_key()) == len(RESULTS) - 1  # that one is computed again
     done = call("repair", "--store", store.folder)
     assert done.exit_code == 0
-    assert "8 records kept, 1 fault" in done.output
+    assert f"1 fault, as it was in {file.name}.damaged" in done.output
     assert file.with_name(f"{file.name}.damaged").read_bytes() == damaged
     assert call("check", "--store", store.folder).exit_code == 0
     assert [item for item in RESULTS if item not in plain(store.load())] == [RESULTS[2]]
     assert "nothing to repair" in call("repair", "--store", store.folder).output
 
 
+def test_a_record_goes_into_a_damaged_file(tmp_path: Path) -> None:
+    """A run goes on whatever has happened to its file."""
+    store, draw = stored(tmp_path), random.Random(3)
+    (file,) = store.files
+    whole = file.read_bytes()
+    for turn in range(40):
+        content = bytearray(whole)
+        # Where the trees begin, and the last page, which takes the next record.
+        start = (0, 1024, len(whole) - 1024)[turn % 3]
+        place = 8 * start + draw.randrange(8 * 100)
+        content[place // 8] ^= 1 << place % 8
+        file.write_bytes(content)
+        with store.exclusive(RUN):
+            store.append(RUN, replace(RESULTS[0], seed=77))
+        results = plain(store.load(RUN))
+        assert replace(RESULTS[0], seed=77) in results
+        assert len(set(map(repr, results)) & set(map(repr, RESULTS))) >= len(RESULTS) - 1
+        for other in tmp_path.glob("*.sqlite-*"):
+            other.unlink()
+
+
 @pytest.mark.parametrize("form", ["jsonl", "csv", "parquet"])
-def test_export_writes_every_result(form: str, tmp_path: Path) -> None:
+def test_reports_write_every_result(form: str, tmp_path: Path) -> None:
     import pandas as pd
 
     store, out = stored(tmp_path / "s"), tmp_path / "out"
-    stored(tmp_path / "s", "20260102T000000Z-bbbbbb")
-    done = call("export", "-f", form, "-o", out, "--store", store.folder)
+    words = ["report", RUN, "-f", form, "-o", str(out), "--store", str(store.folder)]
+    done = CliRunner().invoke(bench, words)
     assert done.exit_code == 0, done.output
-    assert sorted(path.stem for path in out.iterdir()) == list(store.runs())
     file = out / f"{RUN}.{form}"
     if form == "jsonl":
-        records = [json.loads(line) for line in file.read_text().splitlines()]
-        results = [item["result"] for item in records if item["record"] == "result"]
-        assert plain(run_from_json({"meta": {}, "results": results})) == list(RESULTS)
+        first, *records = [json.loads(line) for line in file.read_text().splitlines()]
+        assert (first["record"], first["run"], first["meta"]["seeds"]) == ("run", RUN, [0, 1, 2])
+        results = [item["result"] for item in records]
+        again = run_from_json({"meta": {}, "results": results})
+        assert again.results == store.load().results
     else:
         frame = pd.read_csv(file) if form == "csv" else pd.read_parquet(file)
         assert sorted(frame["seconds"]) == sorted(item.seconds for item in RESULTS)
-    refused = call("export", "-o", store.folder, "--store", store.folder)
-    assert (refused.exit_code, "is the store itself" in refused.output) == (2, True)
     none = call("check", "--store", tmp_path / "none")
     assert (none.exit_code, "no results" in none.output) == (2, True)
 
@@ -158,7 +226,7 @@ def test_a_repair_that_fails_leaves_the_original(
 ) -> None:
     store = stored(tmp_path)
     (file,) = store.files
-    file.write_bytes(file.read_bytes().replace(b"corner", b"cornes", 1))
+    change_data(file, "corner", "cornes")
     before = file.read_bytes()
 
     def full(descriptor: int) -> None:
@@ -166,17 +234,17 @@ def test_a_repair_that_fails_leaves_the_original(
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(InputError, match="No space left"):
-        repair(store)
+        store.repair(RUN)
     assert file.read_bytes() == before
-    assert [p for p in tmp_path.iterdir() if p.suffix not in (".jsonl", ".damaged")] == []
+    assert [p for p in tmp_path.iterdir() if p.suffix not in (".sqlite", ".damaged")] == []
 
 
 def test_a_run_that_goes_on_is_not_repaired(tmp_path: Path) -> None:
     store = stored(tmp_path)
-    (file,) = store.files
-    file.write_bytes(file.read_bytes().replace(b"corner", b"cornes", 1))
-    with store.exclusive(RUN), pytest.raises(InputError, match="another process"):
-        repair(store)
+    change_data(*store.files, "corner", "cornes")
+    with store.exclusive(RUN):
+        refused = call("repair", "--store", store.folder)
+    assert (refused.exit_code, "another process" in refused.output) == (2, True)
 
 
 _WRITERS = """
@@ -189,7 +257,7 @@ for run, count in zip(sys.argv[2::2], map(int, sys.argv[3::2])):
         continue
     with store.exclusive(run):
         store.begin({"run": run})
-        print(run, os.getpid(), flush=True)
+        os.write(1, f"{run} {os.getpid()}\\n".encode())  # at once, unlike print
         for seed in range(count):
             store.append(run, JobResult("c", "s", seed, "failed", "x" * 3000))
     os._exit(0)
@@ -212,7 +280,7 @@ def test_processes_write_and_some_are_killed(tmp_path: Path) -> None:
                     os.kill(int(pid), signal.SIGKILL)
         assert writers.wait(60) == 0
     assert [item.seed for item in store.load("steady").results] == [*range(400)]
-    assert faults_of(store) == [] or all("cut short" in str(f) for f in faults_of(store))
+    assert find_store_faults(store) == []
     for turn in range(3):
         run = f"killed-{turn}"
         seeds = [item.seed for item in store.load(run).results]
@@ -220,13 +288,13 @@ def test_processes_write_and_some_are_killed(tmp_path: Path) -> None:
         with store.exclusive(run):  # its lock went with the process
             store.append(run, JobResult("c", "s", 10**7, "failed", "after"))
         assert len(store.load(run).results) == len(seeds) + 1
-    assert faults_of(store) == []
+    assert find_store_faults(store) == []
 
 
-def test_records_are_on_the_disk_within_a_second(
+def test_records_are_in_the_file_within_a_second(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    synced: list[int] = []
+    """What is in the file itself was synced before; see also the power cuts."""
     waits: list[float] = []
     start = threading.Timer.__init__
 
@@ -234,39 +302,37 @@ def test_records_are_on_the_disk_within_a_second(
         waits.append(seconds)
         start(self, 0.0, *rest)  # type: ignore[arg-type]
 
-    real, there = os.fsync, threading.Event()
-
-    def fsync(descriptor: int) -> None:
-        synced.append(os.fstat(descriptor).st_size)
-        real(descriptor)
-        there.set()
-
     store = Store(tmp_path)
     store.begin(META)
-    monkeypatch.setattr(os, "fsync", fsync)
     monkeypatch.setattr(threading.Timer, "__init__", timed)
-    store.append(RUN, RESULTS[0])
-    assert there.wait(30.0)
-    assert waits == [1.0]
-    (file,) = store.files
-    assert synced == [file.stat().st_size]
-
-
-def test_a_disk_that_fails_is_told_with_the_next_record(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    store = stored(tmp_path)
-
-    def broken(path: Path) -> None:
-        raise OSError(5, "Input/output error")
-
-    monkeypatch.setattr(sealed_file, "sync", broken)
-    monkeypatch.setattr(sealed_file, "_SYNCED_WITHIN", 0.0)
     store.append(RUN, RESULTS[0])
     for thread in threading.enumerate():
         if isinstance(thread, threading.Timer):
             thread.join()
-    with pytest.raises(InputError, match="cannot be written: Input/output error"):
+    assert waits == [1.0]
+    (file,) = store.files
+    assert encode_result(RESULTS[0]) in file.read_bytes()
+
+
+def test_a_disk_that_fails_is_reported_with_the_next_record(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = Store(tmp_path)
+    store.begin(META)
+    ask = record_file.RecordWriter._ask
+
+    def broken(self: record_file.RecordWriter, statement: str) -> object:
+        if "checkpoint" in statement:
+            raise sqlite3.OperationalError("disk I/O error")
+        return ask(self, statement)
+
+    monkeypatch.setattr(record_file.RecordWriter, "_ask", broken)
+    monkeypatch.setattr(record_file, "_ON_DISK_WITHIN", 0.0)
+    store.append(RUN, RESULTS[0])
+    for thread in threading.enumerate():
+        if isinstance(thread, threading.Timer):
+            thread.join()
+    with pytest.raises(InputError, match="cannot be written: disk I/O error"):
         store.append(RUN, RESULTS[1])
 
 
@@ -276,7 +342,7 @@ def test_a_folder_that_may_not_be_written_is_read(tmp_path: Path) -> None:
     tmp_path.chmod(0o555)
     try:
         assert len(store.load().results) == len(RESULTS)
-        assert faults_of(store) == []
+        assert find_store_faults(store) == []
         with pytest.raises(InputError, match="Permission denied"):
             store.begin({**META, "run": "new"})
     finally:
@@ -290,21 +356,22 @@ def test_results_come_back_whole(tmp_path: Path) -> None:
     assert result == replace(RESULTS[0], rank=result.rank)
 
 
-def test_an_export_leaves_out_what_is_damaged(tmp_path: Path) -> None:
+def test_a_report_leaves_out_what_is_damaged(tmp_path: Path) -> None:
     store = stored(tmp_path)
-    (file,) = store.files
-    file.write_bytes(file.read_bytes().replace(b"0.99", b"0.98", 1))
-    faults: list[InputError] = []
-    assert len(list(exported(store, RUN, faults))) == len(RESULTS) + 2
-    assert len(faults) == 1
+    change_data(*store.files, "0.99", "0.98")
+    words = ["report", "-f", "jsonl", "--store", str(store.folder)]
+    done = CliRunner().invoke(bench, words)
+    assert len(done.stdout.splitlines()) == len(RESULTS)
+    assert "sqlite:2: damaged" in done.stderr
+    assert "1 of 6 jobs are missing and score as failures: corner a seed 0 drawn" in done.stderr
 
 
 def test_a_comparison_tells_what_is_damaged(tmp_path: Path) -> None:
     store = stored(tmp_path)
     stored(tmp_path, "20260102T000000Z-bbbbbb")
     file = store.file_of(RUN)
-    file.write_bytes(file.read_bytes().replace(b"0.99", b"0.98", 1))
+    change_data(file, "0.99", "0.98")
     words = ["compare", RUN, "20260102T000000Z-bbbbbb", "--store", str(store.folder)]
     told = CliRunner().invoke(bench, words)
     assert told.exit_code == 0, told.output
-    assert f"{file.name}:3:damaged" in "".join(told.output.split())
+    assert f"{file.name}:2:damaged" in "".join(told.output.split())

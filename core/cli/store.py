@@ -1,4 +1,4 @@
-"""``bench store``: what is damaged in a store, the store without it, runs as plain files."""
+"""``bench store``: what is damaged in a store, and the store without it."""
 
 from __future__ import annotations
 
@@ -8,23 +8,20 @@ from typing import TYPE_CHECKING
 import click
 
 from femubench.core.cli import options
-from femubench.core.cli.registry import Verbs, plugins_for
+from femubench.core.cli.registry import Verbs
 from femubench.core.display import counted
 from femubench.core.errors import InputError
-from femubench.core.files import make_folder, write_atomically
 
 if TYPE_CHECKING:
     from femubench.core.run.store import Store
 
-_LINES, _FRAMES = "jsonl", ("csv", "parquet")
-
 
 @click.group("store", cls=Verbs)
 def store() -> None:
-    """Check, repair or export stored runs."""
+    """Check or repair stored runs."""
 
 
-def _opened(folder: Path | None) -> Store:
+def _open(folder: Path | None) -> Store:
     """Return the store that is meant.
 
     Raises:
@@ -33,7 +30,7 @@ def _opened(folder: Path | None) -> Store:
     from femubench.core.library.rank import store_in
 
     found = store_in(folder)
-    if not found.files:
+    if not (found.files or found.old_files):
         expected = "a run stored by `bench run`"
         raise InputError("no results", file=found.folder, expected=expected)
     return found
@@ -45,19 +42,16 @@ def _opened(folder: Path | None) -> Store:
 def check(ctx: click.Context, store: Path | None) -> None:
     """Read every record; exit with 1 if one is damaged or missing.
 
-    A fault is one line: file, line, what is wrong.
+    A fault is one line: file, number of the record, what is wrong.
     """
-    from femubench.core.run.upkeep import faults_of, unsealed
+    from femubench.core.run.upkeep import find_store_faults
 
-    kept = _opened(store)
-    faults = faults_of(kept)
+    kept = _open(store)
+    faults = find_store_faults(kept)
     for fault in faults:
         click.echo(" ".join(str(fault).split()))
-    if old := unsealed(kept):
-        click.echo(
-            f"{counted(old, 'record')} of an earlier version without checksums; "
-            "`bench store repair` adds them"
-        )
+    for note in kept.notes_of_old_files():
+        click.echo(note)
     runs = counted(len(kept.runs()), "run")
     click.echo(f"{kept.folder}: {runs}, {counted(len(faults), 'fault')}")
     ctx.exit(int(bool(faults)))
@@ -68,56 +62,20 @@ def check(ctx: click.Context, store: Path | None) -> None:
 def repair(store: Path | None) -> None:
     """Leave out what is damaged, so that `bench run --resume` computes it again.
 
-    Damaged lines go to RUN.jsonl.damaged. Runs of an earlier version are converted.
+    A damaged file is kept as RUN.sqlite.damaged. Runs of an earlier version are converted.
     """
-    from femubench.core.run.upkeep import repair as repaired
+    from femubench.core.run.upkeep import convert_old_files
 
-    kept = _opened(store)
-    done = repaired(kept)
-    for item in done:
-        aside = "" if item.aside is None else f", damaged lines in {item.aside}"
-        lost = counted(item.lost, "fault")
-        click.echo(f"{item.file}: {counted(item.records, 'record')} kept, {lost}{aside}")
+    kept = _open(store)
+    done = 0
+    for file, (records, lost) in convert_old_files(kept).items():
+        click.echo(f"{file}: {counted(records, 'record')} converted, {counted(len(lost), 'fault')}")
+        done += 1
+    for file in kept.files:
+        with kept.exclusive(file.stem):
+            faults = kept.repair(file.stem)
+        if faults:
+            click.echo(f"{file}: {counted(len(faults), 'fault')}, as it was in {file.name}.damaged")
+            done += 1
     if not done:
         click.echo(f"{kept.folder}: nothing to repair")
-
-
-@store.command("export")
-@click.argument("runs", metavar="[RUN]...", nargs=-1)
-@click.option(
-    "-f", "--format", "form", type=click.Choice([_LINES, *_FRAMES]), default=_LINES,
-    show_default=True, help="One line of JSON a record, or a table with one row a job.",
-)  # fmt: skip
-@options.output_folder("Write a file for each run there. Default: here.", default=".")
-@options.store("Where the runs are.")
-@click.pass_context
-def export(
-    ctx: click.Context, runs: tuple[str, ...], form: str, output: Path, store: Path | None
-) -> None:
-    """Write runs as plain files.
-
-    A RUN is a run id or its first letters; without any, all runs of the store.
-    """
-    from femubench.core.library.report import rendered, reporter, run_name
-    from femubench.core.run.upkeep import exported
-
-    kept = _opened(store)
-    make_folder(output)
-    if output.resolve() == kept.folder.resolve():
-        raise InputError("is the store itself", file=output, expected="another folder")
-    for run_id in [str(kept.begun(word)["run"]) for word in runs] or kept.runs():
-        faults: list[InputError] = []
-        if form == _LINES:
-            file = output / f"{run_id}.{form}"
-            with file.open("w", encoding="ascii") as stream:
-                stream.writelines(f"{line}\n" for line in exported(kept, run_id, faults))
-        else:
-            run = kept.load(run_id)
-            writer = reporter(plugins_for(ctx), form)
-            file = output / f"{run_name(run)}{writer.suffix}"
-            write_atomically(file, rendered(writer, run))
-            for note in run.meta["notes"]:
-                click.echo(f"bench: {note}", err=True)
-        for fault in faults:
-            click.echo(f"bench: {' '.join(str(fault).split())}: left out", err=True)
-        click.echo(f"{form}: {file}")

@@ -13,10 +13,10 @@ from femubench.core.errors import InputError
 from femubench.core.garbage import uncollected
 from femubench.core.pace import Advance, Told
 from femubench.core.run.jobs_left import JobsLeft
+from femubench.core.run.record_file import Record
 from femubench.core.run.schedule import Show
 from femubench.core.run.slots import Slot, starts_of
 from femubench.core.run.store import Store
-from femubench.core.run.stored import AnyRecord
 from femubench.core.schema.results import DONE, JobResult
 from femubench.core.schema.run_options import Overwrite
 
@@ -32,8 +32,8 @@ class StoredResults:
         own: those of this run.
     """
 
-    found: dict[str, AnyRecord] = field(default_factory=dict)
-    own: dict[str, AnyRecord] = field(default_factory=dict)
+    found: dict[str, Record] = field(default_factory=dict)
+    own: dict[str, Record] = field(default_factory=dict)
 
     def take(self, key: str) -> tuple[JobResult | None, bool]:
         """Return a result to keep, if there is one, and whether this run has it; let go of it."""
@@ -48,7 +48,7 @@ class StoredResults:
 
 
 class Results:
-    """Results as they come: into the store, to whoever watches, and back in the order of jobs."""
+    """Results as they come: into the store, to who watches, and back in the order of jobs."""
 
     def __init__(
         self,
@@ -56,10 +56,10 @@ class Results:
         store: Store | None,
         run: str,
         progress: Progress | None,
-        told: Told | None = None,
+        report: Told | None = None,
     ) -> None:
         self._slots, self._store, self._run, self._progress = slots, store, run, progress
-        self._told, self._left = told, JobsLeft((), (), 1)
+        self._report, self._left = report, JobsLeft((), (), 1)
         self._found: dict[int, JobResult] = {}
         if store is not None:
             # What is drawn of a case starts from the model that makes the ranks, which comes first.
@@ -83,9 +83,9 @@ class Results:
         result = replace(result, key=key, provenance=provenance)
         if self._store is not None:
             self._store.append(self._run, result)
-        self._tell(index, result)
-        if self._told is not None:
-            self._told(self._left.after(result))
+        self._take(index, result)
+        if self._report is not None:
+            self._report(self._left.after(result))
 
     def show(self, slot: Slot, exhibit: Mapping[str, Any]) -> None:
         """Take the exhibit of a result that is about to come."""
@@ -112,16 +112,16 @@ class Results:
                 result = replace(result, nominal=slot.nominal)
             if self._store is not None and not there:
                 self._store.append(self._run, result)
-            self._tell(index, result)
+            self._take(index, result)
         # Seed after seed: what is there early says something of every case and strategy.
         missing = sorted(missing, key=lambda index: self._slots[index].seed)
-        if self._told is not None:
+        if self._report is not None:
             jobs = ((slot.case.name, slot.strategy) for slot in (self._slots[i] for i in missing))
             self._left = JobsLeft(jobs, self._found.values(), workers)
-            self._told(Advance(0, len(missing)))
+            self._report(Advance(0, len(missing)))
         return missing
 
-    def _tell(self, index: int, result: JobResult) -> None:
+    def _take(self, index: int, result: JobResult) -> None:
         self._found[index] = result
         if self._progress is not None:
             self._progress(result, len(self._found), len(self._slots))
@@ -131,7 +131,7 @@ class Results:
         return [self._found[index] for index in sorted(self._found)]
 
 
-def recorded(
+def begin_run(
     stack: ExitStack,
     store: Store | None,
     meta: dict[str, Any],
@@ -160,7 +160,7 @@ def recorded(
 
 
 @contextmanager
-def ended(store: Store | None, run: str) -> Iterator[dict[str, Any]]:
+def record_end(store: Store | None, run: str) -> Iterator[dict[str, Any]]:
     """Record the end of a run, also of one that is interrupted."""
     ending: dict[str, Any] = {"interrupted": True}
 
@@ -172,7 +172,7 @@ def ended(store: Store | None, run: str) -> Iterator[dict[str, Any]]:
     try:
         yield ending
     except BaseException:
-        with suppress(InputError):  # why the run ends is to be told, not what follows from it
+        with suppress(InputError):  # why the run ends counts, not what follows from it
             record()
         raise
     ending["interrupted"] = False

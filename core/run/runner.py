@@ -19,7 +19,7 @@ from femubench.core.pace import Told
 from femubench.core.roles import Strategy
 from femubench.core.run.executor import Executor, open_executor
 from femubench.core.run.provenance import home_of, plan_digest, run_meta
-from femubench.core.run.recording import Progress, Results, ended, recorded
+from femubench.core.run.recording import Progress, Results, begin_run, record_end
 from femubench.core.run.schedule import Workload
 from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Starts
@@ -102,8 +102,8 @@ class Plan:
             about = {**starts.about(cases), **starts.beside.about(references)}
             yardsticks = {case.name: references[case.name] for case in cases}
             slots.meta = run_meta(cases, strategies, yardsticks, slots.seeds, asked, about)
-            meta, known = recorded(stack, store, slots.meta, options.overwrite, options.resume)
-            ending = stack.enter_context(ended(store, meta["run"]))
+            meta, known = begin_run(stack, store, slots.meta, options.overwrite, options.resume)
+            ending = stack.enter_context(record_end(store, meta["run"]))
             results = Results(slots, store, meta["run"], receivers.progress, receivers.advance)
             wanted = stack.enter_context(stopping()).until(results.keep(known, executor.workers))
             workload = Workload(slots, references, limits, results.shelf)

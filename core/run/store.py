@@ -1,30 +1,30 @@
-"""The store of results: one file a run, to which every job adds one line at once."""
+"""The store of results: one file a run, to which every job adds one record at once."""
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import sqlite3
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from femubench.core.drawing.files import Exhibits
 from femubench.core.errors import InputError
 from femubench.core.garbage import uncollected
-from femubench.core.run.sealed_file import Syncing, add, sync
-from femubench.core.run.stored import (
-    OLD_FILE,
-    AnyRecord,
+from femubench.core.run.record_file import (
     Record,
-    begun,
-    done,
-    ended,
-    records_of,
+    RecordWriter,
+    find_faults,
+    read_records,
+    write_file,
 )
-from femubench.core.schema.records import check_extent
+from femubench.core.schema.records import check_extent, compact, encode_result
 from femubench.core.schema.results import (
     DONE,
     NOMINALS,
@@ -36,22 +36,65 @@ from femubench.core.schema.results import (
 )
 from femubench.core.score.ranking import scores_and_ranks
 
-_MOST_NOTES = 3
-_SUFFIX = ".jsonl"
+JobName = tuple[str, str, int, Nominal]
+
+_MOST_NOTES, _MOST_JOBS = 3, 5
+_SUFFIX = ".sqlite"
+_STORED = "a run stored by `bench run`"
 _RUN_ID = re.compile(r"(?!results$)[A-Za-z0-9][A-Za-z0-9._-]{0,199}")
 
 
 def notes_of(faults: Sequence[InputError], folder: Path) -> list[str]:
     """Return a line for each of the first faults of a store and one for the others."""
-    shown = [f"{' '.join(str(fault).split())}: left out" for fault in faults[:_MOST_NOTES]]
+    shown = [
+        f"{' '.join(str(fault).split())}{': left out' if fault.line else ''}"
+        for fault in faults[:_MOST_NOTES]
+    ]
     more = len(faults) - len(shown)
     if more:
-        lines = "line was" if more == 1 else "lines were"
-        shown.append(f"{folder}: {more} more {lines} left out")
+        records = "record was" if more == 1 else "records were"
+        shown.append(f"{folder}: {more} more {records} left out")
     return shown
 
 
-def held(path: Path) -> int:
+def planned_jobs(meta: Mapping[str, Any]) -> dict[JobName, None]:
+    """Return the jobs that a run began with, by case, strategy, seed and nominal model.
+
+    Arguments:
+        meta: ``cases``, ``strategies``, ``seeds``, ``starts`` and ``twins`` of the run.
+    """
+    starts = meta.get("starts") or {}
+    models = {case: starts.get(case, NOMINALS[:1]) for case in meta.get("cases") or {}}
+    # What runs beside the cases starts from the model that ranks.
+    models |= {name: models.get(case, NOMINALS)[:1] for name, case in origins_of(meta).items()}
+    return {
+        (case, strategy, seed, nominal): None
+        for case, nominals in models.items()
+        for nominal in nominals
+        for seed in meta.get("seeds") or ()
+        for strategy in meta.get("strategies") or ()
+    }
+
+
+def note_missing_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> str | None:
+    """Return a line that says which jobs of a run have no result; None where all have one."""
+    plan = planned_jobs(meta)
+    there = {(r.case, r.strategy, r.seed, r.nominal) for r in results}
+    missing = [job for job in plan if job not in there]
+    if not missing:
+        return None
+    names = [f"{case} {who} seed {seed} {nominal}" for case, who, seed, nominal in missing]
+    first = ", ".join(names[:_MOST_JOBS])
+    more = len(names) - _MOST_JOBS
+    first += f" and {more} more" if more > 0 else ""
+    if "finished" in meta and (meta["finished"] is None or meta.get("interrupted") is True):
+        how = "has not ended" if meta["finished"] is None else "was interrupted"
+        done = len(plan) - len(missing)
+        return f"the run {how}: {done} of {len(plan)} jobs are there; not run: {first}"
+    return f"{len(missing)} of {len(plan)} jobs are missing and score as failures: {first}"
+
+
+def hold_lock(path: Path) -> int:
     """Return a descriptor that holds the lock of a file, which its holder removes.
 
     Raises:
@@ -74,9 +117,8 @@ def held(path: Path) -> int:
 class Store:
     """Results of many runs in one folder, each in a file of its own.
 
-    Several processes may write at the same time. Every record is a line of JSON that ends with its
-    checksum; see docs/results.md. What is damaged is left out and told in the notes of a run, and
-    never keeps anybody from the rest.
+    Several processes may write at the same time. Every record has a checksum; see docs/results.md.
+    What is damaged is left out, as the notes of a run say, and never keeps anybody from the rest.
 
     Arguments:
         folder: created with the first record.
@@ -87,7 +129,7 @@ class Store:
 
     def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder)
-        self._syncing = Syncing()
+        self._writers: dict[str, RecordWriter] = {}
         self.working_on: str | None = None
 
     def file_of(self, run_id: str) -> Path:
@@ -103,10 +145,14 @@ class Store:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Return the files that hold records, that of earlier versions first."""
-        own = (file for file in self.folder.glob(f"*{_SUFFIX}") if _RUN_ID.fullmatch(file.stem))
-        old = self.folder / OLD_FILE
-        return (*([old] if old.exists() else []), *sorted(own))
+        """Return the files that hold records, one a run."""
+        found = (file for file in self.folder.glob(f"*{_SUFFIX}") if _RUN_ID.fullmatch(file.stem))
+        return tuple(sorted(found))
+
+    @property
+    def old_files(self) -> tuple[Path, ...]:
+        """Return the files of earlier versions, which `bench store repair` converts."""
+        return tuple(sorted(self.folder.glob("*.jsonl")))
 
     @cached_property
     def exhibits(self) -> Exhibits:
@@ -114,32 +160,37 @@ class Store:
         return Exhibits(self.folder)
 
     def begin(self, meta: Mapping[str, Any]) -> None:
-        """Record the start of a run, twice: without it the run could not be continued.
+        """Record the start of a run.
 
         Arguments:
             meta: has the id of the run under ``run``.
         """
-        for _ in range(2):
-            self._write(meta["run"], partial(begun, meta), at_once=True)
+        file = self.file_of(meta["run"])
+        data = compact({"at": time.time(), "meta": meta}).encode()
+        with report_write_errors(file):
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_file(file, [Record("run", "", "", data)])
 
     def append(self, run_id: str, result: JobResult) -> None:
         """Record the result of one job; after a crash it is there whole or not at all."""
-        self._write(run_id, partial(done, result))
+        self._add(run_id, Record("result", result.key, result.status, encode_result(result)))
 
     def end(self, run_id: str, meta: Mapping[str, Any]) -> None:
         """Record the end of a run with what is known only then."""
-        self._write(run_id, partial(ended, meta), at_once=True)
+        data = compact({"meta": meta}).encode()
+        self._add(run_id, Record("end", "", "", data), at_once=True)
+        self._close(run_id, is_complete=True)
 
     def runs(self) -> tuple[str, ...]:
         """Return the ids of all runs, oldest first; none where nothing was stored."""
-        return tuple(self._begun([]))
+        return tuple(self._starts())
 
     @uncollected()
     def load(self, run_id: str | None = None) -> Run:
         """Return a run with scores and ranks, its results in the order of its jobs.
 
-        What is damaged or was cut short (a crash while writing) is left out and told about in
-        ``meta["notes"]``; a run that never ended has ``meta["finished"]`` None.
+        What is damaged is left out; ``meta["notes"]`` say so, and which jobs have no result. A run
+        that never ended has ``meta["finished"]`` None.
 
         Arguments:
             run_id: or the beginning of one; None for the latest.
@@ -149,9 +200,9 @@ class Store:
         """
         wanted = self._find(run_id)
         meta: dict[str, Any] = {"run": wanted, "finished": None}
-        results: dict[tuple[str, str, int, Nominal], JobResult] = {}
+        results: dict[JobName, JobResult] = {}
         faults: list[InputError] = []
-        for record in self.records(wanted, faults):
+        for record in read_records(self.file_of(wanted), faults):
             try:
                 if record.kind == "result":
                     r = record.result()
@@ -165,8 +216,9 @@ class Store:
         listed = [result for result in everything if result.case not in others]
         beside = tuple(result for result in everything if result.case in others)
         check_extent(meta, tuple(listed), file=self.folder)
-        told = meta.get("notes")
-        notes = [*(told if isinstance(told, list) else []), *notes_of(faults, self.folder)]
+        known, missing = meta.get("notes"), note_missing_jobs(meta, everything)
+        notes = [*(known if isinstance(known, list) else []), *notes_of(faults, self.folder)]
+        notes += [*self.notes_of_old_files(), *([missing] if missing else [])]
         reference = meta.get("reference") or None
         found = scores_and_ranks(listed, reference, meta.get("baseline"))
         for result, score, rank in zip(listed, *found, strict=True):
@@ -183,7 +235,7 @@ class Store:
         return found
 
     @uncollected()
-    def latest(self, run_id: str | None = None, *, but: str | None = None) -> dict[str, AnyRecord]:
+    def latest(self, run_id: str | None = None, *, but: str | None = None) -> dict[str, Record]:
         """Return the record of the latest result of every job that has a key, yet to be decoded.
 
         A failure after a result is no later one: what made it fail, such as a shorter time limit,
@@ -193,9 +245,9 @@ class Store:
             run_id: whose results; None for those of all runs.
             but: a run whose results are left out.
         """
-        found: dict[str, AnyRecord] = {}
+        found: dict[str, Record] = {}
         for run in (*self.runs(),) if run_id is None else (run_id,):
-            for record in self.records(run, []) if run != but else ():
+            for record in read_records(self.file_of(run), []) if run != but else ():
                 known = found.get(record.key)
                 if not record.key or record.kind != "result":
                     continue
@@ -206,11 +258,11 @@ class Store:
     def begun(self, run_id: str | None = None) -> dict[str, Any]:
         """Return the meta data with which a run began; arguments and errors as for `load`."""
         wanted = self._find(run_id)
-        return {**(self._begun([])[wanted] or {}), "run": wanted}
+        return {**(self._starts()[wanted] or {}), "run": wanted}
 
     def latest_of_plan(self, plan: str) -> dict[str, Any] | None:
         """Return the meta data with which the latest run of the same jobs began."""
-        found = [m for m in self._begun([]).values() if m is not None and m.get("plan") == plan]
+        found = [m for m in self._starts().values() if m is not None and m.get("plan") == plan]
         return found[-1] if found else None
 
     @contextmanager
@@ -224,7 +276,7 @@ class Store:
         path = file.with_name(f".{run_id}.lock")
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            descriptor = held(path)
+            descriptor = hold_lock(path)
         except BlockingIOError as error:
             what = f"another process is working on run {run_id}"
             raise InputError(what, file=file, expected="one at a time") from error
@@ -235,88 +287,90 @@ class Store:
         try:
             yield
         finally:
+            self._close(run_id)
             path.unlink(missing_ok=True)
             os.close(descriptor)
 
-    def records(self, run_id: str, faults: list[InputError]) -> Iterator[AnyRecord]:
-        """Yield the records of a run, those of earlier versions first.
+    def repair(self, run_id: str) -> list[InputError]:
+        """Write the file of a run anew if it has faults; return these.
 
-        Arguments:
-            run_id: the whole id.
-            faults: takes an error for every line that is no record.
+        The file as it was is kept under another name.
 
         Raises:
-            InputError: when a file cannot be read.
+            InputError: when something cannot be read or written.
         """
-        old = self.folder / OLD_FILE
-        if old.exists():
-            yield from (r for r in records_of(old, faults) if r.run == run_id)
-        # What an earlier version called a run may be no name of a file.
-        if _RUN_ID.fullmatch(run_id) and self.file_of(run_id).exists():
-            yield from records_of(self.file_of(run_id), faults)
+        self._close(run_id)
+        file, faults = self.file_of(run_id), find_faults(self.file_of(run_id))
+        if faults:
+            with report_write_errors(file):
+                damaged = file.with_name(f"{file.name}.damaged")
+                damaged.write_bytes(file.read_bytes())
+                write_file(file, [*read_records(file, [])])
+        return faults
 
-    def _begun(self, faults: list[InputError]) -> dict[str, dict[str, Any] | None]:
+    def _starts(self) -> dict[str, dict[str, Any] | None]:
         """Return the meta data with which all runs began, oldest first; None where it is lost."""
-        found: dict[str, dict[str, Any] | None] = {}
-        times: dict[str, float] = {}
+        found: dict[str, tuple[float, dict[str, Any] | None]] = {}
         for file in self.files:
-            if file.name == OLD_FILE:
-                for record in records_of(file, faults):
-                    found.setdefault(record.run, None)
-                    if record.kind == "run":
-                        found[record.run] = _meta_of(record)
-            elif file.stem not in found:
-                first = next(records_of(file, faults), None)
-                if isinstance(first, Record) and first.kind == "run":
-                    found[file.stem], times[file.stem] = _meta_of(first), first.at
-                else:
-                    found[file.stem], times[file.stem] = None, file.stat().st_mtime
-        return {run: found[run] for run in sorted(found, key=lambda run: times.get(run, 0.0))}
+            found[file.stem] = file.stat().st_mtime, None
+            first = next(read_records(file, []), None)
+            if first is not None and first.kind == "run":
+                with suppress(InputError):
+                    found[file.stem] = first.at, {**first.meta(), "run": file.stem}
+        return {run: meta for run, (_, meta) in sorted(found.items(), key=lambda item: item[1][0])}
+
+    def notes_of_old_files(self) -> list[str]:
+        """Return a line where there are runs of an earlier version."""
+        names = ", ".join(file.name for file in self.old_files[:_MOST_NOTES])
+        how = "runs of an earlier version; `bench store repair` converts them"
+        return [f"{self.folder}: {how} ({names})"] if names else []
 
     def _find(self, run_id: str | None) -> str:
         """Return the id of the run that is meant."""
-        if not self.files:
-            expected = "a run stored by `bench run`"
-            raise InputError("no results", file=self.folder, expected=expected)
-        faults: list[InputError] = []
-        known = list(self._begun(faults))
+        known = list(self._starts())
         if run_id in known:
             return str(run_id)
         matching = [name for name in known if run_id is None or name.startswith(run_id)]
         if not matching:
-            what = "no run" if run_id is None else f"no run {run_id!r}"
-            what = "; ".join([what, *notes_of(faults, self.folder)])
-            stored = (
-                f"one of the {len(known)} stored, e.g. {known[-1]}" if known else "a stored run"
-            )
+            what = "no results" if not known else f"no run {run_id!r}"
+            what = "; ".join([what, *self.notes_of_old_files()])
+            stored = f"one of the {len(known)} stored, e.g. {known[-1]}" if known else _STORED
             raise InputError(what, file=self.folder, expected=stored)
         if run_id is not None and len(matching) > 1:
             what = f"{len(matching)} runs begin with {run_id!r}"
             raise InputError(what, file=self.folder, expected=f"more letters, e.g. {matching[0]}")
         return str(matching[-1])
 
-    def _write(
-        self, run_id: str, line_after: Callable[[bytes], bytes], *, at_once: bool = False
-    ) -> None:
-        path = self.file_of(run_id)
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            add(path, line_after)
-            if at_once:
-                sync(path)
-                sync(self.folder)
-            else:
-                self._syncing.soon(path)
-        except OSError as error:
-            what = f"a record cannot be written: {error.strerror or error}"
-            raise InputError(what, file=path, expected="a store with room") from error
+    def _add(self, run_id: str, record: Record, *, at_once: bool = False) -> None:
+        with report_write_errors(self.file_of(run_id)):
+            try:
+                self._writer(run_id).append(record, at_once=at_once)
+            except sqlite3.DatabaseError:
+                # What is damaged, of which a full disk is no part, takes no records.
+                if not (self.file_of(run_id).exists() and self.repair(run_id)):
+                    raise
+                self._writer(run_id).append(record, at_once=at_once)
+
+    def _writer(self, run_id: str) -> RecordWriter:
+        if run_id not in self._writers:
+            self._writers[run_id] = RecordWriter(self.file_of(run_id))
+        return self._writers[run_id]
+
+    def _close(self, run_id: str, *, is_complete: bool = False) -> None:
+        if run_id in self._writers:
+            self._writers.pop(run_id).close(is_complete=is_complete)
 
 
-def _meta_of(record: AnyRecord) -> dict[str, Any] | None:
-    """Return the meta data of a run's first record; None where they are wrong."""
-    with suppress(InputError):
-        return {**record.meta(), "run": record.run}
-    return None
+@contextmanager
+def report_write_errors(file: Path) -> Iterator[None]:
+    """Make an error of whatever keeps records from being written."""
+    try:
+        yield
+    except (OSError, sqlite3.Error) as error:
+        is_full = getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
+        why = os.strerror(errno.ENOSPC) if is_full else getattr(error, "strerror", None) or error
+        what = f"a record cannot be written: {why}"
+        raise InputError(what, file=file, expected="a store with room") from error
 
 
 def in_order_of_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> list[JobResult]:

@@ -2,176 +2,90 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
-from collections.abc import Iterable, Iterator
-from contextlib import ExitStack
-from dataclasses import dataclass
+from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
+from typing import Any
+
+from msgspec import structs
 
 from femubench.core.errors import InputError
-from femubench.core.run.sealed_file import lines_of, sync
-from femubench.core.run.store import Store
-from femubench.core.run.stored import OLD_FILE, AnyRecord, Record, records_of
-from femubench.core.schema.records import compact, result_to_json
-from femubench.core.schema.sealing import sum_of
+from femubench.core.files import read_bytes
+from femubench.core.run.record_file import LARGEST, Record, find_faults, read_records, write_file
+from femubench.core.run.store import Store, report_write_errors
+from femubench.core.schema.paired_modes import PairedMode
+from femubench.core.schema.records import compact, encode_result, parse_json, result_from_json
+from femubench.core.schema.sealing import is_whole
 
-_DAMAGED, _CONVERTED = ".damaged", ".converted"
-_GAP = "records are missing before this one"
-
-
-@dataclass(frozen=True)
-class Repair:
-    """What became of a file.
-
-    Arguments:
-        file: as it was called.
-        records: that were kept.
-        lost: lines that were no records, and gaps between those that are.
-        aside: where the damaged lines are now, None without any; what an earlier version wrote is
-            beside the new files under another name.
-    """
-
-    file: Path
-    records: int
-    lost: int
-    aside: Path | None
+_CONVERTED = ".converted"
+_MODE = tuple(field.encode_name for field in structs.fields(PairedMode))
 
 
-def faults_of(store: Store) -> list[InputError]:
-    """Return what is damaged or missing in a store, one error a fault, pictures last.
-
-    Every record is read to the end. What schema 1 wrote has no checksums: of it only those faults
-    are found that leave no record, or one that cannot be read.
-    """
-    faults: list[InputError] = []
-    for file in store.files:
-        found: list[InputError] = []
-        for record in _chained(file, found):
-            try:
-                if record.kind == "result":
-                    record.result()
-                else:
-                    record.meta()
-            except InputError as fault:
-                found.append(fault)
-        faults += sorted(found, key=lambda fault: fault.line or 0)
+def find_store_faults(store: Store) -> list[InputError]:
+    """Return what is damaged or missing in a store, one error a fault, pictures last."""
+    faults = [fault for file in store.files for fault in find_faults(file)]
     return [*faults, *store.exhibits.faults()]
 
 
-def unsealed(store: Store) -> int:
-    """Return the number of records that have no checksum, since an earlier version wrote them."""
-    return sum(1 for f in store.files if f.name == OLD_FILE for _ in records_of(f, []))
+def convert_old_files(store: Store) -> dict[Path, tuple[int, list[InputError]]]:
+    """Write the runs of earlier versions as files of this one; their files get another name.
 
-
-def _chained(file: Path, faults: list[InputError]) -> Iterator[AnyRecord]:
-    """Yield the records of a file; gaps between them are faults too."""
-    before: bytes | None = b""
-    told = 0
-    for record in records_of(file, faults):
-        if isinstance(record, Record):
-            # Behind a damaged line nobody knows what should stand there.
-            if len(faults) == told and record.after != before:
-                expected = "all that were written"
-                faults.append(InputError(_GAP, file=file, line=record.number, expected=expected))
-            before, told = record.checksum, len(faults)
-        yield record
-
-
-def repair(store: Store) -> list[Repair]:
-    """Write the files of a store anew that have faults, with all records that are whole.
-
-    Damaged lines go to a file beside, ``RUN.jsonl.damaged``; the file of an earlier version becomes
-    files of this one, with checksums, and is kept under another name. An original is there until
-    all that is to replace it is on the disk.
+    Returns the number of records and the lines that are none, by file.
 
     Raises:
         InputError: when another process works on a run, or something cannot be written.
     """
-    done = []
-    for file in store.files:
+    done = {}
+    for file in store.old_files:
         faults: list[InputError] = []
-        for _ in _chained(file, faults):
-            pass
-        if file.name == OLD_FILE:
-            # The records of schema 1 become files of this version.
-            kept, runs = 0, dict.fromkeys(record.run for record in records_of(file, []))
-            with ExitStack() as stack:
-                for run in runs:
-                    stack.enter_context(store.exclusive(run))
-                aside = _set_aside(file, faults)
-                for run in runs:
-                    own = store.file_of(run)
-                    kept += _rewritten(store.folder, own, store.records(run, []))
-                file.replace(file.with_name(f"{file.name}{_CONVERTED}"))
-                sync(store.folder)
-            done.append(Repair(file, kept, len(faults), aside))
-        elif faults:
-            with store.exclusive(file.stem):
-                aside = _set_aside(file, faults)
-                kept = _rewritten(store.folder, file, records_of(file, []))
-                done.append(Repair(file, kept, len(faults), aside))
+        runs: dict[str, list[Record]] = {}
+        for run, record in read_old_records(file, faults):
+            runs.setdefault(run, []).append(record)
+        for run, records in runs.items():
+            own = store.file_of(run)
+            with store.exclusive(run), report_write_errors(own):
+                write_file(own, [*records, *(read_records(own, []) if own.exists() else ())])
+        file.replace(file.with_name(f"{file.name}{_CONVERTED}"))
+        done[file] = sum(map(len, runs.values())), faults
     return done
 
 
-def _set_aside(file: Path, faults: Iterable[InputError]) -> Path | None:
-    """Keep the damaged lines of a file beside it; return where."""
-    numbers = {fault.line for fault in faults if fault.what != _GAP}
-    lines = [text for number, text, _ in lines_of(file) if number in numbers]
-    if not lines:
-        return None
-    aside = file.with_name(f"{file.name}{_DAMAGED}")
-    try:
-        with aside.open("ab") as stream:
-            stream.write(b"\n".join([*lines, b""]))
-            stream.flush()
-            os.fsync(stream.fileno())
-    except OSError as error:
-        raise _unwritable(aside, error) from error
-    return aside
+def read_old_records(file: Path, faults: list[InputError]) -> Iterator[tuple[str, Record]]:
+    """Yield the records of a file of JSON lines with their runs.
 
-
-def _rewritten(folder: Path, file: Path, records: Iterable[AnyRecord]) -> int:
-    """Put records into a file in place of what it holds; return how many."""
-    count, after = 0, b""
-    handle, name = tempfile.mkstemp(dir=folder, prefix=f".{file.name}.")
-    part = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            for record in records:
-                line = record.following(after)
-                stream.write(line + b"\n")
-                count, after = count + 1, sum_of(line)
-            stream.flush()
-            os.fsync(stream.fileno())
-        part.chmod(0o644)
-        part.replace(file)
-        sync(folder)
-    except OSError as error:
-        raise _unwritable(file, error) from error
-    finally:
-        part.unlink(missing_ok=True)
-    return count
-
-
-def _unwritable(file: Path, error: OSError) -> InputError:
-    what = f"cannot be written: {error.strerror or error}"
-    return InputError(what, file=file, expected="a store with room, of yours")
-
-
-def exported(store: Store, run_id: str, faults: list[InputError]) -> Iterator[str]:
-    """Yield the records of a run as lines of plain JSON, without checksums.
-
-    Arguments:
-        run_id: of a run that is there.
-        faults: takes what is left out.
+    In schema 1 one file holds all runs; in schema 2 one does a run, and each line ends with a
+    checksum.
     """
-    for record in store.records(run_id, faults):
-        plain = {"record": record.kind, "run": run_id}
+    for number, line in enumerate(read_bytes(file, LARGEST).splitlines(), 1):
+        where: dict[str, Any] = {"file": file, "line": number}
         try:
-            if record.kind == "result":
-                yield compact({**plain, "result": result_to_json(record.result())})
-            else:
-                yield compact({**plain, "meta": record.meta()})
+            data = parse_json(line, **where, expected="one record a line")
+            schema = data.get("schema") if isinstance(data, dict) else None
+            if schema not in (1, 2) or (schema == 2 and not is_whole(line)):
+                raise InputError("damaged", **where, expected="a record")
+            run = data["run"] if schema == 1 else file.stem
+            record = _record_of(data)
+            record.file, record.number = file, number
+            yield str(run), record
         except InputError as fault:
-            faults.append(fault)
+            where["key"], where["expected"] = fault.key, fault.expected
+            faults.append(InputError(fault.what, **where))
+        except (KeyError, TypeError, ValueError, AttributeError) as fault:
+            faults.append(InputError(f"not a record: {fault}", **where, expected="a record"))
+
+
+def _record_of(data: dict[str, Any]) -> Record:
+    kind = data["record"]
+    if kind != "result":
+        meta = data["meta"]
+        start = datetime.fromisoformat(meta.get("started", "1970-01-01T00:00:00+00:00"))
+        at = data.get("at", start.timestamp())
+        return Record(kind, "", "", compact({"at": at, "meta": meta}).encode())
+    plain = data["result"]
+    if "details" in data:
+        plain |= data["details"]
+        for name, block in plain.pop("blocks").items():
+            rows = data["modes"].get(name, ())
+            plain[name] = {**block, "modes": [dict(zip(_MODE, row, strict=True)) for row in rows]}
+    result = result_from_json(plain, key="result")
+    return Record(kind, result.key, result.status, encode_result(result))

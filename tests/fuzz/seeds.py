@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import gzip
 import json
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pyuff
 
-from femubench.core.run.upkeep import exported
-from femubench.results import Block, JobResult, PairedMode, Run, Store, run_to_json
+from femubench.results import Block, JobResult, PairedMode, Run, run_to_json
 
 ROOT = Path(__file__).parents[2]
 CASES = sorted(
@@ -175,13 +173,11 @@ def run_text() -> str:
     return json.dumps(run_to_json(a_run()), indent=1)
 
 
-def store_text(folder: Path) -> str:
+def store_text() -> str:
     """Return the lines of a store of version 0.1, without checksums, that holds a run."""
-    run, store = a_run(), Store(folder)
-    store.begin(run.meta)
-    for result in run.results:
-        store.append(run.meta["run"], result)
-    store.end(run.meta["run"], {"finished": "2026-01-01T00:01:00+00:00"})
-    records = [json.loads(line) for line in exported(store, run.meta["run"], [])]
-    shutil.rmtree(folder)
-    return "".join(json.dumps({"schema": 1, **record}) + "\n" for record in records[1:])
+    run = run_to_json(a_run())
+    end = {"finished": "2026-01-01T00:01:00+00:00"}
+    records = [{"record": "run", "meta": run["meta"]}, {"record": "end", "meta": end}]
+    records[1:1] = [{"record": "result", "result": result} for result in run["results"]]
+    common = {"schema": 1, "run": run["meta"]["run"]}
+    return "".join(json.dumps({**common, **record}) + "\n" for record in records)
