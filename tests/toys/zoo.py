@@ -181,7 +181,7 @@ class Trojan(Animal):
 
     def harm(self, model: Model) -> Model:
         code = pickle.dumps(_Bomb())
-        answers._sealed = lambda *_: b"o" + code
+        answers._pack = lambda *_: b"o" + code
         return model
 
 
