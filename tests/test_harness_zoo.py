@@ -126,7 +126,7 @@ def test_a_judgement_out_of_bounds_ends_its_job_alone() -> None:
     outcome = _Bench(Workload([slot], {}, {}), iter(()))._judgement(slot, Ending("answer", answer))
     assert isinstance(outcome, JobOutcome)
     assert outcome.status == "failed"
-    assert outcome.reason.startswith("its result is out of bounds: parameter_count")
+    assert outcome.reason.startswith("its result is out of bounds: result.parameter_count")
 
 
 def test_nothing_is_left_behind(runs: dict[str, Run]) -> None:

@@ -194,7 +194,7 @@ class _Bomb:
 def trojan(model: Model) -> None:
     """Hands back something that would run a command in the process that reads it."""
     code = pickle.dumps(_Bomb())
-    answers._sealed = lambda *_: b"o" + code
+    answers._pack = lambda *_: b"o" + code
 
 
 @animal()
