@@ -12,6 +12,8 @@ from femubench import InputError, read_case
 from femubench.core.challenge.truth_file import KnownCase, TrueCause, held, read_truth, truth_text
 from truths.posing import DEFECTS, SUITE, pose
 
+pytestmark = pytest.mark.slow(20)
+
 CAUSES = (
     TrueCause("a loose joint", "joint-rotation", "J5", ("joint-rotation@T",), 1.25e5, "N m/rad"),
     TrueCause("a tapered member", "", "front-left"),
