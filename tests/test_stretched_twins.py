@@ -38,6 +38,8 @@ from truths.stretch_file import HELD_OUT_SEED, SUITE, distance, file_of, held_ou
 from truths.structure import STEEL, Change, Lump, Member, Spring, Structure
 from truths.suite import structures
 
+pytestmark = pytest.mark.slow(20)
+
 FILES = sorted(SUITE.glob(f"*/{FILE}"))
 NAMES = [file.parent.name for file in FILES]
 LARGEST = 6 * 1024**2  # bytes of all files

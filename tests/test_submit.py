@@ -18,6 +18,8 @@ from click.testing import CliRunner
 import femubench
 from femubench.core.cli.main import bench
 
+pytestmark = pytest.mark.slow(20)
+
 SITE = Path(str(femubench.__file__)).parents[1]
 ACTION = Path(__file__).parents[1] / ".github" / "actions" / "submit" / "action.yml"
 CASE = "suite/bracket"

@@ -13,6 +13,8 @@ from femubench import read_case
 from femubench.core.challenge.truth_file import read_truth
 from truths.posing import DEFECTS, pose
 
+pytestmark = pytest.mark.slow(20)
+
 FOLDERS = sorted(path.parent for path in DEFECTS.glob("*/truth.toml"))
 TRUTHS = [read_truth(folder) for folder in FOLDERS]
 FEWEST = {"defect": 100, "pair": 15, "clean": 20, "outside": 20}

@@ -22,6 +22,8 @@ from truths import faults
 from truths.faults import FAULT_KINDS, Draft, Structure, drafts, files_of, visibility, write_faults
 from truths.posing import FAULTS, SUITE
 
+pytestmark = pytest.mark.slow(20)
+
 Drawn = tuple[Structure, KnownCase, Draft]
 
 

@@ -34,6 +34,8 @@ from truths.opensees_frames import FREE, cut, plans
 from truths.opensees_modes import environment
 from truths.posing import OPENSEES, STRUCTURES, pose
 
+pytestmark = pytest.mark.slow(20)
+
 FOLDERS = sorted(file.parent for file in OPENSEES.glob("*/truth.toml"))
 SHOWN = [folder for folder in FOLDERS if not read_truth(folder).held]
 DRAWS = {draw.name: draw for draw in draws()}

@@ -13,6 +13,8 @@ from femubench.core.challenge.truth_file import KnownCase, TrueCause, held, read
 from truths.posing import DEFECTS, SUITE, pose
 from truths.truth_text import truth_text
 
+pytestmark = pytest.mark.slow(20)
+
 CAUSES = (
     TrueCause("a loose joint", "joint-rotation", "J5", ("joint-rotation@T",), 1.25e5, "N m/rad"),
     TrueCause("a tapered member", "", "front-left"),

@@ -24,6 +24,8 @@ from truths.seats import rigid_fit
 from truths.sections import Section, angle, bar, channel, i_beam, rectangular_tube, tee
 from truths.structure import STEEL, Change, Clamp, Lump, Member, Oscillator, Spring, Structure
 
+pytestmark = pytest.mark.slow(20)
+
 TRUTHS = Path(__file__).parents[1] / "truths"
 # What turns solids into cases knows the project; what makes the solids does not.
 POSING = {
