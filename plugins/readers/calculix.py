@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
@@ -13,10 +12,10 @@ from femubench.fem import MatrixGeometry, SparseArray, matrix_model
 from femubench.plugins.readers import nodes
 from femubench.plugins.readers.reading import (
     DIRECTIONS,
+    ProgramReader,
     columns_of,
     directions,
     lower_triangle,
-    no_modes,
     opened,
     symmetric,
     whole,
@@ -27,7 +26,7 @@ _LABELS = "node.direction for every row, directions 1 to 6"
 _MOST_ROWS = 1_000_000
 
 
-class CalculixReader:
+class CalculixReader(ProgramReader):
     """Reads the job of an input file: job.sti, job.mas and job.dof beside job.inp.
 
     Files job_NAME.sti beside them are groups: the part NAME of the stiffness.
@@ -64,10 +63,6 @@ class CalculixReader:
     def read_nodes(self, path: Path) -> Mapping[str, nodes.Point]:
         """Return the nodes of an input file; raises InputError."""
         return nodes.read_nodes(path.with_suffix(".inp"))
-
-    def read_modes(self, path: Path) -> NoReturn:
-        """Refuse: the files of a job hold no measured modes."""
-        no_modes(path, "the files of CalculiX")
 
     def write_model(self, model: Model, path: Path, original: Path) -> None:
         """Write .sti, .mas and .dof of an updated model beside each other, and its groups."""

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from femubench import InputError, Measurement, Sensors
 from femubench.fem import Outline
 from femubench.modal import FrequencyResponses, TimeSignals, real_modes
 from femubench.plugins.readers.axes import BASIC, System
-from femubench.plugins.readers.reading import DIRECTIONS, opened
+from femubench.plugins.readers.reading import DIRECTIONS, ProgramReader, opened
 from femubench.plugins.readers.universal_datasets import Dataset, read_datasets
 
 _COORDINATES, _UNITS, _SYSTEMS, _SHAPES = (15, 2411), 164, (18, 2420), (55, 2414)
@@ -48,15 +47,11 @@ class _Mode:
     shape: Mapping[tuple[int, str], complex]
 
 
-class UniversalReader:
+class UniversalReader(ProgramReader):
     """Reads nodes, modes, units and axes, and the lines that draw a structure."""
 
     name: str = "universal file"
     suffixes: tuple[str, ...] = (".uff", ".unv", ".uf")
-
-    def read_matrix(self, path: Path) -> NoReturn:
-        """Refuse: matrices of universal files are not read."""
-        raise InputError("no matrix is read from a universal file", file=path, expected=".mtx")
 
     def read_modes(self, path: Path) -> Measurement:
         """Return sensors ``node:direction`` and modes.
