@@ -16,7 +16,7 @@ from typing import Any
 
 import femubench
 from femubench import Run
-from femubench.core.display import counted
+from femubench.core.display import count_noun
 from femubench.reports.runs import board_text, floors_said
 from femubench.results import run_to_json
 
@@ -112,7 +112,7 @@ def main() -> None:
     if words.board == "default":
         label, said = floors_said(run)
         put("floors", f"**{label}**: {said}", ROOT / "docs" / "scoring.md")
-    print(f"{counted(len(run.results), 'job')} in {file_of(words.board)}")
+    print(f"{count_noun(len(run.results), 'job')} in {file_of(words.board)}")
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ from femubench.core.fem.sections import rectangular_tube
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.measurement import Measurement
-from femubench.core.plugin.loader import registered_effects
+from femubench.core.plugin.loader import list_effects
 
 USED, HELD_OUT = 8, 4
 MODES = 6 + 4 * USED + 20  # that a diagnosis of so many used modes asks for
@@ -124,7 +124,7 @@ def case_of(frame: Frame, directions: str, sensors: int, damage: float = -0.15) 
     """
     model = Model.of(frame)
     member = frame.members[len(frame.members) // 2].name
-    effect = next(e for e in registered_effects() if e.name == "member-stiffness")
+    effect = next(e for e in list_effects() if e.name == "member-stiffness")
     truth = effect.extend(model, member, [damage])
     which = np.unique(np.linspace(0, len(frame.joints) - 1, sensors).astype(int))
     points = [(frame.joints[i], d) for i in which for d in directions]
@@ -171,7 +171,7 @@ def measured(name: str) -> tuple[Cost, Diagnosis]:
         begin = time.process_time()
         found = diagnose(case)
         seconds = time.process_time() - begin
-    known = hypotheses_of(case.model, by_themselves(registered_effects()))
+    known = hypotheses_of(case.model, by_themselves(list_effects()))
     first = found.causes[0] if found.causes else None
     return Cost(
         case.model.size,

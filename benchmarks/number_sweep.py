@@ -22,7 +22,13 @@ from typing import Any
 from blind_sweep import GROUPS, Record, SweepCase, run_task, tasks
 from threadpoolctl import threadpool_limits
 
-from femubench.core.inference.settings import Setting, Value, overridden, settings_table, shown
+from femubench.core.inference.settings import (
+    Setting,
+    Value,
+    format_value,
+    overridden,
+    settings_table,
+)
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -146,7 +152,7 @@ def table_text(known: Mapping[str, str]) -> str:
         known: what is measured of a number, by its name.
     """
     rows = [
-        (f"`{name}`", shown(s.value), s.unit, s.kind, s.why, known.get(name, ""))
+        (f"`{name}`", format_value(s.value), s.unit, s.kind, s.why, known.get(name, ""))
         for name, s in settings_table().items()
     ]
     lines = [COLUMNS, ["---"] * len(COLUMNS), *rows]

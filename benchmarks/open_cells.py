@@ -25,11 +25,11 @@ from threadpoolctl import threadpool_limits
 
 from femubench import StrategyFailure
 from femubench.fem import FloatArray
-from femubench.papers.printed import printed
+from femubench.papers.printed import read_printed
 
 PAGE = Path(__file__).parents[1] / "docs" / "reproduce.md"
 CLOSED = 0.5  # percent
-TABLES = printed("frame")
+TABLES = read_printed("frame")
 NOMINAL = TABLES["table1"]["fe"]
 # Family: what the page calls the column, and where it is printed.
 COLUMNS = {

@@ -31,8 +31,8 @@ from femubench.core.library.rank import plan_run
 from femubench.core.modal import eigen
 from femubench.core.run.answers import pack_outcome, unpack_outcome
 from femubench.core.run.executor import LocalProcesses
-from femubench.core.run.jobs import Job, performed
-from femubench.core.run.judging import judged
+from femubench.core.run.jobs import Job, perform_job
+from femubench.core.run.judging import judge_outcome
 from femubench.core.run.runner import Plan, Receivers
 from femubench.core.run.slots import Slots
 from femubench.core.run.store import Store
@@ -127,10 +127,10 @@ def solutions(plan: Plan) -> Solutions:
         for slot in Slots(pairs, plan.strategies, plan.options.all_seeds):
             if isinstance(slot.job, Job):
                 # By way of its bytes: the strategy's model has modes that the judge's has not.
-                outcome, given = performed(slot.job)
+                outcome, given = perform_job(slot.job)
                 outcome = unpack_outcome(pack_outcome(outcome, given), slot.case.model)
                 names = slot.strategy, slot.seed, slot.nominal
-                judged(slot.case, references[slot.case.name], names, outcome)
+                judge_outcome(slot.case, references[slot.case.name], names, outcome)
     return found
 
 

@@ -34,7 +34,7 @@ from femubench.core.modal.eigen import Modes, solve_modes
 from femubench.core.modal.factorisation import LU, Cholesky, cholmod_obstacle
 from femubench.core.modal.many_changes import Change, modes_of_changes
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
-from femubench.core.plugin.loader import registered_effects
+from femubench.core.plugin.loader import list_effects
 from femubench.core.typing import FloatArray
 
 MODES = 12
@@ -251,7 +251,7 @@ def _diagnosed(joints: int) -> Row:
     solution = least(lambda: solve_modes(case.model, DIAGNOSED_MODES))
     row = timed(diagnose, case)
     row.pop("answer")
-    known = len(hypotheses_of(case.model, by_themselves(registered_effects())))
+    known = len(hypotheses_of(case.model, by_themselves(list_effects())))
     beyond = 1e3 * (row["seconds"] - SOLVES * solution) / known
     return {"hypotheses": known, **row, "anchor": solution, "ms": beyond, "peak_mb": peak()}
 

@@ -17,8 +17,8 @@ from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import FemubenchError
 from femubench.core.fem.model import Model
 from femubench.core.fit.extended_model import raw_residual
-from femubench.core.inference.examine import posed
-from femubench.core.plugin.loader import registered_effects
+from femubench.core.inference.examine import pose_problem
+from femubench.core.plugin.loader import list_effects
 
 _MAGNITUDES = (0.3, 1.0, 2.5)  # deviations of the prior
 _SEED = 19
@@ -46,8 +46,8 @@ def test_diagnosis(benchmark: BenchmarkFixture, hidden: Hidden) -> None:
 def test_every_hypothesis_solved_anew(benchmark: BenchmarkFixture) -> None:
     """The rival: three models a hypothesis, nothing refined, no second cause, no proof."""
     case = _case("one")
-    known = hypotheses_of(case.model, registered_effects())
-    problem, _ = posed(case.model, case.measurement.select(case.used), known, case.tolerance)
+    known = hypotheses_of(case.model, list_effects())
+    problem, _ = pose_problem(case.model, case.measurement.select(case.used), known, case.tolerance)
 
     def solve_all() -> float:
         best = np.inf

@@ -12,10 +12,10 @@ import numpy as np
 
 from femubench.core.change.hypothesis import Hypothesis, hypothesis_at
 from femubench.core.errors import FemubenchError, ModelError
-from femubench.core.fit.extended_model import agreed, extended
+from femubench.core.fit.extended_model import check_joint_fit, extend_model
 from femubench.core.fit.modal_fit import Fit, Problem, State, bounds_of, fit, state_at
 from femubench.core.fit.projection import Projection, Projector
-from femubench.core.fit.static_response import Basis, enriched, placed
+from femubench.core.fit.static_response import Basis, enrich_problem, place_data
 from femubench.core.inference.examine import Examination, is_innate
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.prior import Base, textbook_bases
@@ -130,10 +130,10 @@ def _fits_on(
     same: Callable[[str, str], bool],
 ) -> Iterator[Fit]:
     """Yield fits of causes on a textbook set, in the noise of the leading explanation."""
-    model = extended(examination.model, base.parts, base.x)
+    model = extend_model(examination.model, base.parts, base.x)
     best = examination.posterior.explanations[0].fit.state.problem
     basis = Basis.of(model, best.data.measurement)
-    problem = placed(basis, best.data, best.noise, ())
+    problem = place_data(basis, best.data, best.noise, ())
     project = Projector(model, basis.modes.shapes)
 
     def offered(finding: CataloguedCause) -> Hypothesis | None:
@@ -172,18 +172,18 @@ def _fits(
     ]
     together = np.array([np.concatenate(xs) for xs in product(*alone)])
     for state in _best(problem, parts, together):
-        own, placed_parts = enriched(problem, parts)
+        own, placed_parts = enrich_problem(problem, parts)
         found = fit(own, placed_parts, state.x)
         if found is not None:
             # Several causes add up in modal coordinates and not in a model.
-            borne = agreed(found) if len(parts) > 1 or own is not problem else found
+            borne = check_joint_fit(found) if len(parts) > 1 or own is not problem else found
             if borne is not None:
                 yield borne
 
 
 def _best(problem: Problem, parts: Sequence[Projection], starts: FloatArray) -> list[State]:
     """Return the few states of least cost among some starts."""
-    own, placed_parts = enriched(problem, parts)
+    own, placed_parts = enrich_problem(problem, parts)
     low, high = bounds_of(parts)
     states = []
     for start in starts:

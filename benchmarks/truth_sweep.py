@@ -50,8 +50,8 @@ from femubench.core.challenge.answer import Answer, AnswerCause
 from femubench.core.challenge.outcome import (
     OUTCOMES,
     Same,
-    beside,
     counts_as_right,
+    describe_structure,
     is_finding,
     outcome,
     record_of,
@@ -280,7 +280,7 @@ def scored(records: Mapping[str, Record], truths: Iterable[KnownCase], suite: Pa
             worse = fits_worse(record)
             found.append(
                 Scored(
-                    *(truth, said, sure, beside(record)),
+                    *(truth, said, sure, describe_structure(record)),
                     stated=tuple(stated(truth, record, places)),
                     deviations=tuple(
                         size.deviations

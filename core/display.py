@@ -23,14 +23,14 @@ class Shown:
         lines += [f"  {key:{width}}  {text}" for key, text in rows]
         if len(lines) > LINES:
             lines[LINES - 1 :] = [f"  ... {len(lines) - LINES + 1} more"]
-        return "\n".join(clipped(line) for line in lines)
+        return "\n".join(clip_text(line) for line in lines)
 
     def _repr_html_(self) -> str:
         (word, title), *rows = self.rows()
         return html_table(rows, caption=f"{type(self).__name__} {word}: {title}")
 
 
-def clipped(text: str, width: int = WIDTH) -> str:
+def clip_text(text: str, width: int = WIDTH) -> str:
     """Return text on one line that is not longer than the width."""
     line = " ".join(text.split(" ")).replace("\n", " ").rstrip()
     return line if len(line) <= width else f"{line[: width - 3]}..."
@@ -51,7 +51,7 @@ def html_table(
     return f"<table><caption>{escape(caption)}</caption>{top}<tbody>{body}</tbody></table>"
 
 
-def counted(number: int, noun: str) -> str:
+def count_noun(number: int, noun: str) -> str:
     """Return ``1 case``, ``3 cases``, ``2 strategies``."""
     if number == 1:
         return f"1 {noun}"

@@ -85,7 +85,7 @@ def read_text(path: Path, largest: int) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def resolved(path: Path) -> Path:
+def resolve_path(path: Path) -> Path:
     """Return the path without links.
 
     Raises:
@@ -118,7 +118,7 @@ def _too_large(path: Path, largest: int) -> InputError:
 
 
 @contextmanager
-def limited_memory(most: int) -> Iterator[None]:
+def limit_memory(most: int) -> Iterator[None]:
     """Let what is done inside take so many bytes more than now; beyond, MemoryError is raised.
 
     Libraries take memory for what the header of a file claims. Only Linux counts it; elsewhere

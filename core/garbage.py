@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def uncollected() -> Iterator[None]:
+def pause_collection() -> Iterator[None]:
     """Look for no circles of references meanwhile; also a decorator.
 
     Results have none, and to look for them while there are more and more takes half as long as to

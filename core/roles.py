@@ -184,7 +184,7 @@ class Strategy(Protocol):
         ...
 
 
-def declared(strategy: object, what: Literal["needs", "promises"]) -> frozenset[str]:
+def list_declared(strategy: object, what: Literal["needs", "promises"]) -> frozenset[str]:
     """Return what a strategy says that it needs or promises; nothing where it says nothing."""
     found: frozenset[str] = getattr(strategy, what, frozenset())
     return found

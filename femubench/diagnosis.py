@@ -1,9 +1,9 @@
 """The diagnosis as a step of a strategy: examine data, and what came out of it."""
 
-from femubench.core.diagnosis.proof import extended_by as extended_by
+from femubench.core.diagnosis.proof import extend_by as extend_by
 from femubench.core.diagnosis.tables import causes_in as causes_in
 from femubench.core.inference.examine import Examination as Examination, examine as examine
 from femubench.core.inference.posterior import Explanation as Explanation
-from femubench.core.plugin.loader import registered_effects as registered_effects
+from femubench.core.plugin.loader import list_effects as list_effects
 
 __all__ = [name for name in dir() if not name.startswith("_")]

@@ -15,11 +15,11 @@ from femubench.core.change.terms import (
     sparse_term as sparse_term,
 )
 from femubench.core.effect.attachments import (
-    directed_places as directed_places,
-    directed_point as directed_point,
     elastic_band as elastic_band,
     elongation_row as elongation_row,
+    find_directed_point as find_directed_point,
     free_translations as free_translations,
+    list_directed_places as list_directed_places,
     mass_term as mass_term,
     point_in as point_in,
     point_motion as point_motion,
@@ -34,11 +34,11 @@ from femubench.core.effect.flexible_ends import (
     flexible_ends_change as flexible_ends_change,
     free_arm_change as free_arm_change,
     rate_nodes as rate_nodes,
-    softened_ends as softened_ends,
+    soften_ends as soften_ends,
 )
 from femubench.core.effect.flexible_supports import (
     flexible_supports_change as flexible_supports_change,
-    softened_supports as softened_supports,
+    soften_supports as soften_supports,
 )
 from femubench.core.effect.frame_effect import FrameEffect as FrameEffect
 from femubench.core.effect.interfaces import (

@@ -18,22 +18,22 @@ from femubench.core.schema.results import Block as Block, JobResult as JobResult
 from femubench.core.score import predictive as predictive
 from femubench.core.score.counting import (
     block_weights as block_weights,
-    counted_blocks as counted_blocks,
+    choose_blocks as choose_blocks,
 )
 from femubench.core.score.leaderboard import (
     FLOORS as FLOORS,
+    find_basis as find_basis,
     interval_kind as interval_kind,
     is_test as is_test,
     leaderboard as leaderboard,
     ranks_by_floor as ranks_by_floor,
-    scored_on as scored_on,
 )
 from femubench.core.score.ranking import (
     OFFSET_PERCENT as OFFSET_PERCENT,
     SCORE_OF_FAILURE as SCORE_OF_FAILURE,
     TIE as TIE,
+    rank_items as rank_items,
     rank_results as rank_results,
-    ranked as ranked,
 )
 from femubench.core.score.repeatability import unsteady as unsteady
 from femubench.core.score.scoring import (

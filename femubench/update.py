@@ -22,7 +22,6 @@ from femubench.core.fem.model import total_change as total_change
 from femubench.core.fit.discrepancy import Discrepancy as Discrepancy
 from femubench.core.update.change_lists import (
     OWN as OWN,
-    carried_by as carried_by,
     check_changes as check_changes,
     element_sets as element_sets,
     list_changes as list_changes,
@@ -32,6 +31,7 @@ from femubench.core.update.change_lists import (
     scale_groups_within as scale_groups_within,
     scale_joint as scale_joint,
     scale_parts as scale_parts,
+    select_determined as select_determined,
 )
 from femubench.core.update.dynamic import expand_measured_shapes as expand_measured_shapes
 from femubench.core.update.element_families import (
@@ -43,7 +43,7 @@ from femubench.core.update.element_families import (
     group_family as group_family,
     nobari_family as nobari_family,
     physical_family as physical_family,
-    tied as tied,
+    tie_unknowns as tie_unknowns,
 )
 from femubench.core.update.element_strategy import ElementStrategy as ElementStrategy
 from femubench.core.update.entries import update_entries as update_entries
@@ -59,7 +59,7 @@ from femubench.core.update.low_rank import (
 from femubench.core.update.modal_space import (
     ModalFit as ModalFit,
     ModalSpace as ModalSpace,
-    bounded_fit as bounded_fit,
+    fit_bounded as fit_bounded,
     modal_space as modal_space,
     parametric_result as parametric_result,
 )

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from femubench.reports.cells import chance, fixed, plain, whole
+from femubench.reports.cells import chance, format_fixed, plain, whole
 
 Cell = str | float | None
 
@@ -44,7 +44,7 @@ class Column:
             return plain(cell)
         if self.say is not None:
             return self.say(cell)
-        return fixed(cell, self.digits, width) if self.digits else whole(cell, max(width, 4))
+        return format_fixed(cell, self.digits, width) if self.digits else whole(cell, max(width, 4))
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ def plain(text: object) -> str:
     return " ".join("".join(c if c.isprintable() else " " for c in str(text)).split())
 
 
-def shortened(text: str, width: int) -> str:
+def shorten_text(text: str, width: int) -> str:
     """Return text cut to a width, with an ellipsis where something is missing."""
     return text if len(text) <= width else text[: width - 1] + "…"
 
@@ -35,7 +35,7 @@ def join_names(names: Sequence[str]) -> str:
     return " and ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
 
 
-def fixed(value: float | None, digits: int = 2, width: int = 5) -> str:
+def format_fixed(value: float | None, digits: int = 2, width: int = 5) -> str:
     """Return a number with as many decimals, up to `digits`, as fit into a width."""
     if value is None or not math.isfinite(value):
         return NOTHING
@@ -52,7 +52,7 @@ def whole(value: float | None, width: int = 12) -> str:
     """Return a count; one decimal where a median lies between two and there is room for it."""
     if value is None or not math.isfinite(value):
         return NOTHING
-    return fixed(value, 0 if value == round(value) else 1, width)
+    return format_fixed(value, 0 if value == round(value) else 1, width)
 
 
 def hertz(value: float | None) -> str:
@@ -86,7 +86,7 @@ def figure(value: float | None, digits: int = 4) -> str:
     return f"{float(text):.0f}" if "e" in text and 1.0 <= abs(value) < 1e7 else text
 
 
-def signed(value: float | None, decimals: int = 1) -> str:
+def format_signed(value: float | None, decimals: int = 1) -> str:
     """Return a number with its sign."""
     if value is None or not math.isfinite(value):
         return NOTHING

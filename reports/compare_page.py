@@ -16,7 +16,7 @@ from femubench.reports.blocks import (
     Passage,
     Table,
 )
-from femubench.reports.cells import NOTHING, fixed, plain, shortened
+from femubench.reports.cells import NOTHING, format_fixed, plain, shorten_text
 from femubench.reports.html import to_html
 from femubench.reports.markdown import to_markdown
 from femubench.reports.svg import drawing
@@ -98,8 +98,8 @@ def _top(data: Mapping[str, Any]) -> Passage:
 
 def _sections(data: Mapping[str, Any], *, screen: bool = False) -> Iterator[Passage]:
     """Yield the parts; lists are cut on the screen, and tables show what differs."""
-    differing = [shortened(plain(line), _LONGEST) for line in data["environment"]]
-    notes = [shortened(plain(note), _LONGEST) for note in data["notes"]]
+    differing = [shorten_text(plain(line), _LONGEST) for line in data["environment"]]
+    notes = [shorten_text(plain(note), _LONGEST) for note in data["notes"]]
     yield from _listed("Ended otherwise", map(_change, data["changes"]), screen)
     yield from _listed("Beyond a threshold", map(_excess, data["excesses"]), screen)
     evidence = data["evidence"]
@@ -154,7 +154,7 @@ def _drawn(evidence: Sequence[Mapping[str, Any]]) -> list[Block]:
 
 
 def _ratio_text(name: str, ratio: float | None) -> str:
-    return fixed(ratio, 2 if name == "seconds" else 3, 6) + _arrow(name, ratio)
+    return format_fixed(ratio, 2 if name == "seconds" else 3, 6) + _arrow(name, ratio)
 
 
 def _arrow(name: str, ratio: float | None) -> str:
@@ -165,7 +165,11 @@ def _arrow(name: str, ratio: float | None) -> str:
 
 def _proof(item: Mapping[str, Any]) -> list[Cell]:
     low, high = item["low"], item["high"]
-    ends = None if low is None or high is None else f"{fixed(low, 3, 6)} - {fixed(high, 3, 6)}"
+    ends = (
+        None
+        if low is None or high is None
+        else f"{format_fixed(low, 3, 6)} - {format_fixed(high, 3, 6)}"
+    )
     differing = f"{item['differing']} of {item['structures']}"
     return [item["strategy"], differing, item["ratio"], ends or NOTHING, item["p"], item["verdict"]]
 

@@ -25,7 +25,7 @@ from femubench.reports.blocks import (
     Row,
     Table,
 )
-from femubench.reports.cells import chance, figure, plain, sentence, signed
+from femubench.reports.cells import chance, figure, format_signed, plain, sentence
 from femubench.reports.diagnosis_words import Data
 from femubench.reports.markdown import to_markdown
 from femubench.reports.terminal import to_terminal
@@ -206,7 +206,7 @@ def _fit(data: Data, *, page: bool) -> Iterator[Block]:
         "are noise alone lie within ±2" + (", the shaded band. ○ before, ◆ after." * page or ".")
     )
     drawings = []
-    before_after = [Column(when, 9, say=signed) for when in _WHEN]
+    before_after = [Column(when, 9, say=format_signed) for when in _WHEN]
     kind: Any
     for kind, title in _KINDS.items():
         dots = residual_dots(data, kind)
@@ -217,7 +217,7 @@ def _fit(data: Data, *, page: bool) -> Iterator[Block]:
             more = f"{len(dots) - MOST_ROWS} more in the table below." * (len(dots) > MOST_ROWS)
             drawings.append(Drawing(title, more, drawn))
         elif dots:
-            say = partial(figure, digits=3) if kind == "shape" else signed
+            say = partial(figure, digits=3) if kind == "shape" else format_signed
             heads = [Column(title, 36, left=True), *(Column(when, 9, say=say) for when in _WHEN)]
             yield Table(heads, [[dot.name, dot.before, dot.after] for dot in dots])
     if drawings:

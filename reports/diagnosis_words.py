@@ -6,7 +6,15 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from femubench.reports.cells import NOTHING, chance, estimate, figure, first_of, plain, signed
+from femubench.reports.cells import (
+    NOTHING,
+    chance,
+    estimate,
+    figure,
+    first_of,
+    format_signed,
+    plain,
+)
 
 Data = Mapping[str, Any]
 
@@ -105,8 +113,8 @@ def weight(row: Data) -> str:
     """Return what data and prior say for the first explanation against another one."""
     against = "no cause at all" if row["against"] == "nothing" else plain(row["against"])
     return (
-        f"Against {against}, the data add {signed(row['data'])} to the logarithm of the odds, "
-        f"the prior {signed(row['prior'])}."
+        f"Against {against}, the data add {format_signed(row['data'])} to the logarithm of the odds, "
+        f"the prior {format_signed(row['prior'])}."
     )
 
 
@@ -127,7 +135,7 @@ def parameter(item: Data) -> str:
     if item["wording"] != "change" or value is None or not abs(value) < 10.0:
         return text
     spread = "" if std is None else f" ± {figure(100.0 * std, 2)}"
-    return f"{text} ({signed(100.0 * value)}{spread} %)"
+    return f"{text} ({format_signed(100.0 * value)}{spread} %)"
 
 
 def unit_of(size: Data) -> str:
@@ -149,7 +157,7 @@ def look(found: Data) -> str:
     """Return what is odd about a model, and how the frequencies change if it is corrected."""
     effect = f" ({found['effect']})" if found["effect"] else ""
     changes = [
-        f"mode {change['mode']} {signed(change['percent'], 2)} %"
+        f"mode {change['mode']} {format_signed(change['percent'], 2)} %"
         for change in found["changes"]
         if change["percent"] is not None
     ]

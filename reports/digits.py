@@ -38,7 +38,7 @@ class Digits:
             max((len(digits.strip("-0").replace(".", "")) for digits in powers), default=1),
         )
 
-    def printed(self, value: float, unit: str = "") -> str:
+    def format(self, value: float, unit: str = "") -> str:
         """Return a figure as the paper has it."""
         return self._text(value, unit, 0, power=not _fits(value))
 

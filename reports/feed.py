@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 from uuid import NAMESPACE_URL, uuid5
 
-from femubench.reports.cells import fixed, interval, plain
+from femubench.reports.cells import format_fixed, interval, plain
 from femubench.reports.templating import templates
 
 TITLE = "femubench leaderboard"
@@ -58,7 +58,7 @@ def _news_text(item: Mapping[str, Any]) -> str:
     if item["skill"] is None:
         return f"{told}no result on today's files of the cases."
     sure = "" if item["low"] is None else f" (95 %: {interval(item['low'], item['high'])})"
-    return f"{told}skill {fixed(item['skill'], 3, 7)}{sure} on today's cases."
+    return f"{told}skill {format_fixed(item['skill'], 3, 7)}{sure} on today's cases."
 
 
 def _name(*parts: str) -> str:

@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from femubench.reports.blocks import Passage
 from femubench.reports.cells import plain
-from femubench.reports.svg import embedded
+from femubench.reports.svg import embed_svg
 from femubench.reports.templating import asset, templates
 
 
@@ -39,7 +39,7 @@ def to_html(
         sections=list(sections),
         style=Markup(asset("page.css") + asset("report.css")),
         script=Markup("".join(map(asset, scripts))),
-        embedded=embedded,
+        embedded=embed_svg,
     )
 
 

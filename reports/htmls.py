@@ -26,7 +26,7 @@ class HtmlReporter:
 
     def render_with(self, run: Run, exhibits: ExhibitSource | None) -> str:
         """Return the page with the drawings that the store has."""
-        if StudyAxes.asked(run) is not None:
+        if StudyAxes.from_run(run) is not None:
             from femubench.reports.study import study_html
 
             return study_html(run)

@@ -35,7 +35,7 @@ class JsonReporter:
     def render(self, run: Run) -> str:
         """Return strict JSON: what is not a finite number is null."""
         plain = {**run_to_json(run), "leaderboard": board_of(run)}
-        if StudyAxes.asked(run) is not None:
+        if StudyAxes.from_run(run) is not None:
             cells = skill_by(run).to_dict("records")
             plain["cells"] = [{str(name): clean(v) for name, v in row.items()} for row in cells]
         return json.dumps(plain, indent=1, allow_nan=False)

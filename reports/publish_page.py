@@ -7,11 +7,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from femubench.plot import Axis, Chart, Mark, Series
-from femubench.reports.cells import fixed, interval, join_names, plain, shortened
+from femubench.reports.cells import format_fixed, interval, join_names, plain, shorten_text
 from femubench.reports.feed import feeds_of, headline_of
 from femubench.reports.svg import drawing
 from femubench.reports.templating import asset, templates
-from femubench.results import ranked
+from femubench.results import rank_items
 
 _MOST_DRAWN = 20
 _LEAST = -1.0  # skill that is drawn; an arrow tells of less
@@ -108,7 +108,7 @@ def _answer(board: Data) -> Iterator[str]:
 
 def _skill_words(row: Data) -> str:
     sure = "" if row["low"] is None else f" (95 % interval {interval(row['low'], row['high'])})"
-    return f"skill {fixed(row['skill'], 3, 7)}{sure}"
+    return f"skill {format_fixed(row['skill'], 3, 7)}{sure}"
 
 
 def _on_case(strategies: Iterable[Data], name: str, digest: str) -> list[tuple[Data, Data]]:
@@ -124,7 +124,7 @@ def _on_case(strategies: Iterable[Data], name: str, digest: str) -> list[tuple[D
         item, row = entry
         return (bool(row["unphysical"] or row["conflict"]),), row["score"], item["name"]
 
-    return [entry for _, entry in ranked(found, order)]
+    return [entry for _, entry in rank_items(found, order)]
 
 
 def _flags(row: Data) -> list[str]:
@@ -143,7 +143,7 @@ def _machines(machines: Sequence[Data], *, most: int = 3) -> str:
     """Return the first machines with processor and linear algebra, and how many there are."""
     keys = ("cpu",) if most == 1 else ("cpu", "blas")
     listed = (", ".join(plain(m[key]) for key in keys if m.get(key)) for m in machines)
-    names = list(dict.fromkeys(shortened(name, 80) or "unknown" for name in listed))
+    names = list(dict.fromkeys(shorten_text(name, 80) or "unknown" for name in listed))
     return "; ".join(names[:most]) + (f" +{len(names) - most}" if len(names) > most else "")
 
 
@@ -170,7 +170,7 @@ def history_of(versions: Sequence[Data]) -> Chart | None:
     rows = [
         (
             "on all cases" if row["complete"] else "lacks a case",
-            f"{len(versions) - age}  {shortened(plain(row['version']), 14)}, {row['last'][:10]}",
+            f"{len(versions) - age}  {shorten_text(plain(row['version']), 14)}, {row['last'][:10]}",
             row,
         )
         for age, row in enumerate(versions)

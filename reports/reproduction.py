@@ -159,7 +159,7 @@ def cells_in_words(cells: Sequence[Cell], words: Words) -> Iterator[Block]:
             cell.row,
             cell.column,
             *([cell.unit] if several else []),
-            digits[cell.unit].printed(cell.printed, cell.unit),
+            digits[cell.unit].format(cell.printed, cell.unit),
             digits[cell.unit].ours(cell.ours, cell.unit, beside=cell.printed),
             off(cell.deviation_percent, cell.unit),
             f"{words[cell.verdict]} {marks.get(cell.note, '')}".rstrip(),

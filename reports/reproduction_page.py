@@ -17,7 +17,7 @@ from femubench.reports import reproduction as words
 from femubench.reports.blocks import Drawing
 from femubench.reports.cells import plain
 from femubench.reports.digits import off
-from femubench.reports.svg import drawing, embedded
+from femubench.reports.svg import drawing, embed_svg
 from femubench.reports.templating import templates
 from femubench.reproduction import (
     VERDICTS,
@@ -56,7 +56,7 @@ def reproduction_html(studies: Sequence[Study], drawings: Mapping[str, str]) -> 
         cells=[cell for study in studies for cell in study.cells],
         options=[option for paper in papers for option in paper.options],
         drawn=lambda one: Drawing(one.title, one.caption, _shown(one, drawings[one.name])),
-        drawing=drawing, embedded=embedded, faults=_FAULTS, off=off, places_of=places_of,
+        drawing=drawing, embedded=embed_svg, faults=_FAULTS, off=off, places_of=places_of,
         say=words, tally=_tally, verdicts=VERDICTS,
     )  # fmt: skip
 
@@ -174,4 +174,4 @@ def _shown(figure: Figure, svg: str) -> Markup:
 
     if not isinstance(figure, StructureMap):
         svg = re.sub(r"#[0-9a-fA-F]{6}\b", named, svg)
-    return embedded(svg, figure.name, plain(figure.title))
+    return embed_svg(svg, figure.name, plain(figure.title))

@@ -12,21 +12,21 @@ from femubench.reports import study
 from femubench.reports.blocks import Block, Cell, Column, Items, Passage, Table
 from femubench.reports.cells import NOTHING, hertz, interval, plain, whole
 from femubench.reports.markdown import escape, to_markdown
-from femubench.reports.page.papers import papers_of, started_as_drawn
+from femubench.reports.page.papers import list_drawn_frequencies, papers_of
 from femubench.reports.summary import (
     cases_of,
     failures,
     finding,
     first_seed,
+    group_reasons,
     header,
     lead,
     notes_of,
-    spared,
     strategies_of,
     troubles,
 )
 from femubench.reports.terminal import to_terminal
-from femubench.reports.twins import MEANING, drawn_from, suspicions
+from femubench.reports.twins import MEANING, describe_twins, suspicions
 from femubench.results import (
     FLOORS,
     JobResult,
@@ -95,7 +95,7 @@ class TerminalReporter:
 
     def render(self, run: Run) -> str:
         """Return the ranking, the failures and what the columns mean."""
-        if StudyAxes.asked(run) is not None:
+        if StudyAxes.from_run(run) is not None:
             return to_terminal(study.sections_of(run))
         failed = failures(troubles(run.results))
         told = [*failed, *_notes(run)]
@@ -144,7 +144,7 @@ class MarkdownReporter:
 
     def render(self, run: Run) -> str:
         """Return the report."""
-        if StudyAxes.asked(run) is not None:
+        if StudyAxes.from_run(run) is not None:
             sections = [*study.sections_of(run), study.about_axes(run)]
             return to_markdown(sections, study.title_of(run))
         title = f"Updating strategies compared: run {run.meta.get('run', '')}".rstrip()
@@ -246,7 +246,7 @@ def _twins(run: Run) -> Iterator[Block]:
             [name + " (knows the cases?)" * own.suspicious, own.skill, own.original_skill, own.p]
             for name, own in found
         ]
-        said = f"{MEANING} Here: skill on {drawn_from(run)}."
+        said = f"{MEANING} Here: skill on {describe_twins(run)}."
         yield Table([Column("strategy", 30, left=True), *heads], rows, said)
     yield from (f"?: {told}" for told in suspicions(run))
 
@@ -255,7 +255,7 @@ def _notes(run: Run) -> Iterator[str]:
     """Yield what else a reader of the screen has to know."""
     yield from (f"Note: {note}." for note in notes_of(run))
     yield from _moving(run)
-    for reason, names in spared(run.results).items():
+    for reason, names in group_reasons(run.results).items():
         named = ", ".join(map(plain, names))
         yield f"Not applicable, counted as the model that was given: {named}: {reason}."
 
@@ -289,7 +289,7 @@ def _document(run: Run) -> Iterator[Passage]:
     for title, fine in (("Failures", False), ("Not applicable", True)):
         ended = failures(troubles(run.results, fine=fine))
         yield Passage(title, ended or ["None."], level=3)
-    drawn, papers, ranked = started_as_drawn(run), papers_of(run), Run(run.meta, run.ranked)
+    drawn, papers, ranked = list_drawn_frequencies(run), papers_of(run), Run(run.meta, run.ranked)
     for case in cases_of(run):
         start, printed = drawn.get(case, {}), papers.get(case, {})
         others = (("from the model as drawn", start), ("as the paper prints it", printed))

@@ -8,7 +8,7 @@ from typing import Any
 
 from femubench import InputError
 from femubench.reports.blocks import Block, Column, Drawing, Items, Passage, Table
-from femubench.reports.cells import NOTHING, fixed, interval, plain
+from femubench.reports.cells import NOTHING, format_fixed, interval, plain
 from femubench.reports.summary import failures, header, lead, notes_of, troubles
 from femubench.results import Run, StudyAxes, skill_by
 
@@ -126,7 +126,9 @@ def _options(row: dict[Any, Any], names: Sequence[str]) -> str:
 
 def _skill(row: dict[Any, Any]) -> str:
     marks = ("!" if row["unphysical"] else "") + ("*" if row["failed"] + row["missing"] else "")
-    return marks + ("n/a" if row["not_applicable"] == row["jobs"] else fixed(row["skill"], 3, 6))
+    return marks + (
+        "n/a" if row["not_applicable"] == row["jobs"] else format_fixed(row["skill"], 3, 6)
+    )
 
 
 def _lost(row: dict[Any, Any]) -> str:

@@ -13,9 +13,9 @@ from femubench.results import (
     JobResult,
     PairedMode,
     Run,
+    find_basis,
     interval_kind,
     note_missing_jobs,
-    scored_on,
     structures_of,
 )
 
@@ -66,7 +66,7 @@ def failures(items: Sequence[Trouble]) -> list[Block]:
     return [Table(heads, rows, most=20)] if rows else []
 
 
-def spared(results: Iterable[JobResult]) -> dict[str, list[str]]:
+def group_reasons(results: Iterable[JobResult]) -> dict[str, list[str]]:
     """Return from the reason for which strategies are not applicable to their names."""
     reasons: dict[str, list[str]] = {}
     for item in troubles(results, fine=True):
@@ -125,7 +125,7 @@ def _yardstick(run: Run) -> str:
 
 def lead(run: Run) -> str:
     """Return what the skill of a run says, and from where its strategies started."""
-    unseen = scored_on(run) == "unseen"
+    unseen = find_basis(run) == "unseen"
     what = "unseen data" if unseen else "the modes that were given"
     told = [
         f"Skill is the part of the {_yardstick(run)} model's error on {what} that a strategy takes "
@@ -154,7 +154,7 @@ def finding(
     if best is None:
         return ["No strategy gave a possible model."] if board else []
     name, skill, models = plain(best["strategy"]), best["skill"], f"{_yardstick(run)} models"
-    sure, data = "", "unseen data" if scored_on(run) == "unseen" else "the given modes"
+    sure, data = "", "unseen data" if find_basis(run) == "unseen" else "the given modes"
     if kind := interval_kind(run):
         cases = {structures_of(run).get(case, case) for case in cases_of(run)}
         count = len(seeds_of(run) if kind == "seeds" else cases)

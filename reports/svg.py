@@ -39,7 +39,7 @@ def drawing(chart: Chart, caption: str) -> Markup | None:
     return Markup("".join(drawn))
 
 
-def embedded(svg: str, prefix: str, label: str) -> Markup:
+def embed_svg(svg: str, prefix: str, label: str) -> Markup:
     """Return a drawing for the middle of a document.
 
     Arguments:

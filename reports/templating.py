@@ -6,7 +6,7 @@ from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from femubench.reports.cells import chance, fixed, plain, sentence, shortened
+from femubench.reports.cells import chance, format_fixed, plain, sentence, shorten_text
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -25,7 +25,7 @@ def templates() -> Environment:
         lstrip_blocks=True,
         finalize=lambda value: value if hasattr(value, "__html__") else plain(value),
     )
-    room.filters.update(fixed=fixed, plain=plain, shortened=shortened, chance=chance)
+    room.filters.update(fixed=format_fixed, plain=plain, shortened=shorten_text, chance=chance)
     room.filters["sentence"] = sentence
     return room
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import zip_longest
 
 from femubench.reports.blocks import Block, Cards, Column, Items, Passage, Row, Table
-from femubench.reports.cells import plain, shortened
+from femubench.reports.cells import plain, shorten_text
 
 WIDTH = 80
 
@@ -17,7 +17,7 @@ def to_terminal(sections: Iterable[Passage]) -> str:
     return "\n\n".join("\n".join(_screen(section)) for section in sections)
 
 
-def aligned_table(rows: list[list[str]], headers: tuple[str, ...], align: tuple[str, ...]) -> str:
+def align_table(rows: list[list[str]], headers: tuple[str, ...], align: tuple[str, ...]) -> str:
     """Return a table no wider than its cells; tabulate pads headers, so they go in as rows."""
     from tabulate import tabulate
 
@@ -32,7 +32,7 @@ def aligned_table(rows: list[list[str]], headers: tuple[str, ...], align: tuple[
 
 def _screen(section: Passage) -> Iterator[str]:
     if section.title:
-        yield shortened(plain(section.title), WIDTH)
+        yield shorten_text(plain(section.title), WIDTH)
     for block in section.blocks:
         yield from _shown(block, "  " if section.title else "")
 
@@ -84,13 +84,13 @@ def _parts(table: Table, room: int) -> Iterator[str]:
         most = [column.width or widths[k] + spare for k, column in zip(part, columns, strict=True)]
         lines = [line for row in rows for line in _lines([row[k] for k in part], columns, most)]
         heads = [(column.title, column.side) for column in columns]
-        yield aligned_table(lines, *zip(*heads, strict=True))
+        yield align_table(lines, *zip(*heads, strict=True))
 
 
 def _lines(row: Sequence[str], columns: Sequence[Column], widths: Sequence[int]) -> list[list[str]]:
     """Return the lines that a row takes on the screen."""
     cells = [
-        textwrap.wrap(cell, width) if column.wrap else [shortened(cell, width)]
+        textwrap.wrap(cell, width) if column.wrap else [shorten_text(cell, width)]
         for cell, column, width in zip(row, columns, widths, strict=True)
     ]
     return [list(line) for line in zip_longest(*cells, fillvalue="")] or [[""] * len(columns)]

@@ -26,7 +26,7 @@ def twins_by_strategy(run: Run) -> dict[str, dict[str, Any]]:
     }
 
 
-def drawn_from(run: Run) -> str:
+def describe_twins(run: Run) -> str:
     """Return how many twins there were, and from which seed."""
     told = run.meta.get("twins") or {}
     twins = told.get("of") or {}

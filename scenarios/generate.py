@@ -17,7 +17,7 @@ import pandas as pd
 from femubench import Model, Sensors, solve_modes
 from femubench.fem import GroundSpring, Place, PointMass, rectangular_tube
 from femubench.scenarios.structures import HALF_SIDE, RUNG, ladder_truth
-from femubench.scenarios.twin_data import loaded_shapes, twin_modes
+from femubench.scenarios.twin_data import read_shapes, twin_modes
 
 HERE = Path(__file__).parent
 Array = npt.NDArray[np.float64]
@@ -115,11 +115,11 @@ def write_tests(root: Path) -> None:
     """Write the two published tests with the shapes of the twins under the test's masses."""
     sensors = ladder_sensors()
     write_sensors(root / "frame", sensors)
-    shapes = loaded_shapes("frame_twin_outofplane.csv", HERE / "frame", sensors)
+    shapes = read_shapes("frame_twin_outofplane.csv", HERE / "frame", sensors)
     write_modes(root / "frame" / "modes.csv", sensors, FRAME_HZ, shapes[:, :5], TEST_STD)
     sensors = hframe_sensors()
     write_sensors(root / "hframe", sensors)
-    shapes = loaded_shapes("hframe_twin_inplane.csv", HERE / "hframe", sensors)
+    shapes = read_shapes("hframe_twin_inplane.csv", HERE / "hframe", sensors)
     # Test mode 7 moves out of plane and has no shape here; the twin's mode 7 is the test's 8.
     listed = np.column_stack([shapes[:, :6], np.full(len(sensors), np.nan), shapes[:, 6]])
     path = root / "hframe" / "modes.csv"

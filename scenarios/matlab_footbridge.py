@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from femubench import InputError
 from femubench.fem import BoolArray, FloatArray
-from femubench.scenarios.nodes_from_stiffness import Row, labelled_rows
+from femubench.scenarios.nodes_from_stiffness import Row, label_rows
 
 VARIABLE = "FEMUBENCH_FOOTBRIDGE"
 MODEL, TEST = "SteelPedestrianBridgeExp.mat", "ExpModeInfo_FEM.mat"
@@ -142,7 +142,7 @@ def _rows(model: _Variables, turns: BoolArray) -> list[Row]:
     springs = {name: model.array(name, size, size) for name in GROUPS[-4:]}
     free = model.array("K_whole", size, size) - sum(springs.values())
     y1, z1, y2, z2 = (np.flatnonzero(part.diagonal()).tolist() for part in springs.values())
-    found = labelled_rows(free, turns, [*y1, *y2], [*z1, *z2])
+    found = label_rows(free, turns, [*y1, *y2], [*z1, *z2])
     if found is not None:
         return found
     return [Row(i, "rx" if turn else "z", (i / _INCH, 0.0, 0.0)) for i, turn in enumerate(turns)]

@@ -29,7 +29,7 @@ class Row:
     xyz: tuple[float, float, float]
 
 
-def labelled_rows(
+def label_rows(
     stiffness: FloatArray, turns: BoolArray, across: Sequence[int], upright: Sequence[int]
 ) -> list[Row] | None:
     """Return what the rows are; None where the stiffness does not tell.

@@ -40,7 +40,7 @@ def twin_modes(file: str, sensors: Sequence[tuple[Array, str]]) -> tuple[Array, 
     return frequencies, np.array(shapes).T
 
 
-def loaded_shapes(file: str, folder: Path, sensors: Sensors) -> Array:
+def read_shapes(file: str, folder: Path, sensors: Sensors) -> Array:
     """Return the shapes of a solid twin that carries the known masses of a case, (n_sensors, m).
 
     The twin's own modes and its rigid-body motions are coupled by the masses (structural

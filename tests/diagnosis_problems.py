@@ -18,7 +18,7 @@ from femubench.core.fit.modal_fit import Problem
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.projection import Projection
 from femubench.core.fit.residuals import Data
-from femubench.core.inference.examine import posed
+from femubench.core.inference.examine import pose_problem
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.roles import Effect
 from femubench.effect import total_mass
@@ -102,7 +102,7 @@ def problem_of(
 ) -> Problem:
     """Return a problem without the correction for the mesh."""
     if tolerance:
-        problem, _ = posed(model, measurement, hypotheses_of(model, effects), tolerance)
+        problem, _ = pose_problem(model, measurement, hypotheses_of(model, effects), tolerance)
         return replace(problem, data=Data(measurement, np.zeros(0)))
     known = hypotheses_of(model, effects)
     space = nominal_space(model, solve_modes(model), measurement.sensors, known)

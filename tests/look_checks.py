@@ -11,14 +11,14 @@ from femubench.core.look import look as core_look
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.schema.diagnosis import LookWarning
-from femubench.diagnosis import registered_effects
+from femubench.diagnosis import list_effects
 
 
 def look(
     model: Model, measurement: Measurement, band: tuple[float, float] | None = None
 ) -> tuple[LookWarning, ...]:
     """Return what a diagnosis would show: the looks of all effects included."""
-    return core_look.look(model, measurement, band, registered_effects())
+    return core_look.look(model, measurement, band, list_effects())
 
 
 def midpoints(frame: Frame) -> Sensors:

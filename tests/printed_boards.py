@@ -10,7 +10,7 @@ import pytest
 
 import femubench
 from femubench import Run
-from femubench.reports.cells import shortened
+from femubench.reports.cells import shorten_text
 from femubench.results import leaderboard
 
 ROOT = Path(__file__).parents[1]
@@ -44,7 +44,7 @@ def assert_board_is_that_of(run: Run, name: str) -> None:
     board = leaderboard(run).to_dict("records")
     rows = _ROW.findall(text)
     assert [(int(rank), name) for _, rank, name, _ in rows] == [
-        (row["rank"], shortened(row["strategy"], 16)) for row in board
+        (row["rank"], shorten_text(row["strategy"], 16)) for row in board
     ]
     for (marks, _, _, cells), row in zip(rows, board, strict=True):
         assert ("!" in marks) == row["unphysical"]

@@ -13,8 +13,8 @@ from numpy.testing import assert_allclose
 from scipy.special import logsumexp
 
 from femubench import Model, solve_modes
-from femubench.core.advise.advice import aligned
-from femubench.core.advise.point_attachments import antiresonances, loaded_frequencies
+from femubench.core.advise.advice import align_shapes
+from femubench.core.advise.point_attachments import antiresonances, predict_loaded_frequencies
 from femubench.core.advise.prediction import Outlook, Points, Predicted, distance
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.fem.model import Dofs
@@ -42,9 +42,9 @@ def seen_values(view: Outlook, points: Points, shapes: FloatArray) -> list[Predi
     return [
         view.mass(),
         view.frequencies(view.further(2)),
-        aligned(shapes, *view.shapes()),
+        align_shapes(shapes, *view.shapes()),
         view.flexibility(),
-        *loaded_frequencies(view, points, 0.03),
+        *predict_loaded_frequencies(view, points, 0.03),
         *antiresonances(view),
     ]
 
@@ -68,7 +68,7 @@ class TestPredictions:
             [p.coordinate(v) for p, v in zip(part.hypothesis.parameters, size, strict=True)]
         )
         view, points = one_outlook(problem, Fit(state_at(problem, (part,), x), 0.0))
-        loaded = loaded_frequencies(view, points, 0.04)
+        loaded = predict_loaded_frequencies(view, points, 0.04)
         zeros = antiresonances(view)
         rigid = problem.space.rigid
         for i in range(0, len(points.labels), 3):
@@ -167,7 +167,7 @@ def test_distance_against_likelihood_ratios(symmetric: Model) -> None:
     predicted = []
     for found in fits:
         view, points = one_outlook(problem, found)
-        predicted.append(loaded_frequencies(view, points, mass)[points.labels.index("A")])
+        predicted.append(predict_loaded_frequencies(view, points, mass)[points.labels.index("A")])
     tables = [_drawn(symmetric, found, "A", mass, rng) for found in fits]
     std = 3.0 * STD * tables[0].mean(axis=0)
     stated = distance(predicted[0], predicted[1], std)

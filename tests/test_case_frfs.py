@@ -11,7 +11,7 @@ import femubench
 from femubench import Case, InputError, Sensors, read_case
 from femubench.core.case.response_files import responses_npz
 from femubench.core.case.writing import write_case
-from femubench.core.drawing.prediction import drive_sensor, frequency_axis, measured_receptances
+from femubench.core.drawing.prediction import drive_sensor, frequency_axis, list_receptances
 from femubench.modal import FrequencyResponses, receptance
 
 DRIVEN = 4
@@ -58,7 +58,7 @@ def test_strategies_see_no_response(with_frfs: Case) -> None:
 
 def test_the_measured_curve_is_drawn(with_frfs: Case, plain: Case) -> None:
     assert drive_sensor(with_frfs) == plain.measurement.sensors.labels[DRIVEN]
-    found = measured_receptances(with_frfs)
+    found = list_receptances(with_frfs)
     assert found["note"].startswith("As measured.")
     levels = np.array(found["measured"][""], dtype=float)
     axis, frfs = frequency_axis(with_frfs), with_frfs.frfs

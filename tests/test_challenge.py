@@ -31,7 +31,7 @@ from femubench.core.challenge.truth import (
     Truth,
     fine_places,
     finer,
-    scattered,
+    scatter_elements,
 )
 from femubench.core.challenge.truth_file import KnownCase, TrueCause
 from femubench.core.challenge.visibility import delta_chi2
@@ -201,7 +201,7 @@ def test_the_loss_in_half_an_element_is_as_flexible_as_that_in_the_whole(loss: f
 
 
 def test_scatter_moves_the_frequencies_by_its_size_and_every_element_of_the_nominal_mesh() -> None:
-    frame = scattered(finer(LADDER.frame), 0.005, np.random.default_rng(1))
+    frame = scatter_elements(finer(LADDER.frame), 0.005, np.random.default_rng(1))
     assert len(frame.factors) == 2 * 28
     assert {len(factor.at) for factor in frame.factors} == {2}
     clean, moved = (see(Model.of(f), LADDER) for f in (finer(LADDER.frame), frame))

@@ -717,8 +717,8 @@ class Faulty:
 
 def test_a_reporter_that_raises_is_named() -> None:
     from femubench.core.errors import PluginError
-    from femubench.core.library.report import rendered
+    from femubench.core.library.report import render_report
     from femubench.core.schema.results import Run
 
     with pytest.raises(PluginError, match="reporter 'faulty' failed: ZeroDivisionError"):
-        rendered(Faulty(), Run({}, ()))
+        render_report(Faulty(), Run({}, ()))

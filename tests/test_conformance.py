@@ -26,7 +26,7 @@ from femubench.core.cli.main import bench
 from femubench.core.conformance import kit
 from femubench.core.conformance.checking import Subject, checks_of, findings, subjects
 from femubench.core.conformance.kit import Bench, Role
-from femubench.core.conformance.place_words import known_place
+from femubench.core.conformance.place_words import has_place
 from femubench.core.conformance.problems import PROBLEMS, problem
 from femubench.core.errors import InputError
 from femubench.core.plugin.loader import load_plugins
@@ -268,9 +268,9 @@ def test_scenarios(tmp_path: Path) -> None:
 def test_places_are_words_of_the_grammar() -> None:
     model = problem("grounded frame in space").model
     good = ("all", "L", "type:L", "A", "AB", "AB/2", "AB@A", "AB@0.25", "A-D", "A:z", "AB@0.5:x")
-    assert [place for place in good if not known_place(model, place)] == []
+    assert [place for place in good if not has_place(model, place)] == []
     wrong = ("Z", "AB/3", "AB/0", "AB@C", "AB@1.5", "A-Z", "A:w", "type:Q", "")
-    assert [place for place in wrong if known_place(model, place)] == []
+    assert [place for place in wrong if has_place(model, place)] == []
 
 
 def test_a_name_is_looked_up_kindly() -> None:

@@ -271,7 +271,7 @@ def test_effects_are_left_out_by_name_and_those_of_handbooks_together(
 ) -> None:
     handbooks = {"torsion-constant", "shear-deformation", "rotary-inertia"}
     kept = {*handbooks, "youngs-modulus"}
-    others = {effect.name for effect in diagnosis.registered_effects()} - kept
+    others = {effect.name for effect in diagnosis.list_effects()} - kept
 
     def named(*left_out: str, **options: Any) -> set[str]:
         without = "+".join([*others, *left_out])

@@ -22,7 +22,7 @@ from femubench.core.fem.structure import Structure
 from femubench.core.fit.modal_fit import state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
-from femubench.core.inference.examine import posed
+from femubench.core.inference.examine import pose_problem
 from femubench.fem import FloatArray, Frame
 
 FrameBuilder = Callable[..., Frame]
@@ -70,7 +70,7 @@ def test_no_scale_of_a_shape_fits_better_than_its_modal_scale_factor() -> None:
     rng = np.random.default_rng(1)
     data = toy([10.0], rng.standard_normal((6, 1)).tolist())
     reading = rng.standard_normal((1, 6, 1))
-    scaled, factor = data.scaled(reading)
+    scaled, factor = data.scale(reading)
     misfit = data.shapes - scaled[0]
     assert abs(float(misfit[:, 0] @ reading[0, :, 0])) < 1e-12
     best = np.square(misfit).sum()
@@ -163,7 +163,7 @@ def test_a_rigid_mode_that_a_spring_makes_elastic_is_paired(ladder: FrameBuilder
 
 def test_the_mesh_correction_is_counted_from_the_first_elastic_mode() -> None:
     data = Data(toy([10.0], []).measurement, np.array([0.1, 0.2]))
-    found = data.corrected(np.array([[-3.0, 0.0, 10.0, 20.0, 30.0]]), 1.0)
+    found = data.correct_for_mesh(np.array([[-3.0, 0.0, 10.0, 20.0, 30.0]]), 1.0)
     np.testing.assert_allclose(found, [[-3.0, 0.0, 11.0, 24.0, 30.0]])
 
 
@@ -193,7 +193,7 @@ def scatters(ladder: FrameBuilder) -> tuple[Data, Noise, FloatArray, FloatArray]
         test = replace(test, shapes=np.where(turned, -test.shapes, test.shapes))
         drawn = replace(clean, data=Data(test, NOTHING))
         rows.append(state_at(drawn, (), NOTHING).raw)
-    problem, slopes = posed(model, measured(model, frame), (), TOLERANCE)
+    problem, slopes = pose_problem(model, measured(model, frame), (), TOLERANCE)
     return problem.data, problem.noise, slopes, np.array(rows)
 
 
@@ -239,7 +239,7 @@ def test_other_deviations_are_weighed_as_with_a_covariance_of_their_own() -> Non
     ratios[2, 4:9] = 0.2
     ratios[3, 2:] = 1.0 / 3.0
     rows = rng.standard_normal((4, 30))
-    chi2, log_det = noise.reweighed(rows, ratios)
+    chi2, log_det = noise.reweigh(rows, ratios)
     for i, ratio in enumerate(ratios):
         # Measurement has unit deviations in units of its own; the rest keeps its size.
         own = np.diag(1.0 / np.square(ratio)) + shared @ shared.T

@@ -19,7 +19,7 @@ from femubench.core.diagnosis.serial import diagnosis_to_json
 from femubench.core.inference.charge import charges_of
 from femubench.core.inference.examine import Terms, examine
 from femubench.core.inference.fault_search import _Drawn, inquire, log_density
-from femubench.core.plugin.loader import load_plugins, registered_faults
+from femubench.core.plugin.loader import list_faults, load_plugins
 from femubench.effect import Suspect
 from femubench.plugins.faults.readings import multiply_readings, swap_readings
 from femubench.plugins.faults.section_turned import SectionTurned
@@ -298,7 +298,7 @@ def test_a_strangers_fault_is_found() -> None:
     (fault,) = load_plugins([], {"toy": _Offers(Octave)}).faults.values()
     sound = clean("ladder", 1)
     wrong = edited(partial(multiply, "frequencies", [1.0, 1.0, 2.0]), sound)
-    found = diagnose(wrong, FEW, faults=[*registered_faults(), fault], pairs=False)
+    found = diagnose(wrong, FEW, faults=[*list_faults(), fault], pairs=False)
     assert faults_of(found) == [("octave-slip", "mode:3")]
     assert "an octave too high" in found.sentence
 
@@ -337,11 +337,9 @@ def test_the_json_says_the_side_and_a_group_keeps_its_faults() -> None:
 def test_suspects_weighed_at_once_are_as_each_by_itself() -> None:
     case = clean("ladder", 0)
     used = case.measurement.select(case.used)
-    charges = [
-        c for c in charges_of(case.model, used, registered_faults()) if c.fault.side == "data"
-    ]
+    charges = [c for c in charges_of(case.model, used, list_faults()) if c.fault.side == "data"]
     now = _Drawn(case.model, used, None, 1.0)
     for (charge, gain), own in zip(now.all_screened(charges), charges, strict=True):
         assert charge.suspect is own.suspect
-        assert gain == pytest.approx(now.screened(own)[1], rel=1e-9, abs=1e-9), own.suspect.place
+        assert gain == pytest.approx(now.screen(own)[1], rel=1e-9, abs=1e-9), own.suspect.place
     assert len({c.fault.name for c in charges}) > 4

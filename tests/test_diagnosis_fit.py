@@ -154,7 +154,7 @@ def test_modal_coordinates_give_the_modes_of_the_extended_model(
         x = inside(part)
         values = [float(v) for v in h.values(x[None])[0]]
         extended = h.effect.extend(problem.model, h.place, values)
-        stiffness, mass, _ = problem.space.assembled((part,), x)
+        stiffness, mass, _ = problem.space.assemble((part,), x)
         found = solve_pencil(stiffness, mass)[0]
         expected = solve_dense(extended.mass.toarray(), extended.stiffness.toarray())[0]
         floor = 1e-4 * problem.space.eigenvalues[problem.space.rigid]
@@ -171,7 +171,7 @@ def test_all_modes_make_the_modal_coordinates_exact(problems: dict[str, Problem]
         for label in (("youngs-modulus", "all"), ("joint-rotation", "J9"), ("joint-mass", "T"))
     ]
     x = np.array([0.8, 0.6, 1.1])
-    stiffness, mass, _ = problem.space.assembled(parts, x)
+    stiffness, mass, _ = problem.space.assemble(parts, x)
     model = problem.model
     dense = {"stiffness": model.stiffness.toarray(), "mass": model.mass.toarray()}
     total = {name: matrix.copy() for name, matrix in dense.items()}
@@ -201,15 +201,15 @@ def test_rebased_coordinates_are_those_of_the_model_with_the_cause_in_it(
         for part in (other, third)
     ]
     x, rest = np.array([0.9]), np.array([0.7, 0.4, 1.2])
-    space = problem.space.rebased((spring,), x)
+    space = problem.space.rebase((spring,), x)
     # The spring holds one of the rigid modes.
     assert (problem.space.rigid, space.rigid) == (3, 2)
     np.testing.assert_allclose(
-        space.eigenvalues, solve_pencil(*problem.space.assembled((spring,), x)[:2])[0]
+        space.eigenvalues, solve_pencil(*problem.space.assemble((spring,), x)[:2])[0]
     )
     above = tuple(space.projections[i] for i in index)
-    together = problem.space.assembled((spring, other, third), np.concatenate([x, rest]))
-    on_top = space.assembled(above, rest)
+    together = problem.space.assemble((spring, other, third), np.concatenate([x, rest]))
+    on_top = space.assemble(above, rest)
     elastic = slice(2, None)
     expected, seen = (solve_pencil(*found[:2])[0][elastic] for found in (together, on_top))
     np.testing.assert_allclose(seen, expected, rtol=1e-8)

@@ -15,14 +15,14 @@ from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.diagnosis.proof import (
     Unseen,
     gain_of,
-    held_out,
-    left_out,
-    modified,
+    predict_held_out,
+    predict_left_out,
+    predict_modified,
     rms_gain_of,
 )
-from femubench.core.fit.mesh_error import refined
+from femubench.core.fit.mesh_error import refine_mesh
 from femubench.core.fit.modal_fit import Fit, state_at
-from femubench.core.inference.examine import Terms, examine, posed
+from femubench.core.inference.examine import Terms, examine, pose_problem
 from femubench.core.schema.diagnosis import Cause, Gain
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block
@@ -207,7 +207,7 @@ def test_the_gain_is_that_of_the_models_themselves() -> None:
     assert gain.modified_percent is not None
     for first, second in (gain.used_percent, gain.held_out_percent, gain.modified_percent):
         assert second < 0.5 * first
-    errors = modified(case, found.extended, 0.0)
+    errors = predict_modified(case, found.extended, 0.0)
     assert 100.0 * np.median(np.abs(errors.after)) == pytest.approx(
         gain.modified_percent[1],
         abs=0.02,  # the gain is not corrected for the mesh
@@ -271,7 +271,7 @@ def test_a_mode_left_out_has_no_part_in_what_predicts_it() -> None:
     effects = effects_named(*NAMES)
     seen = examine(MODEL, replace(test, frequencies=wrong), effects, tolerance=0.0)
     assert seen.best.parts
-    crossed = left_out(seen, Terms(tuple(effects), tolerance=0.0))
+    crossed = predict_left_out(seen, Terms(tuple(effects), tolerance=0.0))
     assert crossed.after[3] == pytest.approx(crossed.before[3], rel=1e-6)
     assert crossed.before[3] == pytest.approx(0.03, rel=0.05)
 
@@ -292,19 +292,19 @@ def test_the_mesh_is_corrected_mode_by_mode_whatever_mode_a_cause_adds() -> None
     (effect,) = effects_named("attached-oscillator")
     values = (0.3, 150.0)
     extended = effect.extend(coarse, "J1", values)
-    fine = Model.of(refined(coarse.structure))  # type: ignore[arg-type]
+    fine = Model.of(refine_mesh(coarse.structure))  # type: ignore[arg-type]
     truth = effect.extend(fine, "J1", values)
     after = measured(truth.attach(*CHANGE), FRAME, count=8, weighed=False)
     change = Modification("mass and spring", *CHANGE, after)
     test = measured(truth, FRAME, count=8, shapes=8)
     case = case_of(coarse, test, 4, modifications=(change,))
-    errors = modified(case, extended, 0.0)
+    errors = predict_modified(case, extended, 0.0)
     assert np.abs(errors.after).max() < 1e-3
     place = next(p for p in effect.places(coarse) if p.startswith("J1"))
-    problem, _ = posed(coarse, test.select(case.used), hypotheses_of(coarse, [effect]), 0.0)
+    problem, _ = pose_problem(coarse, test.select(case.used), hypotheses_of(coarse, [effect]), 0.0)
     part = part_at(problem, effect.name, place)
     state = state_at(problem, (part,), coordinates(part, values))
-    hidden = held_out(case, problem, problem, Fit(state, 0.0), extended, 0.0)
+    hidden = predict_held_out(case, problem, problem, Fit(state, 0.0), extended, 0.0)
     assert len(hidden.after) == 4
     assert np.abs(hidden.after).max() < 1e-3
 
@@ -314,9 +314,9 @@ def test_a_spring_that_holds_a_free_frame_leaves_the_corrections_where_they_were
     coarse = Model.of(replace(FRAME, members=tuple(replace(m, elements=2) for m in FRAME.members)))
     (effect,) = effects_named("grounding-spring")
     place = next(p for p in effect.places(coarse) if p.startswith("J1"))
-    truth = effect.extend(Model.of(refined(coarse.frame_structure)), place, (2e4,))
+    truth = effect.extend(Model.of(refine_mesh(coarse.frame_structure)), place, (2e4,))
     test = measured(truth, FRAME, count=8, shapes=8)
-    problem, _ = posed(coarse, test, hypotheses_of(coarse, [effect]), 0.0)
+    problem, _ = pose_problem(coarse, test, hypotheses_of(coarse, [effect]), 0.0)
     part = part_at(problem, effect.name, place)
     state = state_at(problem, (part,), coordinates(part, (2e4,)))
     assert np.abs(problem.data.bias[:8]).max() > 0.002

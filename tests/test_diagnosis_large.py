@@ -19,7 +19,7 @@ from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.fem.frame import GroundSpring, Joint, Material, Member, Place, Support
 from femubench.core.fem.model import Dofs
 from femubench.core.fem.sections import rectangular_tube
-from femubench.core.fit.extended_model import departure, extended, raw_residual
+from femubench.core.fit.extended_model import departure, extend_model, raw_residual
 from femubench.core.fit.modal_fit import Problem, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.projection import Projection, Projector
@@ -28,13 +28,13 @@ from femubench.core.fit.static_response import (
     Basis,
     LargeProblem,
     _touched,
-    enriched,
-    placed,
+    enrich_problem,
+    place_data,
 )
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.examine import Examination, examine
-from femubench.core.inference.screening import _pulls, screened, with_shortlist
-from femubench.core.modal.eigen import counted_evaluations, modes_of
+from femubench.core.inference.screening import _pulls, screen_hypotheses, with_shortlist
+from femubench.core.modal.eigen import count_evaluations, modes_of
 from femubench.effect import Effect
 from femubench.fem import Frame
 from femubench.plugins.effects.added_mass import AddedMass
@@ -93,7 +93,7 @@ def posed_on(model: Model, hypotheses: tuple[Hypothesis, ...]) -> Problem:
     measurement = measured(model, sensors_on(model.frame_structure.frame), USED)
     data = Data(measurement, np.zeros(0))
     noise = Noise.of(np.zeros((len(data), 0)), 0.0)
-    return placed(Basis.of(model, measurement), data, noise, hypotheses)
+    return place_data(Basis.of(model, measurement), data, noise, hypotheses)
 
 
 def projected(problem: Problem, hypothesis: Hypothesis) -> Projection:
@@ -125,27 +125,27 @@ class TestCoordinates:
     ) -> None:
         hypothesis = one(model, effect, place)
         problem = posed_on(model, ())
-        own, parts = enriched(problem, (projected(problem, hypothesis),))
+        own, parts = enrich_problem(problem, (projected(problem, hypothesis),))
         state = state_at(own, parts, np.array(x))
-        exact = np.sort(solve_modes(extended(model, parts, np.array(x)), 24).eigenvalues)
+        exact = np.sort(solve_modes(extend_model(model, parts, np.array(x)), 24).eigenvalues)
         assert_allclose(state.eigenvalues[3:12], exact[3:12], rtol=1e-6)
-        raw = raw_residual(own, extended(model, parts, np.array(x)))
+        raw = raw_residual(own, extend_model(model, parts, np.array(x)))
         assert_allclose(state.raw, raw, atol=1e-3)
 
     def test_modes_alone_would_not_do(self, model: Model) -> None:
         problem = posed_on(model, ())
         part = projected(problem, one(model, JointRotation(), "E"))
         state = state_at(problem, (part,), np.array([2.3]))
-        exact = np.sort(solve_modes(extended(model, (part,), state.x), 24).eigenvalues)
+        exact = np.sort(solve_modes(extend_model(model, (part,), state.x), 24).eigenvalues)
         assert np.abs(state.eigenvalues[3:12] / exact[3:12] - 1.0).max() > 0.02
 
     def test_two_causes_share_coordinates(self, model: Model) -> None:
         problem = posed_on(model, ())
         chosen = one(model, JointRotation(), "E"), one(model, AddedMass(), "A")
         parts = tuple(projected(problem, hypothesis) for hypothesis in chosen)
-        own, parts = enriched(problem, parts)
+        own, parts = enrich_problem(problem, parts)
         x = np.array([1.0, 1.5])
-        exact = np.sort(solve_modes(extended(model, parts, x), 24).eigenvalues)
+        exact = np.sort(solve_modes(extend_model(model, parts, x), 24).eigenvalues)
         assert_allclose(state_at(own, parts, x).eigenvalues[3:12], exact[3:12], rtol=1e-6)
 
     def test_one_basis_has_the_slopes_of_all(self, model: Model) -> None:
@@ -155,7 +155,7 @@ class TestCoordinates:
         for effect, place in ((LocalStiffnessLoss(), "AB/13"), (AddedMass(), "BC@0.25")):
             part = projected(problem, one(model, effect, place))
             first, second = (
-                raw_residual(problem, extended(model, (part,), k * step)) for k in (1.0, 2.0)
+                raw_residual(problem, extend_model(model, (part,), k * step)) for k in (1.0, 2.0)
             )
             slope = state_at(problem, (part,), 1.5 * step).jacobian[:, 0]
             assert_allclose(slope, (first - second) / step, atol=2e-3 * np.abs(slope).max())
@@ -176,7 +176,7 @@ class TestCoordinates:
         hypothesis = one(model, effect, place)
         modes = solve_modes(model, 40).shapes
         projector, both = Projector(model, modes[:, :30]), Projector(model, modes)
-        widened = projector.widened(projector(hypothesis), modes[:, 30:])
+        widened = projector.widen(projector(hypothesis), modes[:, 30:])
         factors = hypothesis.typical_factors
         for mass in (False, True):
             expected = both(hypothesis).matrix(factors, mass=mass)
@@ -184,12 +184,12 @@ class TestCoordinates:
             assert (found is None) == (expected is None)
             if expected is not None and found is not None:
                 assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
-        same = projector.widened(projector(hypothesis), modes[:, :0])
+        same = projector.widen(projector(hypothesis), modes[:, :0])
         assert_array_equal(same.cores, projector(hypothesis).cores)
         kept = np.r_[0:20, len(modes.T) : len(modes.T) + hypothesis.change.extra]
         stiff = widened.matrix(factors, mass=False)
         if stiff is not None:
-            cut = widened.restricted(kept).matrix(factors, mass=False)
+            cut = widened.restrict(kept).matrix(factors, mass=False)
             assert_allclose(cut, stiff[np.ix_(kept, kept)], atol=1e-9 * np.abs(stiff).max())
 
     @pytest.mark.parametrize(
@@ -204,8 +204,10 @@ class TestCoordinates:
         problem = posed_on(model, hypotheses)
         base = state_at(problem, (), np.zeros(0))
         parts = [projected(problem, hypothesis) for hypothesis in hypotheses]
-        for part, found in zip(parts, screened(problem, base, parts, Effort()), strict=True):
-            own, (there,) = enriched(problem, (part,))
+        for part, found in zip(
+            parts, screen_hypotheses(problem, base, parts, Effort()), strict=True
+        ):
+            own, (there,) = enrich_problem(problem, (part,))
             for x, residual in zip(found.grid, found.residuals, strict=True):
                 exact = state_at(own, (there,), x).residual
                 assert_allclose(residual, exact, atol=1e-2 * max(1.0, np.abs(exact).max()))
@@ -242,9 +244,9 @@ class TestCoordinates:
         problem = posed_on(model, ())
         seed = projected(problem, one(model, MemberStiffness(), "AB"))
         assert isinstance(problem, LargeProblem)
-        there = problem.common.enriched(problem.space, (seed,))
+        there = problem.common.enrich(problem.space, (seed,))
         hypothesis = one(model, effect, place)
-        found = there.projected(projected(problem, hypothesis))
+        found = there.project(projected(problem, hypothesis))
         expected = Projector(model, there.vectors)(hypothesis)
         for mass in (False, True):
             one_way = found.matrix(hypothesis.typical_factors, mass=mass)
@@ -284,7 +286,7 @@ class TestCoordinates:
 
     def test_a_large_model_is_solved_once_for_fewer_modes(self, model: Model) -> None:
         fresh, other = (Model.of(model.frame_structure.frame) for _ in range(2))
-        with counted_evaluations() as counter:
+        with count_evaluations() as counter:
             many, few = (modes_of(fresh, count) for count in (24, 9))
             assert counter.count == 1
             more = modes_of(fresh, 30)
@@ -299,7 +301,7 @@ class TestCoordinates:
         assert not isinstance(problem, LargeProblem)
         parts = problem.space.projections
         assert len(problem.space) == small.size
-        assert enriched(problem, parts) == (problem, parts)
+        assert enrich_problem(problem, parts) == (problem, parts)
         assert with_shortlist(problem) is problem
 
 

@@ -15,7 +15,7 @@ from diagnosis_toys import STRUCTURE, data_of
 
 from femubench.core.cli.main import bench
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
-from femubench.core.drawing.places import placed_wireframe
+from femubench.core.drawing.places import find_wireframe
 from femubench.core.errors import InputError
 from femubench.core.schema.diagnosis import LocationRow, Rival
 from femubench.reports.diagnosis import diagnosis_html, diagnosis_text
@@ -220,7 +220,7 @@ class TestStructure:
         frame = case.model.frame_structure.frame
         member, joint = frame.members[0], frame.joints[0]
         words = ["all", joint.name, member.name, f"{member.name}/1", f"{member.name}@0.25:z"]
-        placed = placed_wireframe(case, [*words, "no such place"])
+        placed = find_wireframe(case, [*words, "no such place"])
         kinds = {place.place: place.kind for place in placed.places}
         assert [kinds[word] for word in words] == ["all", "joint", "member", "element", "point"]
         assert kinds["no such place"] == "elsewhere"

@@ -23,7 +23,7 @@ from femubench import Model
 from femubench.core.challenge.structures import structure_named
 from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.fem.frame import Place
-from femubench.core.fit.extended_model import agreed, extended, raw_residual
+from femubench.core.fit.extended_model import check_joint_fit, extend_model, raw_residual
 from femubench.core.fit.modal_fit import fit, state_at
 from femubench.core.inference.examine import examine
 from femubench.core.inference.posterior import Explanation, Posterior
@@ -203,15 +203,15 @@ def test_several_causes_agree_with_the_model_that_they_make() -> None:
     )
     plain = fit(problem, parts, np.array([0.5, 0.5]))
     assert plain is not None
-    better = agreed(plain)
+    better = check_joint_fit(plain)
     assert better is not None
     gaps = []
     for found in (plain, better):
-        exact = raw_residual(problem, extended(MODEL, parts, found.state.x))
+        exact = raw_residual(problem, extend_model(MODEL, parts, found.state.x))
         gaps.append(float(np.linalg.norm(exact - found.state.raw)))
     assert gaps[1] < 0.3
     assert gaps[1] <= gaps[0]
-    exact = raw_residual(problem, extended(MODEL, parts, better.state.x))
+    exact = raw_residual(problem, extend_model(MODEL, parts, better.state.x))
     assert float(exact @ exact) < 1.0
 
 
@@ -267,7 +267,7 @@ def test_an_effect_that_states_no_change_is_tabulated_and_found(
     (part,) = best.parts
     found = float(part.hypothesis.values(best.fit.state.x[None])[0, 0])
     assert found == pytest.approx(value, rel=0.15)
-    extended_model = extended(MODEL, best.parts, best.fit.state.x)
+    extended_model = extend_model(MODEL, best.parts, best.fit.state.x)
     exact = raw_residual(best.fit.state.problem, extended_model)
     assert np.abs(exact - best.fit.state.raw).max() < 0.02
 
@@ -293,4 +293,4 @@ def test_causes_that_do_not_go_together_are_no_explanation() -> None:
     high = np.concatenate([part.hypothesis.bounds[1] for part in parts])
     found = fit(problem, parts, high, steps=0)
     assert found is not None
-    assert agreed(found) is None
+    assert check_joint_fit(found) is None

@@ -15,7 +15,7 @@ import pytest
 from matplotlib.figure import Figure as Canvas
 
 from femubench.core.drawing.wireframe import DrawnJoint, DrawnMember
-from femubench.core.plot.figure import draw_figure, drawn
+from femubench.core.plot.figure import draw_figure, render_figure
 from femubench.core.plot.style import STYLES
 from femubench.plot import Wireframe
 from femubench.reproduction import Bars, Curve, Curves, Figure, MatrixImage, StructureMap
@@ -59,12 +59,14 @@ def axes_of(figure: Figure) -> Any:
 
 
 def texts(figure: Figure) -> list[str]:
-    return ["".join(node.itertext()) for node in ET.fromstring(drawn(figure)).iter(f"{SVG}text")]
+    return [
+        "".join(node.itertext()) for node in ET.fromstring(render_figure(figure)).iter(f"{SVG}text")
+    ]
 
 
 @each
 def test_is_one_titled_element(figure: Figure) -> None:
-    text = drawn(figure)
+    text = render_figure(figure)
     assert text.startswith("<svg ")
     root = ET.fromstring(text)
     assert root.tag == f"{SVG}svg"
@@ -76,12 +78,12 @@ def test_is_one_titled_element(figure: Figure) -> None:
 
 @each
 def test_same_text_every_time(figure: Figure) -> None:
-    assert drawn(figure) == drawn(figure)
+    assert render_figure(figure) == render_figure(figure)
 
 
 @pytest.mark.slow(5)
 def test_same_text_in_another_process() -> None:
-    here = "\n".join(drawn(figure) for figure in (MATRIX, BARS))
+    here = "\n".join(render_figure(figure) for figure in (MATRIX, BARS))
     code = (
         "import sys, numpy as np; from femubench.reproduction import Bars, MatrixImage;"
         "from femubench.core.plot.figure import drawn;"
@@ -95,7 +97,7 @@ def test_same_text_in_another_process() -> None:
 
 @each
 def test_nothing_from_outside_and_no_date(figure: Figure) -> None:
-    text = drawn(figure)
+    text = render_figure(figure)
     for link in re.findall(r'(?:xlink:)?href="([^"]*)"', text):
         assert link.startswith(("#", "data:image/png"))
     assert "<style" not in text
@@ -105,7 +107,7 @@ def test_nothing_from_outside_and_no_date(figure: Figure) -> None:
 
 @each
 def test_references_lead_to_ids_that_carry_the_name(figure: Figure) -> None:
-    text = drawn(figure)
+    text = render_figure(figure)
     ids = re.findall(r' id="([^"]*)"', text)
     linked = set(re.findall(r'(?:url\(|href=")#([^")]+)', text))
     assert linked <= set(ids)
@@ -114,14 +116,14 @@ def test_references_lead_to_ids_that_carry_the_name(figure: Figure) -> None:
 
 
 def test_settings_of_the_user_play_no_part_and_stay() -> None:
-    plain = drawn(CURVES)
+    plain = render_figure(CURVES)
     with matplotlib.rc_context({"font.size": 20.0, "axes.grid": True, "lines.linewidth": 5.0}):
-        assert drawn(CURVES) == plain
+        assert render_figure(CURVES) == plain
         assert matplotlib.rcParams["font.size"] == 20.0
 
 
 def test_figures_of_one_page_share_no_id() -> None:
-    both = drawn(BARS) + drawn(replace(BARS, name="other"))
+    both = render_figure(BARS) + render_figure(replace(BARS, name="other"))
     ids = re.findall(r' id="([^"]*)"', both)
     assert len(ids) == len(set(ids))
 
@@ -130,11 +132,12 @@ def test_figures_of_one_page_share_no_id() -> None:
 def test_text_is_text_and_large_enough(figure: Figure) -> None:
     assert texts(figure)
     sizes = [
-        float(s) for s in re.findall(r"font(?:-size)?: (?:[a-z0-9]+ )*([\d.]+)px", drawn(figure))
+        float(s)
+        for s in re.findall(r"font(?:-size)?: (?:[a-z0-9]+ )*([\d.]+)px", render_figure(figure))
     ]
     assert sizes
     assert min(sizes) >= 9.0
-    assert "sans-serif" in drawn(figure)
+    assert "sans-serif" in render_figure(figure)
 
 
 def test_labels_are_as_given() -> None:
@@ -181,7 +184,7 @@ def test_structure_keeps_its_proportions_and_matrix_its_values() -> None:
     ids=lambda f: f.name,
 )
 def test_plain_figures_are_drawn_too(figure: Figure) -> None:
-    ET.fromstring(drawn(figure))
+    ET.fromstring(render_figure(figure))
 
 
 def test_matplotlib_is_imported_on_use_only() -> None:

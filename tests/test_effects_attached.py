@@ -20,16 +20,16 @@ from femubench.core.change.hypothesis import (
     finer as finer_hypotheses,
     hypothesis_at,
 )
-from femubench.core.diagnosis.tables import placed_causes
+from femubench.core.diagnosis.tables import list_causes
 from femubench.core.effect.places import match
 from femubench.core.fit.projection import Projector
 from femubench.core.inference.examine import examine
-from femubench.core.modal.eigen import counted_evaluations, solve_dense
+from femubench.core.modal.eigen import count_evaluations, solve_dense
 from femubench.effect import (
     FrameEffect,
     bare_place,
-    directed_point,
     elastic_band,
+    find_directed_point,
     total_mass,
     translation_rows,
 )
@@ -301,7 +301,7 @@ def test_stiff_oscillator_is_a_mass_and_a_soft_one_rides_along(models: dict[str,
     mass = AddedMass().extend(model, "T1", [0.5])
     np.testing.assert_allclose(hertz(stiff)[3:], hertz(mass)[3:], rtol=1e-6)
     soft = effect.extend(model, "T1:x", [0.5, 1e-3])
-    at, _ = directed_point(model, "T1:x")
+    at, _ = find_directed_point(model, "T1:x")
     across = translation_rows(model, at, ["z"])
     carried = replace(model, mass=model.mass + 0.5 * (across.T @ across))
     # Three rigid modes and the mass that hangs on next to nothing.
@@ -396,7 +396,7 @@ def test_a_mass_beside_the_axis_is_told_where_it_shows(
     rng = np.random.default_rng(3)
     test = measured(truth, specimen.frame, count=8, shapes=6, rng=rng)
     seen = examine(specimen.model, test, tuple(catalogue().values()), tolerance=0.002)
-    (cause,) = placed_causes(seen, seen.best)
+    (cause,) = list_causes(seen, seen.best)
     assert (cause.effect, cause.place) == (told, place)
     assert cause.probability == pytest.approx(seen.posterior.inclusion("added-mass"))
     values = [p.value for p in cause.parameters]
@@ -505,7 +505,7 @@ def test_where_it_was_warm_is_found_where_the_data_show_it(ladder: FrameBuilder)
 
 def test_scales_are_worked_out_once_and_belong_to_their_model(ladder: FrameBuilder) -> None:
     model = Model.of(ladder())
-    with counted_evaluations() as counter:
+    with count_evaluations() as counter:
         for place in GroundingSpring().places(model):
             GroundingSpring().parameters(model, place)
             AttachedOscillator().parameters(model, place)

@@ -13,8 +13,8 @@ from effect_checks import check_exact, check_neutral
 from femubench import InputError, Model, diagnose, read_case
 from femubench.core.case.case import Case
 from femubench.core.case.writing import write_case
-from femubench.core.conformance.place_words import known_place
-from femubench.core.drawing.places import placed_wireframe
+from femubench.core.conformance.place_words import has_place
+from femubench.core.drawing.places import find_wireframe
 from femubench.core.effect.places import match
 from femubench.effect import elements_of, members_at, members_of, set_places, split_direction
 from femubench.fem import Frame, MemberSet, Structure, rectangular_tube, round_tube
@@ -113,11 +113,11 @@ def test_sets_sections_and_materials_are_places(two_metals: Case) -> None:
     assert MemberMass().places(two_metals.model) == families
     assert WallThickness().places(two_metals.model) == families[4:] + families[:3]
     for word in ("set:weld", "section:tube", "material:brass"):
-        assert known_place(two_metals.model, word)
+        assert has_place(two_metals.model, word)
     assert split_direction("set:x") == ("set:x", None)
     assert [m.name for m in members_at(frame, "set:weld")] == ["AB", "BC"]
     assert len(elements_of(Structure.build(frame), "material:brass")) == 6
-    drawn = placed_wireframe(two_metals.model, ["set:weld"]).place("set:weld")
+    drawn = find_wireframe(two_metals.model, ["set:weld"]).place("set:weld")
     assert [span.member for span in drawn.spans] == [0, 1]
 
 

@@ -21,9 +21,9 @@ from femubench.core.conformance.checking import findings, subjects
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
 from femubench.core.look.look import look
 from femubench.core.plugin.loader import load_plugins
-from femubench.diagnosis import registered_effects
+from femubench.diagnosis import list_effects
 from femubench.effect import Effect
-from femubench.reports.cells import figure, signed
+from femubench.reports.cells import figure, format_signed
 from femubench.reports.diagnosis import diagnosis_html, diagnosis_text
 
 OURS = ("youngs-modulus", "density", "torsion-constant")
@@ -42,7 +42,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 def known(*names: str) -> list[Effect]:
-    return [effect for effect in registered_effects("strangers") if effect.name in names]
+    return [effect for effect in list_effects("strangers") if effect.name in names]
 
 
 @pytest.fixture(scope="module")
@@ -130,7 +130,7 @@ def test_it_is_named_with_its_clause_caution_and_size_in_percent(
     page, text = diagnosis_html(data).replace("\xa0", " "), diagnosis_text(data)
     assert SUMMARY in " ".join(text.split())
     assert CAUTION in " ".join(text.split())
-    assert f"({signed(100.0 * size.value)} ±" in page
+    assert f"({format_signed(100.0 * size.value)} ±" in page
     assert f"{SUMMARY[0].upper()}{SUMMARY[1:]}" in page
     (visible,) = [row for row in found.smallest_visible if row.effect == Skin.name]
     assert f"({figure(100.0 * visible.size, 2)} %)" in page
@@ -178,10 +178,10 @@ class TaskOfSkin(SweepCase):
 
 
 def test_without_being_named_it_is_neither_drawn_nor_looked_for() -> None:
-    assert not {Skin.name, Bare.name, Plain.name} & {e.name for e in registered_effects()}
+    assert not {Skin.name, Bare.name, Plain.name} & {e.name for e in list_effects()}
     assert not {Skin.name, Bare.name, Plain.name} & set(draw.registered_effects())
     with pytest.raises(InputError, match="no plugin 'stranger'; did you mean 'strangers'"):
-        registered_effects("stranger")
+        list_effects("stranger")
 
 
 def test_the_sweep_judges_what_is_said_of_it() -> None:

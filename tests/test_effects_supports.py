@@ -12,8 +12,8 @@ from effect_checks import changed_matrices, check_neutral, compare
 from scipy.optimize import brentq
 
 from femubench import Measurement, Model, Sensors, diagnose
-from femubench.core.conformance.place_words import known_place
-from femubench.core.drawing.places import placed_wireframe
+from femubench.core.conformance.place_words import has_place
+from femubench.core.drawing.places import find_wireframe
 from femubench.core.effect.places import match
 from femubench.core.fem.model import common_dofs
 from femubench.effect import Site, members_at, split_direction, support_places, supports_of
@@ -59,8 +59,8 @@ def test_places_are_supports_and_springs_whole_and_by_direction(held: list[Model
     assert stands[-3:] == ("support:L2", "support:L2:x", "support:L2:z")
     assert len(space) == 1 + 7 + 4
     for model in held:
-        assert all(known_place(model, place) for place in EFFECT.places(model))
-        assert not known_place(model, "support:J3")
+        assert all(has_place(model, place) for place in EFFECT.places(model))
+        assert not has_place(model, "support:J3")
 
 
 def test_a_support_has_one_stiffness_of_each_kind(held: list[Model]) -> None:
@@ -135,7 +135,7 @@ def test_words_of_supports(held: list[Model]) -> None:
             supports_of(frame, word)
     site = Site(frame, "support:BC@0.4:z", 1.0, np.array([1.0]))
     assert [m.name for m in site.members] == ["BC"]
-    drawn = placed_wireframe(held[0], support_places(frame))
+    drawn = find_wireframe(held[0], support_places(frame))
     corner = drawn.place("support:A:ry")
     assert corner.kind == "point"
     assert corner.points == ((0.0, 0.0, 0.0),)

@@ -23,7 +23,7 @@ from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.sections import round_tube
 from femubench.core.modal.eigen import (
     DENSE_LIMIT,
-    counted_evaluations,
+    count_evaluations,
     dense_matrices,
     modes_of,
     solve_dense,
@@ -148,8 +148,8 @@ def test_a_mass_lowers_and_a_spring_raises_every_frequency(asymmetric_ladder: Fr
 
 def test_evaluations_are_counted_in_nested_blocks(ladder: FrameBuilder) -> None:
     model = Model.of(ladder())
-    with counted_evaluations() as outer:
-        with counted_evaluations() as inner:
+    with count_evaluations() as outer:
+        with count_evaluations() as inner:
             solve_modes(model)
         solve_modes(model)
         solve_modes(model)
@@ -164,7 +164,7 @@ def test_what_is_known_of_a_large_model_is_not_solved_again(ladder: FrameBuilder
     direct = solve_modes(model, 12)
     shape = np.asarray(model.mass @ direct.elastic.shapes[:, :1])
     unstable = LowRank(shape, np.array([[-2.0 * direct.elastic.eigenvalues[0]]]))
-    with counted_evaluations() as made:
+    with count_evaluations() as made:
         for count in (12, 8, 12, 15, 10):
             assert len(modes_of(model, count)) == len(solve_modes(model, count)) == count
     assert made.count == 2
@@ -173,12 +173,12 @@ def test_what_is_known_of_a_large_model_is_not_solved_again(ladder: FrameBuilder
     )
     # What a change does to known modes is known, and of a negative eigenvalue there is one more.
     changed = with_stiffness_step(model, modes_of(model, 15), unstable)
-    with counted_evaluations() as made:
+    with count_evaluations() as made:
         for look in (solve_modes, modes_of):
             found = look(changed, 9)
             assert len(found) == 10
             assert found.eigenvalues[0] == pytest.approx(-direct.elastic.eigenvalues[0])
     assert made.count == 0
-    with counted_evaluations() as made:
+    with count_evaluations() as made:
         assert len(modes_of(changed, 15)) == len(modes_of(changed, 14)) + 1 == 16
     assert made.count == 1

@@ -40,7 +40,7 @@ from femubench.core.update.element_families import (
     nobari_family,
     operations_of,
     physical_family,
-    scaled_strain_vectors,
+    scale_strain_vectors,
     strain_mode_signs,
 )
 from femubench.core.update.equation_error import (
@@ -257,7 +257,7 @@ ENDS = (
 @pytest.mark.parametrize("beam", ["euler-bernoulli", "timoshenko"])
 def test_nominal_elements_are_made_of_their_strain_modes(plane: Any, beam: Any) -> None:
     structure = Structure.build(ladder(plane, beam, rigid_ends=ENDS))
-    vectors = scaled_strain_vectors(structure, np.arange(28))
+    vectors = scale_strain_vectors(structure, np.arange(28))
     moving = np.outer(structure.active_local, structure.active_local)
     stiffness = stiffness_matrices(structure.properties) * moving
     built = vectors @ np.swapaxes(vectors, 1, 2)
@@ -302,7 +302,7 @@ def test_physical_factor_equals_the_parameter_of_the_structure() -> None:
         [Property("a", "EI", ("rung1/3",)), Property("b", "GJ", ("side00/1",))], [1.25, 0.6]
     )
     expected = Model.of(rebuilt).stiffness.toarray()
-    found = family.changed(NOMINAL, x).stiffness.toarray()
+    found = family.change_model(NOMINAL, x).stiffness.toarray()
     assert found == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())
     values = family.values(x)[family.names.index("EI rung1/3")]
     assert values == pytest.approx(1.25 * 68.367e9 * TUBE.Iy, rel=1e-12)
@@ -404,7 +404,7 @@ def test_rows_are_the_equations_of_motion_and_the_orthogonality() -> None:
     assert with_rows.shape == (249, 140)  # the paper's count
     assert without.shape == (243, 140)
     x = 0.1 * RNG.standard_normal(140)
-    changed = family.changed(NOMINAL, x).stiffness - NOMINAL.stiffness
+    changed = family.change_model(NOMINAL, x).stiffness - NOMINAL.stiffness
     scale = np.array([1.0 if d == "z" else 1.0 / family.structure.properties.length.mean()
                       for d in NOMINAL.dofs.direction])  # fmt: skip
     direct = (scale[:, None] * (changed @ modes.shapes)).T.ravel()

@@ -24,7 +24,7 @@ from femubench.core.drawing.prediction import (
     case_drawing,
     exhibit_of,
     frequency_axis,
-    measured_receptances,
+    list_receptances,
 )
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
@@ -160,7 +160,7 @@ def test_the_measured_receptance_peaks_at_the_measured_frequencies(
     cases: dict[str, Case],
 ) -> None:
     case = cases["frame"]
-    found = measured_receptances(case)
+    found = list_receptances(case)
     step = found["hz"][1] - found["hz"][0]
     tops = peaks(found["hz"], found["measured"][""])
     for frequency in case.measurement.frequencies[:3]:
@@ -209,7 +209,7 @@ class TestFiles:
         exhibits = Exhibits(tmp_path)
         put = {
             **(case_drawing(cases["frame"]) or {}),
-            "receptance": measured_receptances(cases["frame"]),
+            "receptance": list_receptances(cases["frame"]),
             "nominal": None,
         }
         exhibits.put_case(KEY * 4, put)

@@ -18,7 +18,7 @@ from femubench.core.modal.expansion import (
     expand_by_dynamics,
     expand_by_rotation,
     expand_by_serep,
-    measured_rows,
+    find_measured_rows,
     procrustes_rotation,
     same_length,
 )
@@ -168,9 +168,9 @@ def test_dynamic_expansion_meets_the_readings_with_the_least_force(
 def test_sensors_with_a_gap_are_left_out() -> None:
     shapes = np.ones((5, 2))
     shapes[1, 1] = shapes[3, 0] = np.nan
-    np.testing.assert_array_equal(measured_rows(shapes), [True, False, True, False, True])
+    np.testing.assert_array_equal(find_measured_rows(shapes), [True, False, True, False, True])
     with pytest.raises(NotApplicable, match="at least 2 sensors"):
-        measured_rows(np.array([[1.0, np.nan], [np.nan, 2.0], [1.0, 1.0]]))
+        find_measured_rows(np.array([[1.0, np.nan], [np.nan, 2.0], [1.0, 1.0]]))
 
 
 def test_asymmetry_is_seen_in_every_shape(

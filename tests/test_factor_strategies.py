@@ -41,7 +41,7 @@ from femubench.update import (
     modal_space,
     parameterise,
     physical_family,
-    tied,
+    tie_unknowns,
     tikhonov,
 )
 
@@ -318,7 +318,7 @@ def test_parts_make_the_stiffness_and_sets_name_what_the_frame_has() -> None:
     every = np.eye(model.size)
     matrices = parts.energies(every, every)
     np.testing.assert_allclose(
-        parts.start_slopes.combined(every[:, 3], np.diag([1.0, 2.0, 3.0, 4.0, 5.0])),
+        parts.start_slopes.combine(every[:, 3], np.diag([1.0, 2.0, 3.0, 4.0, 5.0])),
         np.array([(p + 1.0) * part[:, 3] for p, part in enumerate(matrices)]).T,
         atol=1e-12 * np.abs(matrices).max(),
     )
@@ -377,7 +377,7 @@ def test_older_strategies_change_the_same_sets(name: str) -> None:
 
 def test_tied_elements_change_alike_and_others_not_at_all() -> None:
     structure = Structure.build(frame_of_five())
-    family = tied(physical_family(structure), {"two": ("m-AB/1", "m-CD/2")})
+    family = tie_unknowns(physical_family(structure), {"two": ("m-AB/1", "m-CD/2")})
     assert family.names == ("EIy two", "GJ two", "EA two", "EIz two")
     change = family.change(np.array([1.0, 0.0, 0.0, 0.0]))
     labels = np.array(structure.labels)

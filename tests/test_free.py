@@ -19,7 +19,7 @@ from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.change.terms import RowOperator, Term
 from femubench.core.effect.attachments import point_motion
 from femubench.core.fem.frame import Place
-from femubench.diagnosis import registered_effects
+from femubench.diagnosis import list_effects
 from femubench.effect import Parameter
 
 CASES = Path(__file__).parent / "cases"
@@ -46,7 +46,7 @@ TETHER: Any = (Tether(),)
 
 
 def names(model: Model, *more: Any) -> Counter[str]:
-    return Counter(h.name for h in hypotheses_of(model, (*registered_effects(), *more)))
+    return Counter(h.name for h in hypotheses_of(model, (*list_effects(), *more)))
 
 
 def test_nothing_to_ground_is_a_candidate_and_all_else_is(ladder: Any) -> None:

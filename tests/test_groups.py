@@ -39,7 +39,7 @@ from femubench.plugins.strategies.generic import GenericLS
 from femubench.plugins.strategies.physical import Physical
 from femubench.plugins.strategies.sampling import BayesianSampling
 from femubench.scenarios.matlab_footbridge import TEST, VARIABLE
-from femubench.scenarios.nodes_from_stiffness import labelled_rows
+from femubench.scenarios.nodes_from_stiffness import label_rows
 from femubench.update import parameterise, scale_groups, scale_groups_within
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
@@ -72,7 +72,7 @@ def grouped(frame: Frame) -> Model:
     twice = [structure.with_values([factor], [2.0]).matrices()[1] for factor in factors]
     parts = {n: m - structure.matrices()[1] for n, m in zip(names, twice, strict=True)}
     for name, springs in (("foot", frame.springs[:2]), ("head", frame.springs[2:])):
-        parts[name] = structure.attached((), springs)[1]
+        parts[name] = structure.assemble_attachments((), springs)[1]
     used, node = np.unique(model.dofs.node, return_inverse=True)
     dofs = Dofs(node.astype(np.int64), model.dofs.direction, model.dofs.xyz)
     geometry = MatrixGeometry(tuple(f"n{n}" for n in used), dofs)
@@ -324,13 +324,13 @@ def test_rows_without_labels_are_told_by_motions_without_force() -> None:
     directions = [label[i][1] for i in keep]
     turns = np.array([d.startswith("r") for d in directions])
     feet = [[i for i, k in enumerate(keep) if label[k] in ((0, d), (1, d))] for d in "yz"]
-    rows = labelled_rows(stiffness, turns, *feet)
+    rows = label_rows(stiffness, turns, *feet)
     assert rows is not None
     assert [row.direction for row in rows] == directions
     xyz = np.array([row.xyz for row in rows])
     wanted = model.dofs.xyz[keep]
     np.testing.assert_allclose(xyz - xyz[0], wanted - wanted[0], atol=1e-6)
-    assert labelled_rows(np.diag(np.ones(6)), np.arange(6) > 2, [0], [1]) is None
+    assert label_rows(np.diag(np.ones(6)), np.arange(6) > 2, [0], [1]) is None
 
 
 def _shuffled_within_nodes(nodes: list[int]) -> list[int]:

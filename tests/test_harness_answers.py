@@ -26,7 +26,7 @@ from femubench.core.fem.sections import constant_kappa
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.run.answers import AnswerError, pack_outcome, read_report, unpack_outcome
 from femubench.core.run.jobs import JobOutcome
-from femubench.core.run.judging import judged
+from femubench.core.run.judging import judge_outcome
 from femubench.core.run.plain_frame import frame_from_plain, frame_to_plain
 from femubench.core.schema.records import result_to_json
 from femubench.core.score.scoring import reference_of
@@ -133,7 +133,7 @@ def test_what_is_attached_by_a_strategy_gets_through() -> None:
     known = reference_of(CASE)
     who = ("s", 0, "drawn")
     one, other = (
-        judged(CASE, known, who, JobOutcome("ok", model=each))
+        judge_outcome(CASE, known, who, JobOutcome("ok", model=each))
         for each in (model, found)  # type: ignore[arg-type]
     )
     assert one.status == other.status == "ok"
@@ -465,7 +465,7 @@ def verdict_on(data: bytes) -> dict[str, Any]:
         outcome = unpack_outcome(data, NOMINAL)
     except AnswerError as error:
         outcome = JobOutcome("failed", str(error))
-    return result_to_json(judged(CASE, reference_of(CASE), ("s", 0, "drawn"), outcome))
+    return result_to_json(judge_outcome(CASE, reference_of(CASE), ("s", 0, "drawn"), outcome))
 
 
 def test_members_in_billions_of_elements_are_not_meshed() -> None:

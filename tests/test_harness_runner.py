@@ -20,7 +20,7 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.pace import Advance
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.jobs import JobOutcome
-from femubench.core.run.judging import judged
+from femubench.core.run.judging import judge_outcome
 from femubench.core.run.runner import Plan, Receivers, run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult
@@ -280,7 +280,9 @@ def test_wrong_input_is_told() -> None:
 def test_a_model_that_cannot_be_solved_has_failed() -> None:
     case = toys.tiny_case()
     massless = replace(case.model, mass=case.model.mass * 0.0)
-    result = judged(case, reference_of(case), ("s", 0, "drawn"), JobOutcome("ok", model=massless))
+    result = judge_outcome(
+        case, reference_of(case), ("s", 0, "drawn"), JobOutcome("ok", model=massless)
+    )
     assert result.status == "failed"
     assert result.reason
     assert np.isclose(result.score, 10.0)

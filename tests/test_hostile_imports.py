@@ -26,8 +26,8 @@ from femubench.core.child.namespaces import Walls
 from femubench.core.plugin import apart, loader
 from femubench.core.plugin.foreign import ForeignStrategy, doc_of
 from femubench.core.plugin.loader import Plugins, load_plugins
-from femubench.core.plugin.variants import labelled, strategy_of
-from femubench.core.run.jobs import Job, execute, sent
+from femubench.core.plugin.variants import label_variant, strategy_of
+from femubench.core.run.jobs import Job, execute, pickle_strategy
 from femubench.core.run.provenance import comes_along, strategy_version
 
 ROOT = Path(__file__).parents[1]
@@ -378,7 +378,9 @@ def test_a_strategy_is_known_by_its_description(fine: Path) -> None:
         "factor": 1.0, "steps": 2, "inner.damping": 1.0, "stiffness.ry": 3.0,
     }  # fmt: skip
     assert inner.needs == {"shapes"}
-    assert labelled(inner.base).name == "scaled-by-stranger:steps=2,damping=1.0,stiffness.ry=3.0"
+    assert (
+        label_variant(inner.base).name == "scaled-by-stranger:steps=2,damping=1.0,stiffness.ry=3.0"
+    )
     assert strategies["scaled-by-stranger"](factor=2.0).name == "scaled-by-stranger:factor=2.0"
     assert MODULE not in sys.modules
 
@@ -401,9 +403,9 @@ def test_options_are_checked_before_anything_runs(fine: Path, words: str, says: 
 def test_a_job_imports_it_where_it_runs_and_sends_the_same_bytes_always(fine: Path) -> None:
     found = found_here(load_plugins())
     loader._known.clear()
-    assert sent(found) == sent(found_here(load_plugins()))
+    assert pickle_strategy(found) == pickle_strategy(found_here(load_plugins()))
     case = read_case(ROOT / "scenarios" / "frame")
-    job = Job(*map(sent, (found, case.model, case.used_measurement())), words=(1,))
+    job = Job(*map(pickle_strategy, (found, case.model, case.used_measurement())), words=(1,))
     assert execute(job).status == "ok"
     assert MODULE in sys.modules
 

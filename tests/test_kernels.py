@@ -17,8 +17,8 @@ from femubench.core.challenge.draw import draw_case
 from femubench.core.challenge.measuring import Seen, record
 from femubench.core.challenge.structures import structure_named
 from femubench.core.fit.residuals import Data
-from femubench.core.modal.correlation import seen_modes
-from femubench.core.modal.eigen import Modes, counted_evaluations, solve_modes
+from femubench.core.modal.correlation import find_seen_modes
+from femubench.core.modal.eigen import Modes, count_evaluations, solve_modes
 from femubench.core.ties import alike, by_probability, in_order, least
 from femubench.core.update import residuals
 from femubench.core.update.change_lists import scale_all_stiffness
@@ -82,7 +82,7 @@ def test_the_sensitivity_method_stops_where_it_would_without_rounding(
     structure = case.model.frame_structure
 
     def run() -> tuple[int, float]:
-        with counted_evaluations() as counter:
+        with count_evaluations() as counter:
             result = sensitivity_update(structure, [scale_all_stiffness(structure)], used)
         assert result.diagnostics["converged"] == 1.0
         return counter.count, result.parameters[0].after
@@ -164,7 +164,7 @@ def crossing() -> Measurement:
 
 
 def test_a_mode_that_no_sensor_sees_has_no_shape(crossing: Measurement) -> None:
-    assert list(seen_modes(crossing.shapes)) == [True, False]
+    assert list(find_seen_modes(crossing.shapes)) == [True, False]
     data = Data(crossing, np.zeros(0))
     assert len(data) == 2 + 4
     assert list((data.weight > 0.0).any(axis=0)) == [True, False]
@@ -181,7 +181,7 @@ def test_a_mode_that_no_sensor_sees_has_no_shape(crossing: Measurement) -> None:
 def test_a_partner_that_no_sensor_sees_predicts_no_shape(crossing: Measurement) -> None:
     data = Data(crossing, np.zeros(0))
     readings = np.column_stack([crossing.shapes[:, 1], crossing.shapes[:, 0]])[None]
-    scaled, factor = data.scaled(readings)
+    scaled, factor = data.scale(readings)
     assert factor[0, 0] == 0.0
     assert not scaled[0, :, 0].any()
 
@@ -193,7 +193,7 @@ def test_rigid_motions_predict_no_shape_in_any_basis(crossing: Measurement) -> N
     hertz = np.array([[1e-6, -1e-7, 12.0, 21.0]])
     turn = np.eye(4)
     turn[:2, :2] = np.linalg.qr(rng.standard_normal((2, 2)))[0]
-    one, two = (data.predicted(hertz, own[None], 1e-3) for own in (shapes, shapes @ turn))
+    one, two = (data.predict(hertz, own[None], 1e-3) for own in (shapes, shapes @ turn))
     for a, b in zip(one, two, strict=True):
         np.testing.assert_allclose(a, b)
     np.testing.assert_array_equal(one[0], [[0.0, 0.0, 12.0, 21.0]])

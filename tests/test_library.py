@@ -23,7 +23,7 @@ import femubench
 import femubench.papers
 from femubench.core.cli.main import bench
 from femubench.core.display import LINES, WIDTH
-from femubench.core.plugin.variants import labelled
+from femubench.core.plugin.variants import label_variant
 from femubench.core.schema.run_options import RunKeywords, describe_fields, split_keywords
 from femubench.core.score.repeatability import result_differences
 from tests.frf_problems import frf_set, write_universal
@@ -360,8 +360,8 @@ class TestRank:
             def __init__(self, size: float = 1.0) -> None:
                 self.size = size
 
-        assert labelled(Plain(2.0)).name == "duck:size=2.0"
-        assert labelled(Plain()).name == "duck"
+        assert label_variant(Plain(2.0)).name == "duck:size=2.0"
+        assert label_variant(Plain()).name == "duck"
 
     @pytest.mark.slow(5)
     @pytest.mark.parametrize("how", ["script", "stdin"])

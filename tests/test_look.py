@@ -35,7 +35,7 @@ from femubench.core.fit.mesh_error import mesh_bias
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.typing import FloatArray
-from femubench.plugins.effects.torsion_constant import estimated_torsion_constant, is_round
+from femubench.plugins.effects.torsion_constant import estimate_torsion_constant, is_round
 
 FrameBuilder = Callable[..., Frame]
 
@@ -117,7 +117,7 @@ def numbers(section: Section, J: float) -> Section:
 def test_numbers_alone_give_nearly_the_constant_of_the_shape(
     section: Section, accuracy: float
 ) -> None:
-    estimate = estimated_torsion_constant(numbers(section, section.Jp))
+    estimate = estimate_torsion_constant(numbers(section, section.Jp))
     assert estimate is not None
     assert estimate[0] == pytest.approx(section.J, rel=accuracy)
 

@@ -14,7 +14,7 @@ from femubench.core.fem.frame import Factor, Frame, Place, PointMass, Preload
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.structure import Structure
-from femubench.core.fit.mesh_error import mesh_bias, refined
+from femubench.core.fit.mesh_error import mesh_bias, refine_mesh
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.typing import FloatArray
 
@@ -41,7 +41,7 @@ def test_a_finer_mesh_keeps_factors_springs_ends_and_changes(fitted_portal: Fram
     structure = Structure.build(frame).with_values(
         [Property("EI", "EI", ("m4/2",)), Property("a", "rigid", ("m8@J5",), "m")], [0.7, 0.025]
     )
-    finer = structure.rebuilt(refined(structure))
+    finer = structure.rebuilt(refine_mesh(structure))
     assert len(finer.properties) > 1.9 * len(structure.properties) - 2
     for name in ("EIy", "rhoA", "GJ"):
         for label, rows in structure.label_index.items():

@@ -17,7 +17,7 @@ from femubench.core.fem.frame import (
 )
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal import many_changes as module
-from femubench.core.modal.eigen import DENSE_LIMIT, Modes, counted_evaluations, solve_modes
+from femubench.core.modal.eigen import DENSE_LIMIT, Modes, count_evaluations, solve_modes
 from femubench.core.modal.many_changes import Change, ManyChanges, many_changes, modes_of_changes
 from tests.lattices import lattice
 
@@ -119,7 +119,7 @@ def test_too_few_modes_cost_further_steps_and_then_a_solution(block: Model) -> N
     expected = solve_modes(block.attach(*change), 9)
     tries = []
     for kept in (40, 12, 9):
-        with counted_evaluations() as counter:
+        with count_evaluations() as counter:
             found = ManyChanges(block, modes.take(np.arange(kept))).after(*change, 9)
         tries.append(counter.count)
         assert elastic_gap(found, expected) < 1e-5

@@ -29,7 +29,7 @@ def tested() -> tuple[Model, Measurement]:
     properties = structure.properties
     factor = rng.lognormal(0.0, 0.1, len(properties))
     for name in ("EA", "EIy", "EIz", "GJ"):
-        properties = properties.scaled(name, factor)
+        properties = properties.scale(name, factor)
     truth = Model.of(type(structure)(structure.frame, structure.mesh, structure.kinematics,
                                      properties, structure.springs))  # fmt: skip
     modes = solve_modes(truth, 6 + USED).elastic

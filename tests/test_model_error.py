@@ -19,7 +19,7 @@ from femubench.core.fit.static_response import Basis
 from femubench.core.inference.model_error import (
     Inadequacy,
     class_widths,
-    conditioned,
+    condition_noise,
     error_slopes,
     kind,
 )
@@ -129,7 +129,7 @@ def test_a_known_reference_conditions_what_is_to_come() -> None:
     root = rng.standard_normal((7, 7))
     total = np.eye(7) + root @ root.T
     both = rng.standard_normal(7)
-    noise = conditioned(total, both[:3], 0.5, beam=True)
+    noise = condition_noise(total, both[:3], 0.5, beam=True)
     residual = noise.residual(both[3:])
     found = noise.log_density - 0.5 * residual @ residual
     expected = multivariate_normal(cov=total).logpdf(both) + 3.5 * np.log(2.0 * np.pi)
@@ -157,7 +157,7 @@ def test_scales_follow_the_size_of_the_error(
     for size in (0.0, 1.0, 3.0):
         rng = np.random.default_rng(5)
         state, _ = drawn(problem, slopes, rng, size)
-        found = model.fitted(state)
+        found = model.fit(state)
         best = model.log_density(state, found.v)
         for step in 0.3 * np.eye(len(found.v)):
             assert best > max(model.log_density(state, found.v + s) for s in (step, -step)) - 1e-3
@@ -178,8 +178,8 @@ def test_scales_that_are_fitted_make_less_sure_than_a_noise_that_is_known(
     offset -= state_at(problem, (part,), np.array([1.5])).raw
     model = Inadequacy.of(slopes, slopes, error, WIDTHS, 0.02, 0.0)
     present = replace(problem, offset=offset)
-    guess = model.noise(model.fitted(state_at(present, (), NOTHING)))
-    known = conditioned(model.covariance(guess.scales), model.residual, 0.0, beam=True)
+    guess = model.noise(model.fit(state_at(present, (), NOTHING)))
+    known = condition_noise(model.covariance(guess.scales), model.residual, 0.0, beam=True)
     np.testing.assert_allclose(known.factor, guess.factor)
     odds = []
     for noise in (guess, known):
@@ -206,7 +206,7 @@ def test_unseen_data_lie_within_what_is_foreseen(
         state, error = drawn(problem, slopes, np.random.default_rng(seed), 1.0)
         part = replace(state, problem=replace(problem, noise=Noise(np.eye(len(used)))))
         object.__setattr__(part, "raw", state.raw[used])
-        found = model.fitted(part)
+        found = model.fit(part)
         mean, std = model.foreseen(
             found.v,
             {k: s[rows] for k, s in slopes.items()},
@@ -236,16 +236,14 @@ def test_a_cause_beside_a_model_error_keeps_its_size(
     model = Inadequacy.of(slopes, slopes, before, WIDTHS, 0.02, 0.0)
     present = replace(problem, offset=offset)
     nothing = state_at(present, (), NOTHING)
-    noise = model.noise(model.fitted(nothing))
+    noise = model.noise(model.fit(nothing))
     found = fit(replace(present, noise=noise), (part,), np.array([0.3]))
     assert found is not None
     assert np.linalg.norm(shift) > 8.0
     assert abs(found.state.x[0] - 1.0) < 3.0 * np.sqrt(found.covariance[0, 0])
     assert np.sqrt(found.covariance[0, 0]) < 0.3
     alone = Inadequacy.of(slopes, None, NOTHING, WIDTHS, 0.0, 0.0)
-    blurred = fit(
-        replace(present, noise=alone.noise(alone.fitted(nothing))), (part,), np.array([0.3])
-    )
+    blurred = fit(replace(present, noise=alone.noise(alone.fit(nothing))), (part,), np.array([0.3]))
     assert blurred is not None
     assert blurred.covariance[0, 0] > found.covariance[0, 0]
 
@@ -266,12 +264,12 @@ def test_what_a_cause_changes_may_be_off_by_a_share_of_it(
     reference, noise = rng.standard_normal((2, len(moved)))
     error = 0.3 * np.abs(moved) * rng.standard_normal(len(moved))
     model = Inadequacy.of(slopes, slopes, reference, WIDTHS, 0.02, 0.0)
-    near = model.fitted(replace(nothing, raw=noise + moved))
+    near = model.fit(replace(nothing, raw=noise + moved))
     shares = []
     for off in (0.0, 1.0):
         explained = replace(point, raw=noise + off * error)
-        seeing = model.beside(replace(nothing, raw=explained.raw + moved), explained)
-        blind, own = model.fitted(explained, near), seeing.fitted(explained, near)
+        seeing = model.add_own_error(replace(nothing, raw=explained.raw + moved), explained)
+        blind, own = model.fit(explained, near), seeing.fit(explained, near)
         shares.append(seeing.own_share(own.v))
         assert model.own_share(blind.v) == 0.0
         assert len(own.v) == len(blind.v) + 1
@@ -282,4 +280,4 @@ def test_what_a_cause_changes_may_be_off_by_a_share_of_it(
     ]
     assert density[1] > density[0] + 3.0
     # Nothing changes nothing: it has no error of its own.
-    assert model.beside(nothing, nothing).change.max() == 0.0
+    assert model.add_own_error(nothing, nothing).change.max() == 0.0

@@ -16,13 +16,13 @@ from synthetic_run import synthetic_run
 
 from femubench.core.score.comparison import Against, compare_runs
 from femubench.core.score.statistics import Groups
-from femubench.papers.printed import printed
+from femubench.papers.printed import read_printed
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.page import data as page
 from femubench.reports.page.data import page_data
-from femubench.reports.page.document import SCRIPTS, STYLES, asset, embedded_json
+from femubench.reports.page.document import SCRIPTS, STYLES, asset, embed_json
 from femubench.reports.page.papers import papers_of
-from femubench.reports.page.rounding import compact_json, plain_data, rounded
+from femubench.reports.page.rounding import compact_json, plain_data, round_figures
 from femubench.reports.runs import MarkdownReporter
 from femubench.results import (
     Block,
@@ -102,9 +102,9 @@ class TestNumbers:
             assert len(detail["history"]) == len(result.history)
 
     def test_rounding(self) -> None:
-        assert [rounded(x, 4) for x in (1234.56, 0.000123456, 5, None, math.nan, "x", True)] == [
-            *(1235, 0.0001235, 5, None, None, None, None)
-        ]
+        assert [
+            round_figures(x, 4) for x in (1234.56, 0.000123456, 5, None, math.nan, "x", True)
+        ] == [*(1235, 0.0001235, 5, None, None, None, None)]
         assert plain_data({"a": [math.inf, np.float64(2.0)]}) == {"a": [None, 2.0]}
         deep: Any = []
         for _ in range(20):
@@ -223,7 +223,7 @@ class TestStatistics:
 
 class TestPapers:
     def test_columns_are_those_of_the_transcribed_tables(self) -> None:
-        frame, hframe = printed("frame"), printed("hframe")
+        frame, hframe = read_printed("frame"), read_printed("hframe")
         assert frame["table1"]["measured"] == page_file("frame")["measured"]
         assert hframe["table1"]["frequency"][:5] == page_file("hframe")["measured"]
         theirs = {
@@ -301,7 +301,7 @@ class TestDocument:
 
     def test_embedded_json_cannot_leave_its_element(self) -> None:
         evil = {"</script><script>alert(1)</script>": "<!-- & \u2028 \u2029 \ud800"}
-        text = embedded_json(evil)
+        text = embed_json(evil)
         assert not set("<>&\u2028\u2029\ud800") & set(text)
         assert json.loads(text) == evil
 

@@ -18,7 +18,7 @@ from femubench.papers.frame.changes import (
     SOLUTIONS,
     change_figures,
     element_kinds,
-    recovered_change,
+    recover_change,
     relative_change,
 )
 from femubench.papers.frame.finding import finding
@@ -28,12 +28,12 @@ from femubench.papers.frame.receptances import (
     receptance_figures,
     receptance_sentences,
 )
-from femubench.papers.printed import printed
+from femubench.papers.printed import read_printed
 from femubench.reproduction import Bars, Curves, MatrixImage, StructureMap, Workbench
 from femubench.results import stiffness_difference
 from femubench.scenarios import HERE
 
-TABLE = printed("frame")["table1"]
+TABLE = read_printed("frame")["table1"]
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +137,7 @@ def test_element_matrices_are_recovered_from_the_parameters(bench: Workbench, wo
     structure = model.frame_structure
     result = bench.update("frame", words)
     family = generic_family(structure, tied=words == "generic-adjusted")
-    assembled = structure.plan.assemble(recovered_change(family, result))
+    assembled = structure.plan.assemble(recover_change(family, result))
     expected = result.model.stiffness - model.stiffness
     assert abs(assembled - expected).max() < 1e-9 * abs(expected).max()
 

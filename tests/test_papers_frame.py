@@ -21,7 +21,7 @@ from femubench.papers.frame import (
     tables,
 )
 from femubench.papers.frame.common import CASE, TRUTH, rigid_modes, strain_modes
-from femubench.papers.printed import printed
+from femubench.papers.printed import read_printed
 from femubench.reproduction import Cell, Extra, Study, Workbench
 
 pytestmark = pytest.mark.slow(20)
@@ -66,7 +66,7 @@ def test_every_cell_is_there_once_and_none_is_without_a_reason(
 
 
 def test_every_printed_figure_has_its_cell(rerun: Study) -> None:
-    data = printed("frame")
+    data = read_printed("frame")
     figures = data["table1"]["fe"] + data["table1"]["error_percent"]
     figures += list(data["generalised_mass"]["off_diagonal"].values()) + list(data["text"].values())
     for table in ("table2", "table3", "table4"):
@@ -134,7 +134,7 @@ def test_independent_cells_hold_for_the_shapes_of_another_structure(bench: Workb
 
 
 def test_what_was_given_is_no_agreement_of_its_own(cells: Mapping[Key, Cell]) -> None:
-    measured = set(printed("frame")["table1"]["measured"])
+    measured = set(read_printed("frame")["table1"]["measured"])
     for (table, row, _), cell in cells.items():
         if table in "234" and row.startswith("mode") and cell.printed in measured:
             assert cell.verdict == "input", cell
@@ -163,7 +163,7 @@ def test_least_squares_column_comes_from_one_reading_that_the_note_names(
 def test_a_column_that_hardly_moves_is_not_explained_by_what_hardly_moves(
     bench: Workbench,
 ) -> None:
-    values = printed("frame")["table3"]["physical"]["modes"]
+    values = read_printed("frame")["table3"]["physical"]["modes"]
     assert readings.farthest(bench, "unchanged", values) < 1.0
     assert readings.farthest(bench, "physical", values) > 10.0
 
@@ -265,7 +265,7 @@ def test_misprints_are_told_by_their_figures(bench: Workbench) -> None:
     assert right < 0.1 * transposed
     structure = bench.cases[CASE].model.frame_structure
     as_printed = misprints.with_printed_torsional_mass(structure)
-    fe = np.array(printed("frame")["table1"]["fe"])
+    fe = np.array(read_printed("frame")["table1"]["fe"])
     assert np.abs(as_printed / fe - 1.0).max() > 0.01
     terms = misprints.coupling_terms(structure)
     assert terms == {"half-turn": ("k13",), "mirror": ("k23",), "full": ()}

@@ -21,8 +21,8 @@ from femubench.papers.hframe.beyond import compare
 from femubench.papers.hframe.meshes import frequencies, mesh_cells
 from femubench.papers.hframe.physical import physical_model, shape_paired_errors
 from femubench.papers.hframe.rows import FREE_EI, ROWS, at_printed, parameter_values, row_of, run
-from femubench.papers.hframe.shapes import expanded_mac, shape_cells
-from femubench.papers.printed import printed
+from femubench.papers.hframe.shapes import compute_expanded_mac, shape_cells
+from femubench.papers.printed import read_printed
 from femubench.reproduction import VERDICTS, Bars, Cell, Study, Workbench
 from femubench.scenarios import HERE
 
@@ -129,7 +129,7 @@ def test_no_option_of_an_independent_update_was_set(cells: Cells) -> None:
 def test_what_was_chosen_for_a_fitted_cell_matters(bench: Workbench, cells: Cells) -> None:
     """Without its damping and number of steps 4b misses the printed parameters."""
     row = row_of("b")
-    for symbol, (_, last) in printed("hframe")["table4"][row.key]["parameters"].items():
+    for symbol, (_, last) in read_printed("hframe")["table4"][row.key]["parameters"].items():
         free = parameter_values(bench, row, row.converged)[symbol][1]
         assert abs(free / last - 1.0) > 1e-3
         assert cells["4b", symbol, "updated"].verdict == "fitted"
@@ -169,7 +169,7 @@ def test_table_3(cells: Cells, bench: Workbench) -> None:
     assert not any(name == "measured 7" for _, name, _ in cells)  # out of plane
     # the large cells off the diagonal need rotations in the vectors
     case = bench.cases["hframe"]
-    every, moved = expanded_mac(case), expanded_mac(case, "translations")
+    every, moved = compute_expanded_mac(case), compute_expanded_mac(case, "translations")
     assert every[6][2] > 10.0 > 5.0 > moved[6][2]
 
 
@@ -181,7 +181,7 @@ def test_initial_columns(cells: Cells) -> None:
 
 def test_frequencies_at_the_printed_parameters(bench: Workbench, done: Study) -> None:
     for row in ROWS:
-        theirs = np.array(printed("hframe")["table4"][row.key]["updated"])
+        theirs = np.array(read_printed("hframe")["table4"][row.key]["updated"])
         off = np.abs(frequencies(at_printed(bench, row), 5) / theirs - 1.0).max()
         assert off < {"a": 4e-4, "b": 4e-4, "c": 4e-4, "d": 4e-4, "e": 1.5e-3}[row.letter]
     extra = next(e for e in done.extras if e.title == "Frequencies at the printed parameters")
@@ -227,7 +227,7 @@ def test_row_c_determines_a_ratio_only(bench: Workbench) -> None:
     assert max(masses) - min(masses) > 0.015
     # with the springs of the initial column the printed updated frequencies are missed
     flexible = frequencies(run(bench, f"{row.initial.words},options.damping=1.0").model, 5)
-    printed_hertz = printed("hframe")["table4"][row.key]["updated"]
+    printed_hertz = read_printed("hframe")["table4"][row.key]["updated"]
     assert np.abs(flexible / np.array(printed_hertz) - 1.0).max() > 5e-3
 
 
@@ -301,7 +301,7 @@ def test_extras_and_figure_are_complete(done: Study) -> None:
 
 
 def test_the_transcription_contradicts_itself_at_the_misprints_only() -> None:
-    tables, wrong = printed("hframe"), []
+    tables, wrong = read_printed("hframe"), []
     measured = np.array(tables["table1"]["frequency"][:5])
     for key, table in tables["table4"].items():
         for column in ("initial", "updated"):

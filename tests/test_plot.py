@@ -28,7 +28,7 @@ from femubench import (
     solve_modes,
 )
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.drawing.places import placed_wireframe
+from femubench.core.drawing.places import find_wireframe
 from femubench.core.errors import InputError
 from femubench.core.plot.findings import scale_end
 from femubench.core.plot.style import COLOURS, place_names
@@ -438,6 +438,6 @@ class TestWireframe:
         ],
     )
     def test_places(self, word: str, kind: str, count: int, hframe: Case) -> None:
-        found = placed_wireframe(hframe, [word]).place(word)
+        found = find_wireframe(hframe, [word]).place(word)
         assert found.kind == kind
         assert len(found.spans) + len(found.points) == count

@@ -55,7 +55,7 @@ def test_the_posterior_is_that_of_exact_solutions() -> None:
     )
     rng = np.random.default_rng(0)
     z = 1.8 * rng.standard_normal((700, len(changes)))
-    points, values = target.predicted(target.point.q + z @ np.linalg.cholesky(covariance).T)
+    points, values = target.predict(target.point.q + z @ np.linalg.cholesky(covariance).T)
     assert len(points) == len(z)
     log, _, _ = target.data
     misfit = np.square((log - values) / target.std(np.zeros(1))).sum(axis=1)

@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 from rich.progress import Progress
 
-from femubench.core.cli.progress import shown, spoken_left
+from femubench.core.cli.progress import format_time_left, show_progress
 from femubench.core.inference.effort import Effort, Kind
 from femubench.core.library.reproduce import _Updates
 from femubench.core.pace import Advance, Pace
@@ -143,17 +143,17 @@ class TestEffort:
             self.work(effort, clock, "single", 4.0)
             assert [advance.left for advance in said] == [None, None]
             assert said[-1].what == "single causes"
-            effort.explained(False)
+            effort.note_adequacy(False)
             self.work(effort, clock, "single", 4.0)
             assert said[-1].left == pytest.approx(4.0)
-            effort.explained(True)
+            effort.note_adequacy(True)
             self.work(effort, clock, "single", 4.0)
             assert said[-1].left == 0.0
         assert (said[-1].done, said[-1].total) == (3, 3)
 
     def test_what_a_stage_does_without_is_not_expected_after_it(self, clock: Clock) -> None:
         effort, said = self.said(clock)
-        effort.explained(True)
+        effort.note_adequacy(True)
         with effort.scope({"advice": 1}):
             with effort.scope({"single": 10}):
                 self.work(effort, clock, "single", 5.0)
@@ -173,7 +173,7 @@ class TestEffort:
 
     def test_a_piece_that_is_overdue_takes_no_time_from_others(self, clock: Clock) -> None:
         effort, said = self.said(clock)
-        effort.explained(True)
+        effort.note_adequacy(True)
         with effort.scope({"single": 3}):
             self.work(effort, clock, "single", 5.0)
             with effort.piece("single"):
@@ -214,9 +214,9 @@ def test_updates_of_the_papers_are_as_long_as_they_were(clock: Clock, speed: flo
 
 
 def test_a_piece_runs_down_and_no_further() -> None:
-    assert spoken_left(Advance(1, 2), 5.0) == "-:--:--"
+    assert format_time_left(Advance(1, 2), 5.0) == "-:--:--"
     advance = Advance(1, 5, left=4000.0, current=100.0)
-    assert [spoken_left(advance, since) for since in (0.0, 40.0, 100.0, 900.0)] == [
+    assert [format_time_left(advance, since) for since in (0.0, 40.0, 100.0, 900.0)] == [
         *("1:06:40", "1:06:00", "1:05:00", "1:05:00"),
     ]
 
@@ -247,7 +247,7 @@ def test_one_line_that_takes_itself_away(clock: Clock, monkeypatch: pytest.Monke
     )
     file = io.StringIO()
     console = Console(file=file, force_terminal=True, width=80)
-    with shown("[red]frame", console, clock) as told:
+    with show_progress("[red]frame", console, clock) as told:
         clock.now += 65.0
         told(Advance(3, 12, "single causes", 130.0, 5.0))
         (line,) = (line for line in screen(file.getvalue()) if line.strip())

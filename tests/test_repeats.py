@@ -91,7 +91,7 @@ def test_selection_and_errors_besides_keep_it_whole() -> None:
     assert some is not None
     np.testing.assert_allclose(some, COVARIANCE[np.ix_([2, 0], [2, 0])])
     more = np.array([0.5, 0.1, 0.3])
-    wide = measured().widened(more).frequency_covariance
+    wide = measured().widen(more).frequency_covariance
     assert wide is not None
     np.testing.assert_allclose(wide, COVARIANCE + np.diag(more**2))
     assert measured(None).frequency_covariance is None

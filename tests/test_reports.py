@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 
-from femubench.core.library.report import rendered
+from femubench.core.library.report import render_report
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import check_reporter
 from femubench.reports import femubench_reporters
-from femubench.reports.cells import fixed, hertz, plain, shortened, whole
+from femubench.reports.cells import format_fixed, hertz, plain, shorten_text, whole
 from femubench.reports.csvs import CsvReporter, ModesCsvReporter
 from femubench.reports.jsons import JsonReporter
 from femubench.reports.markdown import escape
@@ -144,7 +144,7 @@ def test_builtin_reporters_fill_the_role() -> None:
 
 @pytest.mark.parametrize("name", femubench_reporters())
 def test_every_format_takes_an_empty_run(name: str) -> None:
-    content = rendered(load_plugins().reporters[name], run_of(strategies=[]))
+    content = render_report(load_plugins().reporters[name], run_of(strategies=[]))
     # Libraries of a page may say what they like.
     assert isinstance(content, bytes) or "nan" not in content.partition("<script>")[0]
 
@@ -329,12 +329,22 @@ class TestJson:
 
 
 def test_cells() -> None:
-    assert [fixed(x) for x in (0.0, 1.234, 123.456, 12345.6)] == ["0.00", "1.23", "123.5", "12346"]
-    assert [fixed(x, 2, 4) for x in (99.999, 1234567.0, None, math.nan)] == ["100", "1e6", "–", "–"]
+    assert [format_fixed(x) for x in (0.0, 1.234, 123.456, 12345.6)] == [
+        "0.00",
+        "1.23",
+        "123.5",
+        "12346",
+    ]
+    assert [format_fixed(x, 2, 4) for x in (99.999, 1234567.0, None, math.nan)] == [
+        "100",
+        "1e6",
+        "–",
+        "–",
+    ]
     assert [whole(x) for x in (3.0, 2.5, None)] == ["3", "2.5", "–"]
     assert [hertz(x) for x in (226.84, -102.46, None)] == ["226.8", "102.5 i", "–"]
     assert plain("a\x1b[0m\n b") == "a [0m b"
-    assert [shortened(x, 5) for x in ("abcde", "abcdef")] == ["abcde", "abcd…"]
+    assert [shorten_text(x, 5) for x in ("abcde", "abcdef")] == ["abcde", "abcd…"]
 
 
 def test_a_lost_mode_counts_whole_after_a_design_change() -> None:

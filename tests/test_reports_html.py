@@ -20,7 +20,7 @@ from femubench.reports.reproduction import (
     reproduction_text,
 )
 from femubench.reports.reproduction_page import reproduction_html
-from femubench.reports.svg import embedded
+from femubench.reports.svg import embed_svg
 from femubench.reports.terminal import to_terminal
 from femubench.reproduction import Ground, Page, Study
 
@@ -80,7 +80,7 @@ class TestDigits:
     def test_one_more_than_in_print(self) -> None:
         digits = Digits.of([255.8, 500.0])
         assert digits == Digits(1, 1)
-        assert (digits.printed(500.0), digits.ours(500.0)) == ("500.0", "500.00")
+        assert (digits.format(500.0), digits.ours(500.0)) == ("500.0", "500.00")
 
     def test_counts_stay_counts(self) -> None:
         digits = Digits.of([231, 112])
@@ -90,23 +90,23 @@ class TestDigits:
 
     def test_powers_of_ten_do_not_lengthen_the_others(self) -> None:
         digits = Digits.of([0.02, -0.0283, 3.12e-6])
-        assert digits.printed(3.12e-6) == "3.12e-6"
+        assert digits.format(3.12e-6) == "3.12e-6"
         assert digits.ours(3.1204e-6, beside=3.12e-6) == "3.120e-6"
-        assert digits.printed(0.02) == "0.0200"
+        assert digits.format(0.02) == "0.0200"
         assert digits.ours(-0.02849, beside=-0.0283) == "-0.02849"
         assert digits.ours(1.5e-7, beside=0.02) == "0.00000"
         assert digits.ours(4.128e9, beside=0.02) == "4.128e9"
 
     def test_last_digit_of_small_figures(self) -> None:
         digits = Digits.of([-0.0221, -0.0001])
-        assert (digits.printed(-0.0001), digits.ours(0.000192, beside=-0.0001)) == (
+        assert (digits.format(-0.0001), digits.ours(0.000192, beside=-0.0001)) == (
             *("-0.0001", "0.00019"),
         )
 
     def test_imaginary_frequency(self) -> None:
         digits = Digits.of([-1197.6])
-        assert digits.printed(-1197.6, "Hz") == "1197.6 i"
-        assert digits.printed(-1197.6, "N") == "-1197.6"
+        assert digits.format(-1197.6, "Hz") == "1197.6 i"
+        assert digits.format(-1197.6, "N") == "-1197.6"
 
     @pytest.mark.parametrize("value", [None, float("nan"), float("inf")])
     def test_nothing(self, value: float | None) -> None:
@@ -299,7 +299,7 @@ class TestHtml:
 
 class TestDrawing:
     def test_stays_well_formed_and_keeps_its_picture(self) -> None:
-        made = embedded(toys.drawn(toys.figures("frame")[0]), "p", "a & b")
+        made = embed_svg(toys.drawn(toys.figures("frame")[0]), "p", "a & b")
         root = ElementTree.fromstring(str(made))
         assert root.get("aria-label") == "a & b"
         assert 'href="data:image/png;base64,AAAA"' in made
@@ -312,14 +312,14 @@ class TestDrawing:
             '<svg xmlns="http://www.w3.org/2000/svg" aria-labelledby="t d">'
             '<title id="t">T</title><desc id="d">D</desc></svg>'
         )
-        root = ElementTree.fromstring(str(embedded(svg, "p", "l")))
+        root = ElementTree.fromstring(str(embed_svg(svg, "p", "l")))
         assert (root.get("aria-labelledby"), root.get("aria-label")) == ("p-t p-d", None)
         assert [child.get("id") for child in root] == ["p-t", "p-d"]
 
     def test_label_with_brackets_stays(self) -> None:
         svg = '<svg xmlns="http://www.w3.org/2000/svg"><text>url(x)</text></svg>'
-        assert "<text>url(x)</text>" in embedded(svg, "p", "l")
+        assert "<text>url(x)</text>" in embed_svg(svg, "p", "l")
 
     def test_something_else_is_refused(self) -> None:
         with pytest.raises(ValueError, match="not a drawing"):
-            embedded("<html/>", "p", "l")
+            embed_svg("<html/>", "p", "l")

@@ -57,7 +57,9 @@ def test_a_strategy_that_inherits_nothing_is_one() -> None:
     assert Duck.__mro__ == (Duck, object)
     found = check_strategy(Duck)
     assert isinstance(found, roles.Strategy)
-    assert roles.declared(found, "needs") == roles.declared(found, "promises") == frozenset()
+    assert (
+        roles.list_declared(found, "needs") == roles.list_declared(found, "promises") == frozenset()
+    )
     assert not isinstance(object(), roles.Strategy)
     assert not issubclass(Duck, Strategy)
 

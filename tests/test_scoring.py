@@ -18,7 +18,7 @@ from femubench.core.modal.eigen import solve_modes
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block, JobResult, Run, Status
 from femubench.core.score.leaderboard import leaderboard
-from femubench.core.score.ranking import rank_results, ranked, score_of
+from femubench.core.score.ranking import rank_items, rank_results, score_of
 from femubench.core.score.scoring import (
     Reference,
     frequency_error,
@@ -27,7 +27,7 @@ from femubench.core.score.scoring import (
     reference_of,
     score_model,
 )
-from femubench.results import ranks_by_floor, scored_on
+from femubench.results import find_basis, ranks_by_floor
 
 
 @pytest.fixture(scope="module")
@@ -302,12 +302,12 @@ def test_ties_are_transitive_and_end_at_a_gap() -> None:
     scores = [1.0 + 0.9e-6 * k for k in range(4)] + [1.0 + 5e-6]
     items = list(zip("dcbae", scores, strict=True))
     for order in (items, items[::-1]):
-        found = ranked(order, lambda item: ((), item[1], item[0]))
+        found = rank_items(order, lambda item: ((), item[1], item[0]))
         assert [(rank, name) for rank, (name, _) in found] == [
             *((1, name) for name in "abcd"),
             (5, "e"),
         ]
-    tiers = ranked(["x", "y"], lambda name: ((name == "x",), 1.0, name))
+    tiers = rank_items(["x", "y"], lambda name: ((name == "x",), 1.0, name))
     assert tiers == [(1, "y"), (2, "x")]
 
 
@@ -402,8 +402,8 @@ def test_a_case_that_holds_nothing_back_counts_only_among_its_like() -> None:
     assert board(reference, result("s", case="b"))["skill"] == pytest.approx(-9.0)
     given = Run({**META, "reference": {"b": {"used": 3.0}}}, (result("s", case="b"),))
     assert leaderboard(given)["skill"][0] == pytest.approx(1.0 - 1.05 / 3.05)
-    assert scored_on(given) == "given"
-    assert scored_on(Run({**META, "reference": reference}, (seen,))) == "unseen"
+    assert find_basis(given) == "given"
+    assert find_basis(Run({**META, "reference": reference}, (seen,))) == "unseen"
 
 
 def test_tests_stand_apart_from_computed_truths() -> None:

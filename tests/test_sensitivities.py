@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from femubench.core.fem.derivatives import derivatives, touched
+from femubench.core.fem.derivatives import derivatives, list_touched
 from femubench.core.fem.frame import (
     Frame,
     Joint,
@@ -101,7 +101,7 @@ def present_value(structure: Structure, parameter: Property) -> float:
         structure.springs[part.rows]
         if part.kind == "spring"
         else getattr(structure.properties, part.kind)[part.rows]
-        for part in touched(structure, [parameter])
+        for part in list_touched(structure, [parameter])
     ]
     return float(np.concatenate(values).mean())
 

@@ -25,7 +25,7 @@ from femubench import (
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.fem.model_parameters import matrix_slopes
 from femubench.core.fem.sections import constant_kappa
-from femubench.core.modal.eigen import counted_evaluations
+from femubench.core.modal.eigen import count_evaluations
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
 from femubench.core.update.residuals import Targets, predict
 from femubench.effect import Change
@@ -51,11 +51,11 @@ from femubench.plugins.strategies.spring import Spring
 from femubench.update import (
     UpdateOptions,
     all_elements,
-    carried_by,
     groups_within,
     half_depth,
     joint_groups,
     scale_property,
+    select_determined,
     sensitivity_update,
     spring_estimates,
     with_joint_springs,
@@ -262,7 +262,7 @@ def test_a_section_given_as_numbers_has_no_depth(hframe_case: Any) -> None:
 
 
 def test_an_iteration_is_one_eigenvalue_solution(hframe_case: Any) -> None:
-    with counted_evaluations() as counter:
+    with count_evaluations() as counter:
         result = Local().update(*hframe_case, RNG)
     steps = [entry["iteration"] for entry in result.history]
     assert steps == list(range(len(steps)))
@@ -411,7 +411,7 @@ def test_no_more_parameters_than_frequencies(hframe_case: Any) -> None:
         return scale_property(name, "EI", ())
 
     levels = [[some("a"), some("b")], [], [some("c"), some("d")], [some("e")]]
-    counts = {n: [change.name for change in carried_by(levels, n)] for n in (1, 2, 3, 4, 9)}
+    counts = {n: [change.name for change in select_determined(levels, n)] for n in (1, 2, 3, 4, 9)}
     assert counts == {1: ["a"], 2: ["a", "b"], 3: ["a", "b"], 4: list("abcd"), 9: list("abcde")}
 
 

@@ -15,12 +15,12 @@ from femubench.core.errors import InputError
 from femubench.core.inference.settings import (
     Setting,
     Settings,
-    changed_settings,
     decisions_from,
+    format_value,
+    list_changed,
     overridden,
     settings,
     settings_table,
-    shown,
 )
 
 ROOT = Path(__file__).parents[1]
@@ -32,7 +32,7 @@ DECISIONS = [name for name, s in settings_table().items() if s.kind == "decision
 @pytest.mark.parametrize("name", settings_table())
 def test_every_number_stands_in_the_docs(name: str) -> None:
     entry = settings_table()[name]
-    cells = f"`{name}`", shown(entry.value), entry.unit, entry.kind, entry.why
+    cells = f"`{name}`", format_value(entry.value), entry.unit, entry.kind, entry.why
     assert f"| {' | '.join(cells)} |" in (ROOT / "docs" / "settings.md").read_text("utf-8")
 
 
@@ -50,10 +50,10 @@ def test_no_module_has_numbers_of_its_own(room: str) -> None:
 
 
 def test_other_values_last_as_long_as_their_block() -> None:
-    assert changed_settings() == {}
+    assert list_changed() == {}
     with overridden({"sure_fault": 0.95}):
         with overridden({"largest_group": 2}):
-            assert changed_settings() == {"sure_fault": 0.95, "largest_group": 2}
+            assert list_changed() == {"sure_fault": 0.95, "largest_group": 2}
         assert (settings.sure_fault, settings.largest_group) == (0.95, Settings().largest_group)
     with pytest.raises(KeyError), overridden({"sure_fault": 0.95}):
         raise KeyError
@@ -66,7 +66,7 @@ def test_other_values_last_as_long_as_their_block() -> None:
 @pytest.mark.parametrize("name", DECISIONS)
 def test_every_decision_can_be_given_its_own_value_in_words(name: str) -> None:
     value = settings_table()[name].value
-    given = decisions_from([f"{name} = {shown(value)}"])
+    given = decisions_from([f"{name} = {format_value(value)}"])
     assert given == {name: value}
     assert type(given[name]) is type(value)
 
@@ -112,7 +112,7 @@ def test_the_option_reaches_the_diagnosis(monkeypatch: pytest.MonkeyPatch) -> No
     seen: list[dict[str, object]] = []
 
     def search(*_: object, **__: object) -> None:
-        seen.append(dict(changed_settings()))
+        seen.append(dict(list_changed()))
         raise InputError("enough")
 
     monkeypatch.setattr("femubench.core.library.diagnose.search", search)

@@ -48,7 +48,7 @@ def judges() -> Iterator[Judges[int]]:
 def ended(judges: Judges[int]) -> Ending:
     """Wait for the one answer that is being judged."""
     while judges.busy:
-        for _, ending in judges.ended():
+        for _, ending in judges.take_ended():
             return ending
         time.sleep(0.002)
     raise AssertionError("nobody is at work")

@@ -19,12 +19,12 @@ from femubench import read_case
 from femubench.core.case.case import Case
 from femubench.core.cli.main import bench
 from femubench.core.errors import InputError, NotApplicable
-from femubench.core.run.beside import beside
+from femubench.core.run.beside import choose_beside
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.starts import Starts
 from femubench.core.score.twin_skill import TwinSkill, twin_skills
 from femubench.core.twin.reduced_solid import ReducedSolid
-from femubench.core.twin.stretched_case import FILE, draw_stretched_case, stretched_case
+from femubench.core.twin.stretched_case import FILE, draw_stretched_case, stretch_case
 from femubench.core.twin.twins import FAMILIES, TruthFamily, twin_of, twins_of
 from truths.affine import StretchedSolid
 from truths.drawing import case_text
@@ -167,7 +167,7 @@ def test_unstretched_a_file_gives_what_was_published(name: str) -> None:
     case, solid = builtin(name), ReducedSolid.read(SUITE / name / FILE)
     one = np.ones(len(solid.names))
     hertz = [float(v) for v in ROW.findall((SUITE / name / "README.md").read_text("utf-8"))]
-    found = stretched_case(case, solid, one, None)
+    found = stretch_case(case, solid, one, None)
     np.testing.assert_allclose(found.measurement.frequencies, hertz, rtol=5e-4, atol=5e-4)
     structure = structures()[name]
     noise = 5 * max(structure.scatter, 1e-4)
@@ -196,8 +196,8 @@ def test_the_drawing_is_stretched_as_the_solid(name: str, tmp_path: Path) -> Non
         ReducedSolid.read(SUITE / name / FILE),
         structures()[name],
     )
-    factors = solid.drawn(np.random.default_rng(8))
-    found = stretched_case(case, solid, factors, None).model
+    factors = solid.draw_factors(np.random.default_rng(8))
+    found = stretch_case(case, solid, factors, None).model
     move = stretch_of(structure).map(factors)
     joints = {
         j: tuple(move(np.array(p)[:, None])[:, 0].tolist()) for j, p in structure.joints.items()
@@ -247,9 +247,9 @@ def test_twins_have_ratios_of_their_own_and_noise_of_the_stated_size() -> None:
 
     solid = ReducedSolid.read(case.folder / FILE)
     one = np.ones(len(solid.names))
-    exact = stretched_case(case, solid, one, None).measurement
+    exact = stretch_case(case, solid, one, None).measurement
     drawn = [
-        stretched_case(case, solid, one, np.random.default_rng(seed)).measurement
+        stretch_case(case, solid, one, np.random.default_rng(seed)).measurement
         for seed in range(200)
     ]
     spread = np.std([m.frequencies / exact.frequencies for m in drawn], axis=0)
@@ -289,9 +289,9 @@ def skill(families: Mapping[str, TruthFamily]) -> dict[str, TwinSkill]:
     """What twins of some families say of who knows ratios by heart, and of who does nothing."""
     case = builtin("stiffened-strip")
     twins = list(twins_of([case], 2, 13, families))
-    truth = stretched_case(case, ReducedSolid.read(case.folder / FILE), np.ones(4), None)
+    truth = stretch_case(case, ReducedSolid.read(case.folder / FILE), np.ones(4), None)
     able = [toys.Unchanged(), Ratios(tuple(truth.measurement.frequencies))]
-    starts = Starts(beside=beside([case], twins, 2, 13))
+    starts = Starts(beside=choose_beside([case], twins, 2, 13))
     return twin_skills(run_jobs([case], able, jobs=1, starts=starts))
 
 

@@ -16,7 +16,7 @@ import femubench
 from femubench import InputError, plot
 from femubench.core.cli.main import bench
 from femubench.core.library.rank import Run
-from femubench.core.library.report import rendered, reporter
+from femubench.core.library.report import render_report, reporter
 from femubench.core.library.study import StudyPlan, study_plan
 from femubench.core.plugin.loader import Plugins, load_plugins
 from femubench.core.run.executor import LocalProcesses
@@ -24,7 +24,7 @@ from femubench.core.run.recording import Progress
 from femubench.core.run.runner import Receivers
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult
-from femubench.core.study.conditions import varied
+from femubench.core.study.conditions import vary_case
 from femubench.core.study.study_file import read_study
 from femubench.results import leaderboard, results_frame, skill_by
 from tests.test_cli import put_case
@@ -129,7 +129,7 @@ class TestConditions:
 
     def test_noise_scales_with_its_stated_deviation(self) -> None:
         true = self.CASE.used_measurement()
-        once, twice = (varied(self.CASE, f, 0).used_measurement(3) for f in (1.0, 2.0))
+        once, twice = (vary_case(self.CASE, f, 0).used_measurement(3) for f in (1.0, 2.0))
         assert_allclose(once.frequencies, self.CASE.used_measurement(3).frequencies)
         assert_allclose(
             twice.frequencies - true.frequencies, 2 * (once.frequencies - true.frequencies)
@@ -139,13 +139,13 @@ class TestConditions:
         assert_allclose(twice.shape_std, 2 * once.shape_std)
 
     def test_scatter_over_seeds_is_what_is_stated(self) -> None:
-        case = varied(self.CASE, 3.0, 0)
+        case = vary_case(self.CASE, 3.0, 0)
         drawn = np.array([case.used_measurement(seed).frequencies for seed in range(1, 401)])
         stated = case.used_measurement(1).frequency_std
         assert_allclose(drawn.std(axis=0), stated, rtol=0.12)  # three sigma of 400 draws
 
     def test_sensors_are_left_out_with_their_readings(self) -> None:
-        few = varied(self.CASE, 1.0, 3)
+        few = vary_case(self.CASE, 1.0, 3)
         seen, whole = few.used_measurement(2), self.CASE.used_measurement(2)
         kept = [whole.sensors.labels.index(label) for label in seen.sensors.labels]
         assert len(kept) == len(whole.sensors) - 3
@@ -153,13 +153,15 @@ class TestConditions:
         assert_allclose(seen.sensors.xyz, whole.sensors.xyz[kept])
         hidden = str(few.conditions(2)["sensors_left_out"]).split()
         assert {*hidden, *seen.sensors.labels} == set(whole.sensors.labels)
-        more = str(varied(self.CASE, 1.0, 5).conditions(2)["sensors_left_out"]).split()
+        more = str(vary_case(self.CASE, 1.0, 5).conditions(2)["sensors_left_out"]).split()
         assert set(hidden) < set(more)
-        others = {varied(self.CASE, 1.0, 3).conditions(s)["sensors_left_out"] for s in range(1, 9)}
+        others = {
+            vary_case(self.CASE, 1.0, 3).conditions(s)["sensors_left_out"] for s in range(1, 9)
+        }
         assert len(others) > 3
 
     def test_what_is_scored_stays(self) -> None:
-        case = varied(self.CASE, 2.0, 3)
+        case = vary_case(self.CASE, 2.0, 3)
         assert case.measurement is self.CASE.measurement
         assert case.modifications is self.CASE.modifications
 
@@ -220,7 +222,7 @@ class TestRun:
     def test_report_in_every_format(self, spied: Run) -> None:
         plugins = load_plugins()
         texts = {
-            name: rendered(reporter(plugins, name), spied)
+            name: render_report(reporter(plugins, name), spied)
             for name in ("terminal", "markdown", "html", "json", "csv")
         }
         assert max(map(len, str(texts["terminal"]).splitlines())) <= 80

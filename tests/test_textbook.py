@@ -15,14 +15,14 @@ import femubench
 from femubench import NotApplicable
 from femubench.core.cli.main import bench
 from femubench.core.library.rank import request_of
-from femubench.core.plugin.loader import load_plugins, registered_effects
+from femubench.core.plugin.loader import list_effects, load_plugins
 from femubench.core.run.store import Store
 from femubench.effect import textbook_model, textbook_values
 from femubench.fem import bredt
 from femubench.results import run_from_json, run_to_json, score_model
 from tests.test_cli import put_distribution
 
-EFFECTS = registered_effects()
+EFFECTS = list_effects()
 
 
 def test_it_has_bredts_torsion_constant_shear_and_rotary_inertia() -> None:

@@ -12,7 +12,7 @@ import pytest
 import truth_sweep as sweep
 
 from femubench import read_case
-from femubench.core.challenge.truth_file import KnownCase, TrueCause, held
+from femubench.core.challenge.truth_file import KnownCase, TrueCause, is_held
 from femubench.core.diagnosis import diagnose as diagnosing
 from truths.truth_text import truth_text
 
@@ -154,7 +154,7 @@ def test_ranges_of_visibility() -> None:
 
 def test_tables_count_both_halves_apart() -> None:
     names = [str(i) for i in range(20)]
-    kept, shown = ([n for n in names if held(n) is half] for half in (True, False))
+    kept, shown = ([n for n in names if is_held(n) is half] for half in (True, False))
     truths = [truth("defect", LOOSE, name=name) for name in names]
     records = {name: said("named", "joint-rotation@J1") for name in shown}
     records[shown[0]] = said("named", "density@all", p=0.995)
@@ -251,7 +251,7 @@ def test_stated_probabilities_and_sizes(same: sweep.Same) -> None:
 
 
 def test_strict_figures_part_names_from_groups() -> None:
-    names = [name for name in map(str, range(40)) if not held(name)][:6]
+    names = [name for name in map(str, range(40)) if not is_held(name)][:6]
     here, there = "joint-rotation@J1", "joint-rotation@J5"
     records = dict(
         zip(
@@ -291,7 +291,7 @@ def test_a_run_replaces_its_own_rows(tmp_path: Path) -> None:
 
 
 def test_answers_and_the_fit_of_the_truth_are_in_the_tables() -> None:
-    name = next(name for name in map(str, range(20)) if not held(name))
+    name = next(name for name in map(str, range(20)) if not is_held(name))
     given = [{"chi2": c, "unknowns": 1, "log_weight": -c} for c in (50.0, 40.0)]
     record = said("named", "added-mass@J1") | dict(
         zip(("leader_fit", "true_fit"), given, strict=True)

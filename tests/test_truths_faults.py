@@ -16,7 +16,7 @@ from small_suite import SUPPORTED, write_suite
 
 from femubench import Case, InputError, read_case, solve_modes
 from femubench.core.challenge.posing import overlay
-from femubench.core.challenge.truth_file import TRUTH_FILE, KnownCase, held, read_truth
+from femubench.core.challenge.truth_file import TRUTH_FILE, KnownCase, is_held, read_truth
 from femubench.fem import FloatArray
 from truths import faults
 from truths.faults import FAULT_KINDS, Draft, Structure, drafts, files_of, visibility, write_faults
@@ -92,7 +92,7 @@ def test_the_seed_gives_the_same_again(drawn: list[Drawn], suite: Path) -> None:
 def test_halves_are_about_as_large(drawn: list[Drawn]) -> None:
     # Of 60 fair coins, 18 to 42 show heads in all but 0.2 % of all throws.
     assert 18 <= sum(truth.held for _, truth, _ in drawn) <= 42
-    assert 460 <= sum(held(str(i)) for i in range(1000)) <= 540
+    assert 460 <= sum(is_held(str(i)) for i in range(1000)) <= 540
 
 
 def test_an_outlier_is_one_frequency(of_kind: Any, tmp_path: Path) -> None:

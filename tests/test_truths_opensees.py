@@ -15,7 +15,7 @@ import pytest
 from femubench import read_case
 from femubench.core.challenge.truth_file import read_truth
 from femubench.core.fit.extended_model import raw_residual
-from femubench.core.inference.examine import posed
+from femubench.core.inference.examine import pose_problem
 from femubench.core.plugin.loader import load_plugins
 from truths.opensees_cases import (
     COUNTS,
@@ -87,7 +87,7 @@ def test_what_is_wrong_explains_the_data_by_the_effects_of_the_catalogue(
         pytest.skip("no effect describes it")
     pose(folder, tmp_path / "case", suite=STRUCTURES)
     case = read_case(tmp_path / "case")
-    problem, _ = posed(case.model, case.used_measurement(), (), 0.0)
+    problem, _ = pose_problem(case.model, case.used_measurement(), (), 0.0)
     model, before = case.model, raw_residual(problem, case.model)
     for cause in truth.causes:
         effect = effects[cause.effect]

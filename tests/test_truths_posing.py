@@ -9,7 +9,7 @@ import pytest
 from small_suite import write_suite
 
 from femubench import InputError, read_case
-from femubench.core.challenge.truth_file import KnownCase, TrueCause, held, read_truth
+from femubench.core.challenge.truth_file import KnownCase, TrueCause, is_held, read_truth
 from truths.posing import DEFECTS, SUITE, pose
 from truths.truth_text import truth_text
 
@@ -83,7 +83,7 @@ def test_a_faulty_key_is_one_line(tmp_path: Path, old: str, new: str, line: str)
 
 def test_a_truth_in_a_folder_of_another_half_is_refused(tmp_path: Path) -> None:
     room = written(tmp_path)
-    other = next(name for name in map(str, range(99)) if held(name) != held(room.name))
+    other = next(name for name in map(str, range(99)) if is_held(name) != is_held(room.name))
     with pytest.raises(InputError, match="held: the half is another"):
         read_truth(room.rename(tmp_path / other))
 

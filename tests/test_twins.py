@@ -43,7 +43,7 @@ from femubench.core.fem.sections import rectangular_tube, round_tube
 from femubench.core.library.rank import plan_again, plan_run, rank, request_of, textbook_of
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.run.beside import beside
+from femubench.core.run.beside import choose_beside
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
@@ -52,7 +52,7 @@ from femubench.core.schema.results import Run
 from femubench.core.score.repeatability import unsteady
 from femubench.core.score.scoring import judge, reference_of
 from femubench.core.score.twin_skill import twin_skills
-from femubench.core.twin.disguise import disguised
+from femubench.core.twin.disguise import disguise_case
 from femubench.core.twin.similarity import Similarity, matrix_factors, similar_case, similar_frame
 from femubench.core.twin.twins import FAMILIES, Twin, again, twin_of, twins_of
 from femubench.core.typing import SparseArray
@@ -149,7 +149,7 @@ def test_other_names_and_orders_change_no_frequency() -> None:
     frame = everything()
     case = replace(toys.tiny_case(), model=Model.of(frame), measurement=_at_joints(frame),
                    modifications=())  # fmt: skip
-    hidden = disguised(case, np.random.default_rng(3))
+    hidden = disguise_case(case, np.random.default_rng(3))
     other = hidden.model.frame_structure.frame
     first, second = (solve_modes(m.model).elastic for m in (case, hidden))
     assert second.natural_frequencies[:8] == pytest.approx(first.natural_frequencies[:8], rel=1e-9)
@@ -286,7 +286,7 @@ def test_the_same_seed_gives_the_same_twins_and_another_one_others() -> None:
 def run() -> Run:
     case = builtin("frame-solid")
     twins = list(twins_of([case], 2, 11))
-    others = beside([case], twins, 2, 11)
+    others = choose_beside([case], twins, 2, 11)
     truth = tuple(case.measurement.frequencies[case.measurement.frequencies > 0.0])
     able = [toys.Unchanged(), Memory(truth[:8]), Chance(), Drawn()]
     return run_jobs([case], able, seeds=(0, 1), jobs=2, starts=Starts(beside=others))

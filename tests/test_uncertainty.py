@@ -17,7 +17,7 @@ import femubench
 from femubench import Measurement, Model, Strategy, StrategyFailure, UpdateResult, solve_modes
 from femubench.core.run.answers import pack_outcome, read_report, unpack_outcome
 from femubench.core.run.jobs import Job, JobOutcome, execute, seed_words
-from femubench.core.run.judging import judged
+from femubench.core.run.judging import judge_outcome
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block, JobResult
 from femubench.core.score import predictive
@@ -147,7 +147,7 @@ def test_moments_of_drawn_samples_are_those_asked_for() -> None:
         seen.append(q)
         return CASE.model
 
-    found = Uncertainty.drawn(make, np.array([1.0, -1.0]), covariance)
+    found = Uncertainty.draw(make, np.array([1.0, -1.0]), covariance)
     assert len(found.samples) == len(seen)
     assert np.mean(seen, axis=0) == pytest.approx([1.0, -1.0], abs=1e-12)
     assert np.cov(np.transpose(seen), bias=True) == pytest.approx(covariance, abs=1e-12)
@@ -164,7 +164,7 @@ def test_moments_of_drawn_samples_are_those_asked_for() -> None:
 )
 def test_a_covariance_that_is_none_is_refused(covariance: FloatArray, says: str) -> None:
     with pytest.raises(StrategyFailure) as caught:
-        Uncertainty.drawn(lambda q: CASE.model, np.zeros(2), covariance)
+        Uncertainty.draw(lambda q: CASE.model, np.zeros(2), covariance)
     assert says in str(caught.value)
 
 
@@ -173,7 +173,7 @@ def test_a_covariance_that_is_symmetric_to_six_digits_alone_is_refused(lack: flo
     """A wrong index is no rounding: that of a product of matrices is of 1e-15."""
     covariance = np.array([[1.0, 0.5 + lack], [0.5, 1.0]])
     with pytest.raises(StrategyFailure, match="not symmetric"):
-        Uncertainty.drawn(lambda q: CASE.model, np.zeros(2), covariance)
+        Uncertainty.draw(lambda q: CASE.model, np.zeros(2), covariance)
 
 
 def test_a_covariance_of_lower_rank_serves_in_spite_of_its_rounding() -> None:
@@ -184,7 +184,7 @@ def test_a_covariance_of_lower_rank_serves_in_spite_of_its_rounding() -> None:
     for given in (covariance, asymmetric):
         assert np.linalg.eigvalsh(given)[0] < 0.0
         seen: list[FloatArray] = []
-        Uncertainty.drawn(lambda q, seen=seen: seen.append(q) or CASE.model, np.zeros(40), given)  # type: ignore[misc]
+        Uncertainty.draw(lambda q, seen=seen: seen.append(q) or CASE.model, np.zeros(40), given)  # type: ignore[misc]
         size = np.linalg.svdvals(np.array(seen))
         assert np.count_nonzero(size > 1e-6 * size[0]) == 3
         assert np.cov(np.transpose(seen), bias=True) == pytest.approx(covariance, abs=1e-9)
@@ -237,7 +237,7 @@ def test_an_uncertainty_that_is_none_fails_in_one_line(stated: object, says: str
     outcome = outcome_of(stated)
     if outcome.status == "ok":  # what only the judge looks into
         outcome = unpack_outcome(pack_outcome(outcome, CASE.model), CASE.model)
-    result = judged(CASE, reference_of(CASE), ("stating", 0, "drawn"), outcome)
+    result = judge_outcome(CASE, reference_of(CASE), ("stating", 0, "drawn"), outcome)
     assert result.status == "failed"
     assert says in result.reason
     assert "\n" not in result.reason
@@ -341,7 +341,7 @@ def test_posterior_samples_have_the_spread_of_the_sensitivities() -> None:
     assert result.uncertainty.discrepancy_std == 0.0
     outcome = JobOutcome("ok", model=result.model, samples=tuple(result.uncertainty.samples),
                          discrepancy_std=0.0)  # fmt: skip
-    spread: Callable[[JobOutcome], JobResult] = lambda o: judged(  # noqa: E731
+    spread: Callable[[JobOutcome], JobResult] = lambda o: judge_outcome(  # noqa: E731
         case, reference_of(case), ("bayesian", 0, "drawn"), o
     )
     for mode in spread(outcome).blocks["used"].modes:

@@ -10,9 +10,9 @@ from scipy.optimize import linear_sum_assignment
 
 from femubench.core.advise.point_attachments import (
     antiresonances,
-    loaded_frequencies,
     nearest,
     points_of,
+    predict_loaded_frequencies,
 )
 from femubench.core.advise.prediction import Outlook, Points, Predicted, distance, outlook_of
 from femubench.core.fem.model import Model
@@ -119,7 +119,7 @@ def _masses(group: Group) -> Iterator[Option]:
         return
     size = float(f"{settings.test_mass * group.weight:.1e}")
     kilograms = f"{size:.{max(0, 1 - int(np.floor(np.log10(size))))}f}"
-    tables = [loaded_frequencies(view, group.points, size) for view in group.views]
+    tables = [predict_loaded_frequencies(view, group.points, size) for view in group.views]
     for label, *predicted in zip(group.points.labels, *tables, strict=True):
         text = f"attach {kilograms} kg at {label} and measure again"
         yield group.option("load", text, predicted, group.hertz * predicted[0].values)
@@ -155,7 +155,7 @@ def _shapes(group: Group) -> Iterator[Option]:
     if len(shapes) < 2:
         return
     std = np.hypot(settings.reachable_shape_std, group.tolerance) * np.abs(shapes).max(axis=0)
-    own, *others = [aligned(shapes, *pair) for pair in pairs]
+    own, *others = [align_shapes(shapes, *pair) for pair in pairs]
     yield group.option(
         "shapes",
         "measure the shapes of the used modes at joints and in the middle of members",
@@ -164,7 +164,7 @@ def _shapes(group: Group) -> Iterator[Option]:
     )
 
 
-def aligned(reference: FloatArray, shapes: FloatArray, spread: FloatArray) -> Predicted:
+def align_shapes(reference: FloatArray, shapes: FloatArray, spread: FloatArray) -> Predicted:
     """Return shapes at their best scale to others, all that goes along with these left out.
 
     Arguments:

@@ -65,7 +65,7 @@ def _low(outlook: Outlook) -> int:
     return min(len(state.eigenvalues), int(state.partner.max()) + 1 + settings.spare_modes)
 
 
-def loaded_frequencies(outlook: Outlook, points: Points, mass: float) -> list[Predicted]:
+def predict_loaded_frequencies(outlook: Outlook, points: Points, mass: float) -> list[Predicted]:
     """Return the frequencies of the measured modes with a mass at each of the points, in Hz.
 
     Arguments:

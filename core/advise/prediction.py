@@ -222,7 +222,7 @@ def outlook_of(problem: Problem, found: Fit, points: Points) -> Outlook:
     # In coordinates of our own: those of the problem are not kept as motions of the dofs.
     hypotheses = [part.hypothesis for part in found.parts]
     if isinstance(problem, LargeProblem):
-        own = problem.common.enriched(problem.space, found.parts)
+        own = problem.common.enrich(problem.space, found.parts)
         space, shapes = own.space, own.vectors
     else:
         modes = solve_modes(problem.model)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from femubench.core.display import Shown, counted, modes_line
+from femubench.core.display import Shown, count_noun, modes_line
 from femubench.core.fem.frame import GroundSpring, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.modal.frf import FrequencyResponses
@@ -29,7 +29,7 @@ class Modification:
     measurement: Measurement
 
     def __str__(self) -> str:
-        attached = counted(len(self.masses), "mass"), counted(len(self.springs), "spring")
+        attached = count_noun(len(self.masses), "mass"), count_noun(len(self.springs), "spring")
         modes = modes_line(self.measurement.numbers, self.measurement.frequencies)
         return f"{self.name}: {', '.join(attached)}; {modes}"
 

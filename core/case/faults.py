@@ -53,7 +53,7 @@ def at_key(*path: str | int) -> Iterator[None]:
         raise BadKey(path, misfit.what, misfit.expected) from None
 
 
-def dotted(path: KeyPath) -> str:
+def join_key_path(path: KeyPath) -> str:
     """Return ``model.members[2].ends`` for a key path."""
     text = ""
     for part in path:
@@ -65,7 +65,7 @@ def _clipped(text: str) -> str:
     return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 3] + "..."
 
 
-def shown(value: object) -> str:
+def shorten_value(value: object) -> str:
     """Return a value as text of one short line."""
     if isinstance(value, (dict, list, tuple)):
         return "a table" if isinstance(value, dict) else "a list"
@@ -89,7 +89,9 @@ def first_fault(error: ValidationError, schema: type[BaseModel]) -> BadKey:
         path, tag = ("model", *path[2:]), str(path[1])
     owner, expected = _described(schema, path, tag)
     if path[-1] == "[key]":
-        return BadKey(path[:-1], f"{shown(found['input'])} is not allowed as a name", expected)
+        return BadKey(
+            path[:-1], f"{shorten_value(found['input'])} is not allowed as a name", expected
+        )
     kind, value = found["type"], found["input"]
     context: Mapping[str, Any] = found.get("ctx", {})
     if kind == "too_long":
@@ -105,13 +107,13 @@ def first_fault(error: ValidationError, schema: type[BaseModel]) -> BadKey:
         hint = f"; is {near[0]!r} meant?" if near else ""
         return BadKey(path, f"unknown key{hint}", f"one of {', '.join(owner.model_fields)}")
     if kind.startswith("union_tag"):
-        kind_given = shown(value.get("kind") if isinstance(value, dict) else value)
+        kind_given = shorten_value(value.get("kind") if isinstance(value, dict) else value)
         missing = kind == "union_tag_not_found"
         what = "missing key" if missing else f"unknown kind {kind_given}"
         return BadKey(("model", "kind"), what, "'frame', 'matrices' or 'file'")
     if kind == "misfit":
         return BadKey(path, context["what"], context["expected"])
-    return BadKey(path, f"{shown(value)} is not allowed", expected)
+    return BadKey(path, f"{shorten_value(value)} is not allowed", expected)
 
 
 def _described(schema: type[BaseModel], path: KeyPath, tag: str) -> tuple[type[BaseModel], str]:

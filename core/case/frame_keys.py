@@ -47,7 +47,7 @@ class Known:
         return {member.name: getattr(member, kind) for member in self.members}
 
 
-def known_from(file: Path) -> Known:
+def read_known(file: Path) -> Known:
     """Return what a `case.toml` says; nothing where it is not there or not a case."""
     try:
         data = tomllib.loads(read_text(file, LARGEST_TEXT))
@@ -60,7 +60,7 @@ def known_from(file: Path) -> Known:
     return Known(spec.model.sections, spec.model.materials, spec.model.members, share)
 
 
-def named_tables(
+def name_tables(
     contents: Sequence[tuple[str, Keys]],
     own: Mapping[str, str],
     tables: Mapping[str, Keys],
@@ -103,7 +103,7 @@ def named_tables(
     return names, result
 
 
-def described_frame(structure: Structure) -> Frame:
+def describe_frame(structure: Structure) -> Frame:
     """Return the frame with all parameter changes turned into factors, joint springs, rigid ends.
 
     Raises:
@@ -196,12 +196,12 @@ def frame_keys(frame: Frame, known: Known) -> Keys:
         except BadKey:
             continue
         tables[name] = section_keys(section, _ANY_NU, frame.plane, spec)
-    sections, section_tables = named_tables(contents, own, tables, "section")
+    sections, section_tables = name_tables(contents, own, tables, "section")
     contents = [
         (member.name, keys_of(member.material, without=("name",))) for member in frame.members
     ]
     tables = {name: spec.model_dump() for name, spec in known.materials.items()}
-    materials, material_tables = named_tables(contents, known.names("material"), tables, "material")
+    materials, material_tables = name_tables(contents, known.names("material"), tables, "material")
     members = [
         {
             **keys_of(member, without=("section", "material")),

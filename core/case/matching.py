@@ -231,7 +231,7 @@ class Placement:
         return ""
 
 
-def fitted_sensors(
+def match_sensors(
     read: Sensors, file: Path, site: Site, alignment: Alignment, wanted: Collection[str] | None
 ) -> Placed:
     """Return the sensors of a file that a plugin has read, those that fit the structure.
@@ -280,7 +280,7 @@ def fitted_sensors(
             ratio = size_of(test.every) / test.size
             why = f"in m the sensors would span {ratio:.3g} times the structure."
             told = (f"{file.name}: coordinates were taken in {unit}, since {why}", *told)
-        told = (*told, *told_of([match for match, _ in kept], file.name))
+        told = (*told, *describe_matches([match for match, _ in kept], file.name))
     if not kept:
         expected = "nodes with coordinates, in a direction that the model has"
         raise InputError("no sensor fits the structure", file=file, expected=expected)
@@ -291,7 +291,7 @@ def fitted_sensors(
     return Placed(sensors, found, told, scale * alignment.turn)
 
 
-def told_of(matches: Sequence[Match], file: str) -> tuple[str, ...]:
+def describe_matches(matches: Sequence[Match], file: str) -> tuple[str, ...]:
     """Return what to say of sensors that were moved to the structure, in one sentence.
 
     Arguments:

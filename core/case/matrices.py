@@ -23,7 +23,7 @@ from femubench.core.case.nodes import MatrixGeometry, read_dofs
 from femubench.core.case.schema import LARGEST, GroupSpec, MatricesSpec
 from femubench.core.errors import FemubenchError, InputError, ModelError
 from femubench.core.fem.model import Model
-from femubench.core.files import MIB, limited_memory, open_regular
+from femubench.core.files import MIB, limit_memory, open_regular
 from femubench.core.roles import Reader
 from femubench.core.typing import SparseArray
 
@@ -94,7 +94,7 @@ def read_matrix(file: Path, size: int, readers: Sequence[Reader]) -> SparseArray
     Raises:
         InputError: when it is not real, square, of that size, finite and symmetric.
     """
-    return checked(matrix_of(file, readers, size), file, size)
+    return check_symmetric(matrix_of(file, readers, size), file, size)
 
 
 def matrix_of(file: Path, readers: Sequence[Reader], size: int | None = None) -> SparseArray:
@@ -125,7 +125,7 @@ def is_matrix_market(file: Path) -> bool:
     return start.startswith(b"%%") or not start.lstrip()[:1].isdigit()
 
 
-def checked(matrix: SparseArray, file: Path, size: int) -> SparseArray:
+def check_symmetric(matrix: SparseArray, file: Path, size: int) -> SparseArray:
     """Return what a file gave as a symmetric matrix.
 
     Raises:
@@ -171,7 +171,7 @@ def reading_with(reader: Reader, file: Path) -> Iterator[None]:
     """
     size = file.stat().st_size if file.is_file() else 0
     try:
-        with limited_memory(_MEMORY + _PER_BYTE * size):
+        with limit_memory(_MEMORY + _PER_BYTE * size):
             yield
     except ModelError as error:
         raise InputError(

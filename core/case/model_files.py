@@ -18,7 +18,7 @@ from femubench.core.case.faults import BadKey, at_key
 from femubench.core.case.files import CASE_FILE, LARGEST_CASE, CaseFiles
 from femubench.core.case.frame_tables import FrameTables
 from femubench.core.case.matrices import (
-    checked,
+    check_symmetric,
     is_matrix_market,
     matrix_of,
     reader_of,
@@ -85,10 +85,10 @@ def read_as_it_is(paths: ModelFiles, readers: Sequence[Reader]) -> Model:
     model = _read(paths, readers)
     if not isinstance(model.geometry, MatrixGeometry):
         return model
-    mass = checked(model.mass, paths.mass or paths.model, model.size)
-    stiffness = checked(model.stiffness, paths.model, model.size)
+    mass = check_symmetric(model.mass, paths.mass or paths.model, model.size)
+    stiffness = check_symmetric(model.stiffness, paths.model, model.size)
     groups, mass_groups = (
-        {name: checked(part, paths.model, model.size) for name, part in parts.items()}
+        {name: check_symmetric(part, paths.model, model.size) for name, part in parts.items()}
         for parts in (model.groups, model.mass_groups)
     )
     found = replace(model, mass=mass, stiffness=stiffness, groups=groups, mass_groups=mass_groups)

@@ -114,7 +114,7 @@ def with_default_std(shapes: FloatArray, std: FloatArray, share: float) -> Float
     return np.where(np.isnan(std), default[None, :], std)
 
 
-def fitted_modes(read: Measurement, file: Path, sensors: Sensors, share: float) -> Measurement:
+def match_modes(read: Measurement, file: Path, sensors: Sensors, share: float) -> Measurement:
     """Return the modes of a file that a plugin has read, on the sensors of the case.
 
     Raises:
@@ -140,7 +140,7 @@ def fitted_modes(read: Measurement, file: Path, sensors: Sensors, share: float) 
     )
 
 
-def seen_at(measurement: Measurement, sensors: Sensors) -> Measurement:
+def observe_at(measurement: Measurement, sensors: Sensors) -> Measurement:
     """Return a measurement as other sensors would have seen it.
 
     What was measured at the same point along the same axis is taken over, turned where the axis
@@ -164,7 +164,7 @@ def seen_at(measurement: Measurement, sensors: Sensors) -> Measurement:
     return replace(measurement, sensors=sensors, shapes=shapes, shape_std=std)
 
 
-def measured_only(sensors: Sensors, shapes: FloatArray) -> Sensors:
+def select_measured(sensors: Sensors, shapes: FloatArray) -> Sensors:
     """Return the sensors at which some mode has a shape."""
     keep = [int(i) for i in np.flatnonzero(np.isfinite(shapes).any(axis=1))]
     labels, directions = (

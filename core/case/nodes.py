@@ -131,7 +131,7 @@ class MatrixGeometry:
         shape = (len(sensors), len(self.dofs))
         return sp.csr_array((axes[row, column], (row, np.array(found, dtype=int))), shape=shape)
 
-    def attached(
+    def assemble_attachments(
         self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]
     ) -> tuple[SparseArray, SparseArray]:
         """Return the mass and stiffness that attachments add, sparse (n, n) each.

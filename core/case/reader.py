@@ -17,16 +17,16 @@ from femubench.core.case.faults import BadKey, KeyPath, at_key
 from femubench.core.case.files import LARGEST_CASE, CaseFiles
 from femubench.core.case.frame_tables import FrameTables
 from femubench.core.case.frames import FrameSite, Site, attachments, frame_of
-from femubench.core.case.matching import Alignment, Placed, fitted_sensors
+from femubench.core.case.matching import Alignment, Placed, match_sensors
 from femubench.core.case.matrices import model_of_matrices, reader_of, reading_with
 from femubench.core.case.model_files import model_of_file, remarks_of
 from femubench.core.case.modes import (
     FREQUENCY_STD,
     NO_SENSORS,
-    fitted_modes,
-    measured_only,
+    match_modes,
+    observe_at,
     read_modes,
-    seen_at,
+    select_measured,
 )
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.repeats import with_covariance, with_repeats
@@ -34,7 +34,7 @@ from femubench.core.case.response_files import read_responses
 from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, ModificationSpec
 from femubench.core.case.sensors import read_sensors
 from femubench.core.case.tables import SUFFIXES, read_table
-from femubench.core.case.toml_text import located, spec_of
+from femubench.core.case.toml_text import locate_fault, spec_of
 from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
@@ -88,7 +88,7 @@ def read_case(
     except BadKey as fault:
         place = tables.place(fault.path)
         if place is None:
-            raise located(fault, text, files.case_file) from None
+            raise locate_fault(fault, text, files.case_file) from None
         file, line, key = place
         raise InputError(
             fault.what, file=file, line=line, key=key, expected=fault.expected
@@ -148,11 +148,11 @@ class _Building:
         spec = self.spec.model
         with at_key("model"), np.errstate(all="ignore"):
             if isinstance(spec, FileSpec):
-                model = known_free(model_of_file(spec, self.files, self.readers), spec.free)
+                model = mark_free(model_of_file(spec, self.files, self.readers), spec.free)
                 self.notes |= dict.fromkeys(remarks_of(spec, self.files, self.readers))
                 return model
             if not isinstance(spec, FrameSpec):
-                return known_free(model_of_matrices(spec, self.files, self.readers), spec.free)
+                return mark_free(model_of_matrices(spec, self.files, self.readers), spec.free)
             frame = frame_of(spec)
             try:
                 model = Model.of(frame)
@@ -200,7 +200,7 @@ class _Building:
         sensors, from_plugin = self.sensors(site)
         measurement = self.modes(("measurement", "modes"), spec.modes, sensors)
         if from_plugin:
-            measured = measured_only(sensors, measurement.shapes)
+            measured = select_measured(sensors, measurement.shapes)
             measurement = self.modes(("measurement", "modes"), spec.modes, measured)
         measurement = self.with_scatter(measurement)
         listed = [
@@ -264,8 +264,8 @@ class _Building:
         own = sensors
         if spec.sensors is not None:
             path, read = self.reading(("reference", "sensors"), spec.sensors)
-            own = self.placed(path, read, site, spec.modes).sensors
-        found = seen_at(self.modes(("reference", "modes"), spec.modes, own), sensors)
+            own = self.place_sensors(path, read, site, spec.modes).sensors
+        found = observe_at(self.modes(("reference", "modes"), spec.modes, own), sensors)
         key = "modes" if spec.used is None else "used"
         listed = [(("reference", key), number) for number in self.reference_used]
         check_labels(listed, found, spec.modes)
@@ -279,7 +279,7 @@ class _Building:
         path, read = self.reading(("measurement", key), name)
         if spec.sensors is None and (read is None or not len(read.sensors)):
             return NO_SENSORS, False
-        found = self.placed(path, read, site, spec.modes)
+        found = self.place_sensors(path, read, site, spec.modes)
         self.matches = found.matches
         reader: Any = None if read is None else reader_of(path, self.readers)
         if hasattr(reader, "read_outline"):
@@ -287,7 +287,7 @@ class _Building:
                 self.lines = np.asarray(reader.read_outline(path).lines @ found.turn.T)
         return found.sensors, read is not None
 
-    def placed(self, path: Path, read: Measurement | None, site: Site, modes: str) -> Placed:
+    def place_sensors(self, path: Path, read: Measurement | None, site: Site, modes: str) -> Placed:
         """Return the sensors of a file and where each was taken to sit."""
         spec = self.spec.measurement
         with at_key("measurement", "frame"):  # of axes
@@ -296,7 +296,7 @@ class _Building:
             found = read_sensors(path, site, alignment)
         else:
             labels = self.labels(modes)
-            found = fitted_sensors(read.sensors, path, site, alignment, labels)
+            found = match_sensors(read.sensors, path, site, alignment, labels)
         self.notes |= dict.fromkeys(found.told)
         return found
 
@@ -311,7 +311,7 @@ class _Building:
         if read is None:
             found = read_modes(path, sensors, share)
         else:
-            found = fitted_modes(read, path, sensors, share)
+            found = match_modes(read, path, sensors, share)
         found, told = with_floor(found, name, FREQUENCY_STD, share)
         self.notes |= dict.fromkeys(told)
         return found
@@ -342,7 +342,7 @@ class _Building:
         return Modification(spec.name, masses, springs, measurement)
 
 
-def known_free(model: Model, free: bool) -> Model:
+def mark_free(model: Model, free: bool) -> Model:
     """Return a model of which it is known whether it hangs free.
 
     Raises:

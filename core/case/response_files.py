@@ -213,7 +213,7 @@ def responses_npz(measured: FrequencyResponses) -> bytes:
     return held.getvalue()
 
 
-def located(measured: Responses, file: Path) -> Responses:
+def locate_sensors(measured: Responses, file: Path) -> Responses:
     """Return responses whose sensors lie where a table says.
 
     Arguments:

@@ -12,7 +12,7 @@ from femubench.core.case.matching import (
     Alignment,
     Placed,
     Placement,
-    told_of,
+    describe_matches,
 )
 from femubench.core.case.tables import RESERVED, CsvRow, parse_place, read_table
 from femubench.core.errors import InputError
@@ -78,7 +78,7 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
     xyz = np.array([match.xyz for match in matches], dtype=float)
     sensors = Sensors(tuple(labels), xyz, tuple(directions))
     turn = (alignment.unit or 1.0) * alignment.turn
-    return Placed(sensors, matches, (*close, *told_of(matches, file.name)), turn)
+    return Placed(sensors, matches, (*close, *describe_matches(matches, file.name)), turn)
 
 
 def _point_at(row: CsvRow, direction: str, site: Site) -> Vector:

@@ -10,7 +10,14 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from femubench.core.case.faults import BadKey, KeyPath, dotted, first_fault, key_lines, line_of
+from femubench.core.case.faults import (
+    BadKey,
+    KeyPath,
+    first_fault,
+    join_key_path,
+    key_lines,
+    line_of,
+)
 from femubench.core.errors import InputError
 
 _Spec = TypeVar("_Spec", bound=BaseModel)
@@ -55,9 +62,9 @@ def spec_of(
         raise InputError("a number is too long", file=file, expected="valid TOML") from None
 
 
-def located(fault: BadKey, text: str, file: Path) -> InputError:
+def locate_fault(fault: BadKey, text: str, file: Path) -> InputError:
     """Return a fault with its file, line and key."""
-    key = dotted(fault.path) or None
+    key = join_key_path(fault.path) or None
     line = key_line(text, fault.path)
     return InputError(fault.what, file=file, line=line, key=key, expected=fault.expected)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.core.case.frame_keys import described_frame
+from femubench.core.case.frame_keys import describe_frame
 from femubench.core.case.matrix_files import matrices_of
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.schema import LengthUnit
@@ -57,7 +57,7 @@ def _converted(model: Model, length: float, force: float) -> Model:
 
     mass, stiffness = matrices_of(model)
     if model.structure is not None:
-        new = Model.of(_frame(described_frame(model.structure), length, force))
+        new = Model.of(_frame(describe_frame(model.structure), length, force))
         own = model.structure.matrices()  # an update may have changed the matrices themselves
         more_mass, more_stiffness = turned(mass - own[0]), turned(stiffness - own[1])
         return replace(new, mass=new.mass + more_mass, stiffness=new.stiffness + more_stiffness)

@@ -15,15 +15,15 @@ import numpy as np
 
 from femubench.core.case.case import BEAM_SHARE, TOLERANCE, Case, Modification
 from femubench.core.case.deviations import with_floor
-from femubench.core.case.faults import BadKey, dotted
+from femubench.core.case.faults import BadKey, join_key_path
 from femubench.core.case.files import CASE_FILE
 from femubench.core.case.frame_keys import (
     Keys,
     Known,
-    described_frame,
+    describe_frame,
     frame_keys,
     keys_of,
-    known_from,
+    read_known,
 )
 from femubench.core.case.frame_tables import MANY
 from femubench.core.case.matrix_files import (
@@ -105,24 +105,26 @@ def check_written(fresh: Path, folder: Path, wanted: Case) -> None:
         back = read_case(fresh)
     except InputError as error:
         what = error.what.replace(str(fresh), str(folder))
-        raise refused(folder, what, error.key, error.expected) from None
+        raise refuse_case(folder, what, error.key, error.expected) from None
     if not back.model.has_matrices(*matrices_of(wanted.model), _SAME_MATRIX):
         what = "no keys of a frame give the matrices of this model"
-        raise refused(folder, what, "model", "parameters that keys can say")
+        raise refuse_case(folder, what, "model", "parameters that keys can say")
     for part in _SETTINGS:
         if getattr(back, part) != getattr(wanted, part):
             what = f"{getattr(wanted, part)!r} does not read back"
-            raise refused(folder, what, part, f"not {getattr(back, part)!r}")
-    share = known_from(fresh / CASE_FILE).shape_std or SHAPE_STD
+            raise refuse_case(folder, what, part, f"not {getattr(back, part)!r}")
+    share = read_known(fresh / CASE_FILE).shape_std or SHAPE_STD
     if not _same_responses(wanted.frfs, back.frfs):
-        raise refused(folder, "the frequency responses do not read back", "frfs", "finite numbers")
+        raise refuse_case(
+            folder, "the frequency responses do not read back", "frfs", "finite numbers"
+        )
     first, second = (_measurements(case) for case in (wanted, back))
     for one, other in zip(first, second, strict=True):
         # Deviations of next to nothing are raised when they are read.
         column = _differing(with_floor(one, "", FREQUENCY_STD, share)[0], other)
         if column is not None:
             what = f"the {column.replace('_', ' ')} of a measurement does not read back"
-            raise refused(folder, what, "measurement", "finite numbers within their bounds")
+            raise refuse_case(folder, what, "measurement", "finite numbers within their bounds")
 
 
 def _same_responses(one: FrequencyResponses | None, other: FrequencyResponses | None) -> bool:
@@ -164,7 +166,7 @@ def _differing(one: Measurement, other: Measurement) -> str | None:
     return None
 
 
-def refused(folder: Path, what: str, key: str | None, expected: str | None) -> InputError:
+def refuse_case(folder: Path, what: str, key: str | None, expected: str | None) -> InputError:
     """Return the error of a case that no folder can hold."""
     return InputError(f"cannot be written: {what}", file=folder, key=key, expected=expected)
 
@@ -202,12 +204,12 @@ def write_case(
     lines = comment.splitlines() if isinstance(comment, str) else comment
     flat = [line for entry in lines for line in entry.splitlines() or [""]]
     try:
-        files = case_files(wanted, known_from(case.folder / CASE_FILE), flat)
+        files = case_files(wanted, read_known(case.folder / CASE_FILE), flat)
     except BadKey as fault:
-        raise refused(folder, fault.what, dotted(fault.path), fault.expected) from None
+        raise refuse_case(folder, fault.what, join_key_path(fault.path), fault.expected) from None
     except UnicodeEncodeError as error:
         what = f"{error.object[:40]!r} is not a text"
-        raise refused(folder, what, None, "characters of Unicode") from None
+        raise refuse_case(folder, what, None, "characters of Unicode") from None
     with new_folder(folder) as fresh:
         for file, content in files.items():
             (fresh / file).parent.mkdir(exist_ok=True)
@@ -299,7 +301,7 @@ def _model_part(case: Case, known: Known) -> tuple[Keys, Files, tuple[Modificati
     """Return the table `[model]`, its files, and the modifications at the places of that model."""
     model = case.model
     if model.structure is not None and not _matrices_changed(model):
-        frame = described_frame(model.structure)
+        frame = describe_frame(model.structure)
         keys = frame_keys(frame, known)
         return keys, frame_files(_model_of(frame)), case.modifications
     matrices = matrices_of(model)

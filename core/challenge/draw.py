@@ -12,7 +12,7 @@ from zlib import crc32
 import numpy as np
 
 from femubench.core.case.case import TOLERANCE, Case, Modification
-from femubench.core.challenge.measuring import QUALITY, Seen, chi2, record, see, weighed
+from femubench.core.challenge.measuring import QUALITY, Seen, add_mass, chi2, record, see
 from femubench.core.challenge.outside import OUTSIDE, SENSOR_FAULTS
 from femubench.core.challenge.structures import Specimen, structure_named
 from femubench.core.challenge.truth import (
@@ -24,10 +24,10 @@ from femubench.core.challenge.truth import (
     Truth,
     element_of,
     finer,
-    scattered,
+    scatter_elements,
     with_causes,
 )
-from femubench.core.challenge.visibility import unexplained
+from femubench.core.challenge.visibility import find_unexplained
 from femubench.core.change.parameter import Parameter
 from femubench.core.effect.frame_effect import FrameEffect
 from femubench.core.effect.sizes import Site, Size
@@ -66,7 +66,7 @@ class Candidate:
         """Return the model of the frame."""
         return Model.of(self.frame)
 
-    def seen(self, model: Model, specimen: Specimen) -> Seen:
+    def observe(self, model: Model, specimen: Specimen) -> Seen:
         """Return what the sensors show of a model."""
         seen = see(model, specimen)
         if self.sensors is None:
@@ -151,7 +151,7 @@ class Candidates:
         """Return the truth that has these causes and the scatter of the draw."""
         frame = finer(self.specimen.frame)
         if self.scatter > 0.0:
-            frame = scattered(frame, self.scatter, np.random.default_rng(self.scatter_words))
+            frame = scatter_elements(frame, self.scatter, np.random.default_rng(self.scatter_words))
         return Candidate(with_causes(frame, causes, self.effects), causes)
 
     def nothing(self) -> Candidate:
@@ -196,7 +196,7 @@ class Candidates:
         ideal = self.ideal(drawn)
         if chi2(ideal, self.clean) < VISIBLE:
             raise ModelError("the cause is too small")
-        excess = unexplained(self.specimen.model, ideal, self.effects.values(), TOLERANCE)
+        excess = find_unexplained(self.specimen.model, ideal, self.effects.values(), TOLERANCE)
         if excess < VISIBLE:
             raise ModelError("an effect of the catalogue imitates the cause")
         return replace(drawn, excess=excess)
@@ -204,7 +204,7 @@ class Candidates:
     def ideal(self, drawn: Candidate) -> Measurement:
         """Return the used data without noise."""
         quality = QUALITY[self.kind]
-        seen = drawn.seen(drawn.model, self.specimen)
+        seen = drawn.observe(drawn.model, self.specimen)
         return record(
             seen, self.specimen, self.kind, quality.used, None, shapes_up_to=quality.shapes
         )
@@ -282,7 +282,7 @@ def registered_effects(*named: str) -> Effects:
     """
     from femubench.core.plugin import loader
 
-    found = {effect.name: effect for effect in loader.registered_effects()}
+    found = {effect.name: effect for effect in loader.list_effects()}
     if not set(named) <= set(found):
         offered = loader.load_plugins().effects
         found |= {name: offered[name] for name in named if name in offered}
@@ -349,7 +349,7 @@ def _accepted(candidates: Candidates, hidden: Hidden, effect: str | None) -> tup
     for _ in range(_ATTEMPTS):
         try:
             drawn = draws[hidden]()
-            seen = drawn.seen(drawn.model, candidates.specimen)
+            seen = drawn.observe(drawn.model, candidates.specimen)
             candidates.check(seen)
         except (ModelError, IndexError):
             continue
@@ -364,8 +364,8 @@ def _case(candidates: Candidates, drawn: Candidate, seen: Seen, rng: np.random.G
     count = quality.used + quality.held_out
     measurement = record(seen, specimen, kind, count, rng, shapes_up_to=quality.shapes)
     if kind != "C" and rng.random() < _WEIGHED:
-        measurement = weighed(measurement, seen.mass, rng)
-    changed = drawn.seen(drawn.model.attach(*specimen.change), specimen)
+        measurement = add_mass(measurement, seen.mass, rng)
+    changed = drawn.observe(drawn.model.attach(*specimen.change), specimen)
     modified = record(changed, specimen, kind, quality.modified, rng)
     name = f"blind-{hashlib.sha256(measurement.frequencies.tobytes()).hexdigest()[:8]}"
     return Case(

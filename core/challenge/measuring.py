@@ -146,7 +146,7 @@ def record(
     )
 
 
-def weighed(measurement: Measurement, mass: float, rng: np.random.Generator) -> Measurement:
+def add_mass(measurement: Measurement, mass: float, rng: np.random.Generator) -> Measurement:
     """Return the measurement with the mass of the structure, as a scale shows it."""
     value = mass * (1.0 + MASS_STD * float(rng.standard_normal()))
     return replace(measurement, total_mass=(value, MASS_STD * value))

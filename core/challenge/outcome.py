@@ -122,7 +122,7 @@ def outcome(truth: KnownCase, record: Record, same: Same) -> str:
     return "one of two" if half else "wrong"
 
 
-def beside(record: Record) -> str:
+def describe_structure(record: Record) -> str:
     """Return what is said of the structure beside the faults of data and input."""
     verdict = str(record["verdict"])
     if verdict not in ("named", "ambiguous"):

@@ -66,7 +66,7 @@ def sliding_joint(frame: Frame, _: int, rng: np.random.Generator) -> Outside:
     return Outside(text, replace(frame, joint_springs=(*frame.joint_springs, spring)))
 
 
-def displaced_joint(frame: Frame, _: int, rng: np.random.Generator) -> Outside:
+def displace_joint(frame: Frame, _: int, rng: np.random.Generator) -> Outside:
     """Move a joint within the plane of the frame: a wrong drawing."""
     joint, (member, *_rest) = _pick_end(frame, rng)
     # The axes in which the structure extends, which are not those in which it moves.
@@ -82,7 +82,7 @@ def displaced_joint(frame: Frame, _: int, rng: np.random.Generator) -> Outside:
     return Outside(text, replace(frame, joints=joints))
 
 
-def swapped_sensors(frame: Frame, sensors: int, rng: np.random.Generator) -> Outside:
+def swap_sensors(frame: Frame, sensors: int, rng: np.random.Generator) -> Outside:
     """Exchange the cables of two sensors."""
     first, second = (int(i) for i in rng.choice(sensors, 2, replace=False))
     matrix = np.eye(sensors)
@@ -98,7 +98,7 @@ def wrong_gain(frame: Frame, sensors: int, rng: np.random.Generator) -> Outside:
     return Outside(f"sensor {sensor + 1} has a gain of {gain:g}", frame, matrix)
 
 
-def held_rotation(frame: Frame, _: int, rng: np.random.Generator) -> Outside:
+def hold_rotation(frame: Frame, _: int, rng: np.random.Generator) -> Outside:
     """Hold a joint by a rotational spring to ground."""
     joint, (member, *_rest) = _pick_end(frame, rng)
     rotations = [name for name in ACTIVE[frame.plane] if name.startswith("r")]
@@ -110,7 +110,7 @@ def held_rotation(frame: Frame, _: int, rng: np.random.Generator) -> Outside:
     return Outside(text, replace(frame, springs=(*frame.springs, spring)))
 
 
-def tapered_member(frame: Frame, _: int, rng: np.random.Generator) -> Outside:
+def taper_member(frame: Frame, _: int, rng: np.random.Generator) -> Outside:
     """Let the stiffness of a member fall along it from 1.4 to 0.6 of the nominal one."""
     member = frame.members[int(rng.integers(len(frame.members)))]
     scale = np.linspace(1.4, 0.6, member.elements)
@@ -142,11 +142,11 @@ def uneven_joint(frame: Frame, _: int, rng: np.random.Generator) -> Outside:
 
 OUTSIDE: Mapping[str, Drawing] = {
     "sliding-joint": sliding_joint,
-    "displaced-joint": displaced_joint,
-    "swapped-sensors": swapped_sensors,
+    "displaced-joint": displace_joint,
+    "swapped-sensors": swap_sensors,
     "wrong-gain": wrong_gain,
-    "held-rotation": held_rotation,
-    "tapered-member": tapered_member,
+    "held-rotation": hold_rotation,
+    "tapered-member": taper_member,
     "uneven-joint": uneven_joint,
 }
 SENSOR_FAULTS = frozenset({"swapped-sensors", "wrong-gain"})

@@ -116,7 +116,7 @@ def with_causes(
     return frame
 
 
-def scattered(frame: Frame, scatter: float, rng: np.random.Generator) -> Frame:
+def scatter_elements(frame: Frame, scatter: float, rng: np.random.Generator) -> Frame:
     """Return the finer frame with the stiffness and mass of every nominal element scattered.
 
     Arguments:

@@ -24,7 +24,7 @@ _Finding = Annotated[str, Meta(pattern=r"^[^@]+@(?s:.+)$")]
 _ChiSquare = Annotated[float, Meta(ge=0.0, le=1e300)]
 
 
-def held(name: str) -> bool:
+def is_held(name: str) -> bool:
     """Tell whether a truth belongs to the half from which no figure of development is taken."""
     return hashlib.sha256(name.encode()).digest()[0] % 2 == 1
 
@@ -90,7 +90,7 @@ class KnownCase:
     @property
     def held(self) -> bool:
         """Tell whether it is in the held half."""
-        return held(self.name)
+        return is_held(self.name)
 
     def __str__(self) -> str:
         return " + ".join(map(str, self.causes)) or "nothing"
@@ -149,7 +149,7 @@ def read_truth(folder: Path) -> KnownCase:
     except tomllib.TOMLDecodeError as error:
         raise InputError(str(error), file=file, expected="valid TOML") from None
     table = read_plain(_TruthTable, content, file=file)
-    kind, half = table.kind, held(folder.name)
+    kind, half = table.kind, is_held(folder.name)
     if kind not in KINDS:
         expected = f"one of {', '.join(KINDS)}"
         raise InputError(f"unknown kind {kind!r}", file=file, key="kind", expected=expected)

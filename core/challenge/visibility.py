@@ -12,10 +12,10 @@ from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.effect.frame_effect import FrameEffect
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
-from femubench.core.fit.extended_model import agreed
+from femubench.core.fit.extended_model import check_joint_fit
 from femubench.core.fit.modal_fit import Problem, fit
 from femubench.core.fit.projection import Projection
-from femubench.core.inference.examine import posed
+from femubench.core.inference.examine import pose_problem
 from femubench.core.inference.search import Search
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
@@ -39,7 +39,7 @@ def delta_chi2(case: Case, truth: Truth, effects: Mapping[str, FrameEffect]) -> 
     known = hypotheses_of(case.model, dict.fromkeys(present))
     wanted = {(cause.effect, cause.place) for cause in truth.causes}
     true = [h for h in known if (h.effect.name, h.place) in wanted]
-    problem, _ = posed(case.model, case.used_measurement(), true, case.tolerance)
+    problem, _ = pose_problem(case.model, case.used_measurement(), true, case.tolerance)
     whole = _chi2(problem, truth.causes)
     return tuple(
         _chi2(problem, [other for other in truth.causes if other is not cause]) - whole
@@ -47,7 +47,7 @@ def delta_chi2(case: Case, truth: Truth, effects: Mapping[str, FrameEffect]) -> 
     )
 
 
-def unexplained(
+def find_unexplained(
     model: Model, ideal: Measurement, effects: Iterable[Effect], tolerance: float
 ) -> float:
     """Return the chi-square that the best single effect of a catalogue leaves of ideal data.
@@ -56,7 +56,7 @@ def unexplained(
     cause of its own to them.
     """
     known = tuple(effects)
-    problem, _ = posed(model, ideal, hypotheses_of(model, known), tolerance)
+    problem, _ = pose_problem(model, ideal, hypotheses_of(model, known), tolerance)
     explanations, _ = Search(problem, known, pairs=False).run()
     return min(explanation.chi2 for explanation in explanations)
 
@@ -78,5 +78,5 @@ def _chi2(problem: Problem, causes: Sequence[HiddenCause]) -> float:
     found = fit(problem, parts, np.array(start))
     if found is None:
         raise ModelError("the hidden causes make the mass indefinite")
-    borne = agreed(found) if len(parts) > 1 else found
+    borne = check_joint_fit(found) if len(parts) > 1 else found
     return (found if borne is None else borne).state.chi2

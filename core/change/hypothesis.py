@@ -11,10 +11,10 @@ import numpy as np
 import scipy.linalg as la
 
 from femubench.core.change.change import Change
-from femubench.core.change.tabulated import change_of, placed_change
+from femubench.core.change.tabulated import change_of, place_change
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import (
-    cached_by_model,
+    cache_by_model,
     enough_modes,
     modes_of,
     once_for,
@@ -102,7 +102,7 @@ class Hypothesis:
             second = np.linspace(*parameters[1].range, 14)[1:]
             return np.array(list(product(first, second)))
         sizes = _SINGLE if len(parameters) == 1 else _DOUBLE
-        return combined([_points(parameter, sizes) for parameter in parameters])
+        return combine_points([_points(parameter, sizes) for parameter in parameters])
 
     @cached_property
     def grid_factors(self) -> FloatArray:
@@ -171,7 +171,7 @@ def _magnitudes(
     return found
 
 
-def combined(points: Sequence[Sequence[float]]) -> FloatArray:
+def combine_points(points: Sequence[Sequence[float]]) -> FloatArray:
     """Return points of one parameter after the other in all combinations, (g, k).
 
     From three parameters on, each alone, the others in the middle of theirs: as many as there are.
@@ -232,7 +232,7 @@ def _hypotheses(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ..
         # A rod has no bending stiffness by which a rotational spring could be measured.
         places = {p: own for p, own in each.items() if all(one.scale > 0.0 for one in own)}
         own = [
-            Hypothesis(effect, placed_change(effect, model, p, own), len(places))
+            Hypothesis(effect, place_change(effect, model, p, own), len(places))
             for p, own in places.items()
         ]
         if model.free:
@@ -257,7 +257,7 @@ def _holds(model: Model, hypothesis: Hypothesis) -> bool:
     return bool(np.abs(body).max(initial=0.0) > least)
 
 
-@cached_by_model
+@cache_by_model
 def _rigid_motions(model: Model) -> tuple[FloatArray, float]:
     """Return the motions of a model as a rigid body, mass-normalised, and an energy like none."""
     modes = modes_of(model, enough_modes(model, 1))

@@ -14,9 +14,9 @@ from femubench.core.change.terms import Term, sparse_matrix, weigh_term
 from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.model import Model
 from femubench.core.fem.model_parameters import (
+    find_updated_mass,
     mass_slopes,
     matrix_slopes,
-    updated_mass,
     with_values,
 )
 from femubench.core.fem.parameters import Property
@@ -170,7 +170,9 @@ class ParametricModel:
         """
         # A frame weighs what its members weigh; matrices have the terms in them.
         framed = self.terms and model.structure is not None
-        return updated_mass(model) + (float(self.factors(x) @ self._weights) if framed else 0.0)
+        return find_updated_mass(model) + (
+            float(self.factors(x) @ self._weights) if framed else 0.0
+        )
 
     def mass_slopes(self, x: FloatArray, model: Model) -> FloatArray:
         """Return d mass / dx in kg, that of a factor about its present value, (p,)."""

@@ -30,21 +30,21 @@ def change_of(effect: Effect, model: Model, place: str) -> Change:
     Raises:
         ModelError: as `tabulated_change`.
     """
-    return placed_change(effect, model, place, tuple(effect.parameters(model, place)))
+    return place_change(effect, model, place, tuple(effect.parameters(model, place)))
 
 
-def placed_change(
+def place_change(
     effect: Effect, model: Model, place: str, parameters: tuple[EffectParameter, ...]
 ) -> Change:
     """Return the same with parameters that are known."""
     own = getattr(effect, "change", None)
     made: Change = (
-        own(model, place) if callable(own) else tabulated_change(effect, model, place, parameters)
+        own(model, place) if callable(own) else tabulate_change(effect, model, place, parameters)
     )
     return replace(made, name=effect.name, places=(place,), parameters=parameters)
 
 
-def tabulated_change(
+def tabulate_change(
     effect: Effect, model: Model, place: str, parameters: Sequence[EffectParameter]
 ) -> Change:
     """Return the change of an effect that does not state one, interpolated between values.

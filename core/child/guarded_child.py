@@ -15,7 +15,7 @@ from typing import Any, Literal
 import psutil
 
 from femubench.core.child.confinement import LENGTH_BYTES, READY, Confinement, object_frames
-from femubench.core.child.limits import Limits, spoken_bytes
+from femubench.core.child.limits import Limits, format_bytes
 from femubench.core.child.namespaces import FOLDER
 from femubench.core.child.server import NUMBER, end_group, end_server, fork_server
 
@@ -178,10 +178,10 @@ class GuardedChild:
             answer = bytes(self._received[LENGTH_BYTES : self._length])
             return Ending("answer", answer, seconds=seconds)
         if self._printed > limits.output:
-            what = f"printed more than {spoken_bytes(limits.output)}"
+            what = f"printed more than {format_bytes(limits.output)}"
             return Ending("output", reason=what, seconds=seconds)
         if self._length > limits.answer + LENGTH_BYTES:
-            what = f"its result is larger than {spoken_bytes(limits.answer)}"
+            what = f"its result is larger than {format_bytes(limits.answer)}"
             return Ending("answer-size", reason=what, seconds=seconds)
         if ended and self.code is None:
             what = "the process from which all workers are started was ended"
@@ -254,7 +254,7 @@ class GuardedChild:
         if limits.memory is not None:
             used = memory_of(processes, f"/proc/{self.pid}/root" if walled else None)
             if used > limits.memory + _BASE:
-                return f"used {spoken_bytes(used)} of memory, allowed {spoken_bytes(limits.memory)}"
+                return f"used {format_bytes(used)} of memory, allowed {format_bytes(limits.memory)}"
         return None
 
     def kill(self) -> None:

@@ -53,7 +53,7 @@ def memory_share(workers: int, given: int | None = None) -> int:
     return max(int(_SHARE * total / workers), LEAST)
 
 
-def spoken_bytes(count: float) -> str:
+def format_bytes(count: float) -> str:
     """Return a size as one would type it: ``512 MiB``, ``1.5 GiB``."""
     for unit in ("B", "KiB", "MiB"):
         if count < 1024.0:

@@ -22,7 +22,7 @@ from typing import Literal
 
 from femubench.core.child import namespaces
 from femubench.core.child.namespaces import FOLDER, Walls, go_apart
-from femubench.core.child.syscall_filter import known_processor, refuse_system_calls
+from femubench.core.child.syscall_filter import knows_processor, refuse_system_calls
 from femubench.core.errors import InputError
 from femubench.core.schema.run_options import Sandbox
 
@@ -86,7 +86,7 @@ def _unfit() -> str | None:
     numbers = [int(part) for part in release.split(".")[:2] if part.isdigit()]
     if tuple(numbers) < _OLDEST:
         return f"Linux {release} is older than 5.14"
-    if not known_processor():
+    if not knows_processor():
         return f"the system calls of {platform.machine()} are not known"
     return None
 

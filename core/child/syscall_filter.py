@@ -59,7 +59,7 @@ _COMMON = {
 }
 
 
-def known_processor() -> bool:
+def knows_processor() -> bool:
     """Tell whether the numbers of this processor's system calls are known."""
     return platform.machine() in _OWN and sys.byteorder == "little" and sys.maxsize > 2**32
 

@@ -14,7 +14,7 @@ from femubench.core.cli.registry import plugins_for
 from femubench.core.errors import FemubenchError, InputError
 from femubench.core.files import check_new, write_atomically
 from femubench.core.library.cases import one_case
-from femubench.core.plugin.validation import chosen
+from femubench.core.plugin.validation import choose_names
 
 if TYPE_CHECKING:
     from femubench.core.diagnosis.result import Diagnosis
@@ -99,8 +99,8 @@ def diagnose(
     if output is not None:
         check_new(output)
     names = None if effects is None else [word.strip() for word in effects.split(",")]
-    chosen("effect", names or (), plugins.effects)
-    chosen("plugin", others, (plugin.plugin for plugin in plugins.loaded))
+    choose_names("effect", names or (), plugins.effects)
+    choose_names("plugin", others, (plugin.plugin for plugin in plugins.loaded))
     read = one_case(case, plugins)
     from femubench.core.diagnosis.serial import diagnosis_to_json
     from femubench.core.inference.settings import decisions_from

@@ -85,12 +85,12 @@ def telling(
 
 def _shown(store: Store, run: str, screen: Reporter | None) -> int | None:
     """Show what there is of a run; return how many of its jobs are done, None where unknown."""
-    from femubench.core.library.report import rendered, text_of
+    from femubench.core.library.report import render_report, text_of
 
     # What keeps the store from being read is told by what ended the run.
     with suppress(FemubenchError, OSError):
         found = store.load(run)
         if screen is not None and found.results:
-            click.echo("\n" + text_of(screen, rendered(screen, found)))
+            click.echo("\n" + text_of(screen, render_report(screen, found)))
         return len(found.results) + len(found.beside)
     return None

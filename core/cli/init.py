@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from femubench.core.cli import options
-from femubench.core.cli.registry import plugins_for, wrapped
+from femubench.core.cli.registry import plugins_for, wrap_text
 from femubench.core.errors import InputError, ModelError
 
 if TYPE_CHECKING:
@@ -90,17 +90,17 @@ def _tell(case: Case) -> None:
     from femubench.core.case.starting import sizes_of
     from femubench.core.score.scoring import predict_block
 
-    click.echo(wrapped(f"The model {sizes_of(case.model)}.", hanging=2))
+    click.echo(wrap_text(f"The model {sizes_of(case.model)}.", hanging=2))
     for note in case.notes:
-        click.echo(wrapped(f"Note: {note}", hanging=2))
+        click.echo(wrap_text(f"Note: {note}", hanging=2))
     if case.matches:
         far = max(case.matches, key=lambda match: match.distance)
         text = f"{len(case.matches)} sensors matched; furthest from its place is {far.sensor}, "
-        click.echo(wrapped(f"{text}{far.distance:.3g} m from {far.place}.", hanging=2))
+        click.echo(wrap_text(f"{text}{far.distance:.3g} m from {far.place}.", hanging=2))
     try:
         pairs = predict_block(case.model, case.measurement, None)
     except ModelError as error:
-        click.echo(wrapped(f"Note: the model cannot be solved: {error}", hanging=2))
+        click.echo(wrap_text(f"Note: the model cannot be solved: {error}", hanging=2))
         return
     click.echo(f"{'mode':>4} {'measured':>11} {'model':>11} {'MAC':>6}")
     for pair in pairs:

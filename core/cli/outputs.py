@@ -12,7 +12,7 @@ import click
 from femubench.core.cli import options
 from femubench.core.cli.ending import telling
 from femubench.core.cli.progress import progress
-from femubench.core.cli.registry import wrapped
+from femubench.core.cli.registry import wrap_text
 from femubench.core.errors import InputError, OutputError, PluginError
 from femubench.core.files import write_atomically
 
@@ -88,7 +88,7 @@ class RunOutput:
                 found = executor.enclosure()
                 if found.sandbox == "none" and executor.sandbox != "off":
                     click.echo(f"strategies run without a sandbox: {found.reason}", err=True)
-                click.echo(wrapped(header(executor.spoken), hanging=2))
+                click.echo(wrap_text(header(executor.spoken), hanging=2))
             with progress(quiet=quiet) as advance:
                 run = plan.run(executor, Receivers(self.store, advance=advance))
         return run, self._report(run, screen, exhibits)
@@ -103,7 +103,7 @@ class RunOutput:
             OutputError: for the last such file, when all else is done.
             PluginError: for the last reporter that failed.
         """
-        from femubench.core.library.report import rendered, reporter, run_name, text_of
+        from femubench.core.library.report import render_report, reporter, run_name, text_of
         from femubench.core.schema.results import DONE
 
         files, written = dict(self.files), list[str]()
@@ -113,14 +113,14 @@ class RunOutput:
                 files[self.store.folder / f"{run_name(run)}{own.suffix}"] = own
         for path, writer in files.items():
             try:
-                write_atomically(path, rendered(writer, run, exhibits))
+                write_atomically(path, render_report(writer, run, exhibits))
                 written.append(f"{writer.name}: {path}")
             except (OutputError, PluginError) as fault:
                 if broken is not None:
                     click.echo(f"bench: {broken}", err=True)
                 broken = fault
         if screen is not None:
-            click.echo("\n".join(["", text_of(screen, rendered(screen, run)), *written]))
+            click.echo("\n".join(["", text_of(screen, render_report(screen, run)), *written]))
         if broken is not None:
             raise broken
         return int(any(result.status not in DONE for result in run.results))

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 
-from femubench.core.cli.registry import wrapped
+from femubench.core.cli.registry import wrap_text
 from femubench.core.plugin.foreign import Foreign, doc_of
-from femubench.core.plugin.loader import Plugins, shown
+from femubench.core.plugin.loader import Plugins, show_entry
 from femubench.core.plugin.options import ToldOptions, options_of
 from femubench.core.plugin.validation import CHECKS, KINDS
 from femubench.core.roles import (
@@ -20,7 +20,7 @@ from femubench.core.roles import (
     Reporter,
     Scenario,
     Strategy,
-    declared,
+    list_declared,
 )
 
 Row = tuple[str, str]
@@ -42,7 +42,7 @@ def pages_of(name: str, plugins: Plugins) -> Iterator[str]:
     for kind in CHECKS:
         offers = getattr(plugins, kind)
         if name in offers:
-            found, offered = True, shown(offers, name)
+            found, offered = True, show_entry(offers, name)
             origin = next(one for one in plugins.loaded if name in one.offers.get(kind, ()))
             source = "from", f"{origin.distribution}, plugin {origin.plugin}"
             yield _page(f"{name}: {_ROLES[kind]}", _about(offered), [source, *_ROWS[kind](offered)])
@@ -57,10 +57,10 @@ def _page(heading: str, paragraphs: Iterable[str], rows: Iterable[Row]) -> str:
     width = max(len(key) for key, _ in listed) + 2
     lines = [heading]
     for paragraph in paragraphs:
-        lines += [wrapped(paragraph, indent=2, hanging=2), ""]
+        lines += [wrap_text(paragraph, indent=2, hanging=2), ""]
     for key, value in listed:
         first = f"{key + ':':{width}}" if key else " " * width
-        lines.append(wrapped(value, indent=2, lead=first, hanging=width + 2))
+        lines.append(wrap_text(value, indent=2, lead=first, hanging=width + 2))
     return "\n".join(lines)
 
 
@@ -78,8 +78,8 @@ def _about(offered: object) -> Iterator[str]:
 
 def _strategy(strategy: Strategy) -> Iterator[Row]:
     yield "citation", strategy.citation
-    yield "needs", ", ".join(sorted(declared(strategy, "needs"))) or "nothing but frequencies"
-    if promises := declared(strategy, "promises"):
+    yield "needs", ", ".join(sorted(list_declared(strategy, "needs"))) or "nothing but frequencies"
+    if promises := list_declared(strategy, "promises"):
         yield "promises", ", ".join(sorted(promises))
     options = [f"{name} = {_value(value)}" for name, value in options_of(strategy).items()]
     options += [f"{name}.KEY = (none)" for name in _open_mappings(strategy)]

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from femubench.core.cli import options
-from femubench.core.cli.registry import Verbs, plugins_for, warn, wrapped
+from femubench.core.cli.registry import Verbs, plugins_for, warn, wrap_text
 from femubench.core.conformance import SECONDS
-from femubench.core.display import counted
+from femubench.core.display import count_noun
 from femubench.core.errors import InputError
 from femubench.core.files import write_atomically
 from femubench.core.library.cases import read_cases
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.plugin.validation import CHECKS, chosen, did_you_mean
+from femubench.core.plugin.validation import CHECKS, choose_names, did_you_mean
 
 if TYPE_CHECKING:
     from femubench.core.conformance.checking import CheckResult
@@ -50,7 +50,7 @@ def list_(ctx: click.Context, traceback: bool) -> None:
         click.echo(f"{plugin.plugin} ({plugin.distribution})")
         for kind, names in plugin.offers.items():
             if names:
-                click.echo(wrapped(f"{kind}: {', '.join(names)}", indent=2, hanging=4))
+                click.echo(wrap_text(f"{kind}: {', '.join(names)}", indent=2, hanging=4))
     wanted = traceback or bool(ctx.find_root().params.get("traceback"))
     warn(found.broken, with_traceback=wanted)
     if found.broken and not wanted:
@@ -128,7 +128,7 @@ def check(
     found = plugins_for(ctx)
     named = (found.strategies, found.effects, found.readers, found.scenarios)
     known = [word for offered in named for word in offered]
-    chosen("strategy, effect, reader or scenario", [name.partition(":")[0]], known)
+    choose_names("strategy, effect, reader or scenario", [name.partition(":")[0]], known)
     from femubench.core.conformance.checking import counts, findings, subjects, to_json
     from femubench.core.conformance.problems import of_case
 
@@ -136,7 +136,7 @@ def check(
     records: list[dict[str, Any]] = []
     bad = 0
     for subject in subjects(name, found, cases=cases, seconds=timeout):
-        title = f"{subject.role} {subject.name}: {counted(len(subject.checks), 'check')}"
+        title = f"{subject.role} {subject.name}: {count_noun(len(subject.checks), 'check')}"
         click.echo(title if not records else f"\n{title}")
         seen = []
         for finding in findings(subject):
@@ -145,7 +145,7 @@ def check(
         number = counts(seen)
         click.echo(
             f"{number['pass']} passed, {number['fail']} failed, "
-            f"{counted(number['warn'], 'warning')}, {number['not-applicable']} not applicable"
+            f"{count_noun(number['warn'], 'warning')}, {number['not-applicable']} not applicable"
         )
         bad += number["fail"]
         records.append(to_json(subject, seen))

@@ -32,12 +32,12 @@ def progress(what: str = "", *, quiet: bool = False) -> Iterator[Told | None]:
         return
     from rich.console import Console
 
-    with shown(what, Console(stderr=True), time.monotonic) as told:
+    with show_progress(what, Console(stderr=True), time.monotonic) as told:
         yield told
 
 
 @contextmanager
-def shown(what: str, console: Console, clock: Callable[[], float]) -> Iterator[Told]:
+def show_progress(what: str, console: Console, clock: Callable[[], float]) -> Iterator[Told]:
     """Give the function that changes a line of a terminal; see `progress`.
 
     Arguments:
@@ -60,7 +60,7 @@ def shown(what: str, console: Console, clock: Callable[[], float]) -> Iterator[T
 
     class Left(ProgressColumn):
         def render(self, task: Task) -> Text:
-            text = spoken_left(latest, clock() - last)
+            text = format_time_left(latest, clock() - last)
             return Text(f"{text} left", style="progress.remaining")
 
     columns = (
@@ -84,7 +84,7 @@ def shown(what: str, console: Console, clock: Callable[[], float]) -> Iterator[T
         yield tell
 
 
-def spoken_left(advance: Advance, since: float) -> str:
+def format_time_left(advance: Advance, since: float) -> str:
     """Return the time that is left as h:mm:ss, dashes where it is not known.
 
     Arguments:

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from femubench.core.cli import options
-from femubench.core.display import counted
+from femubench.core.display import count_noun
 
 
 @click.command("publish")
@@ -40,12 +40,12 @@ def publish(
         return
     runs, index = len(done.index["runs"]), folder / "index.html"
     click.echo(
-        f"{counted(len(done.added), 'new run')}, {counted(runs, 'run')} and "
-        f"{counted(len(done.index['strategies']), 'strategy')} in all: {index}"
+        f"{count_noun(len(done.added), 'new run')}, {count_noun(runs, 'run')} and "
+        f"{count_noun(len(done.index['strategies']), 'strategy')} in all: {index}"
     )
     if done.index["conflicts"]:
         click.echo(
-            f"bench: {counted(len(done.index['conflicts']), 'job')} with results that contradict "
+            f"bench: {count_noun(len(done.index['conflicts']), 'job')} with results that contradict "
             "each other; they are flagged",
             err=True,
         )

@@ -34,7 +34,7 @@ def warn(broken: Iterable[BrokenPlugin], *, with_traceback: bool) -> None:
             click.echo(fault.traceback, err=True, nl=False)
 
 
-def wrapped(text: str, *, indent: int = 0, lead: str = "", hanging: int) -> str:
+def wrap_text(text: str, *, indent: int = 0, lead: str = "", hanging: int) -> str:
     """Return text on lines of 80 columns, names whole.
 
     Arguments:

@@ -16,7 +16,7 @@ from femubench.core.errors import InputError
 from femubench.core.files import check_writable, make_folder, write_atomically
 from femubench.core.library.cases import way_of
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.plugin.validation import chosen
+from femubench.core.plugin.validation import choose_names
 
 if TYPE_CHECKING:
     from femubench.core.roles import Reporter
@@ -67,7 +67,7 @@ def report(
     words = list(dict.fromkeys(_SHORT.get(p, p) for p in parts if p)) or ["terminal"]
     file = Path(run) if run is not None and os.path.isfile(run) else None
     if file is None:  # names are known to be right before what reads runs is loaded
-        chosen("report format", words, plugins.reporters)
+        choose_names("report format", words, plugins.reporters)
     from femubench.core.library.rank import read_run, store_in
     from femubench.core.library.report import diagnosis_in
 
@@ -77,7 +77,9 @@ def report(
     if file is not None and diagnosis is not None:
         written = _write_diagnosis(diagnosis, file, words, output)
     else:
-        writers = [plugins.reporters[w] for w in chosen("report format", words, plugins.reporters)]
+        writers = [
+            plugins.reporters[w] for w in choose_names("report format", words, plugins.reporters)
+        ]
         kept = store_in(store)
         found = read_run(run, kept)
         # What was left out is told on stderr where a report has no room for it.
@@ -118,7 +120,7 @@ def _write(
     run: Run, exhibits: object, writers: Sequence[Reporter], folder: Path, output: Path | None
 ) -> dict[str, Path]:
     """Write files or show texts; return the files by format."""
-    from femubench.core.library.report import is_for_files, rendered, run_name, text_of
+    from femubench.core.library.report import is_for_files, render_report, run_name, text_of
 
     files = {
         writer.name: (output or folder) / f"{run_name(run)}{writer.suffix}"
@@ -130,7 +132,7 @@ def _write(
     # What is shown may be on its way into a file: then nothing else must be in it.
     aside = len(files) < len(writers)
     for writer in writers:
-        content = rendered(writer, run, exhibits)
+        content = render_report(writer, run, exhibits)
         if writer.name not in files:
             click.echo(text_of(writer, content))
             continue

@@ -8,11 +8,11 @@ import click
 
 from femubench.core.cli import options
 from femubench.core.cli.progress import progress
-from femubench.core.cli.registry import plugins_for, wrapped
-from femubench.core.display import counted
+from femubench.core.cli.registry import plugins_for, wrap_text
+from femubench.core.display import count_noun
 from femubench.core.files import check_can_make, write_atomically
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.plugin.validation import chosen
+from femubench.core.plugin.validation import choose_names
 
 
 class _PaperName(click.Argument):
@@ -48,7 +48,7 @@ def reproduce(
     """
     plugins = plugins_for(ctx)
     if paper is not None:
-        chosen("paper", [paper], plugins.papers)
+        choose_names("paper", [paper], plugins.papers)
     if output is not None:
         check_can_make(output)
     from femubench.core.library.report import rendering
@@ -64,5 +64,5 @@ def reproduce(
     elif not quiet:
         click.echo(rendering(studies, style))
         if files and style == "terminal":
-            written = f"{output}: {', '.join(files)}, {counted(figures, 'figure')} in figures"
-            click.echo(f"\n{wrapped(written, hanging=2)}")
+            written = f"{output}: {', '.join(files)}, {count_noun(figures, 'figure')} in figures"
+            click.echo(f"\n{wrap_text(written, hanging=2)}")

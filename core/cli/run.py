@@ -11,11 +11,11 @@ import click
 
 from femubench.core.cli import options
 from femubench.core.cli.outputs import RunOutput
-from femubench.core.cli.registry import plugins_for, wrapped
-from femubench.core.display import counted
+from femubench.core.cli.registry import plugins_for, wrap_text
+from femubench.core.display import count_noun
 from femubench.core.errors import InputError, PluginError
 from femubench.core.library.cases import case_folders
-from femubench.core.plugin.validation import chosen
+from femubench.core.plugin.validation import choose_names
 from femubench.core.schema.quantities import say_duration
 from femubench.core.schema.run_options import DEFAULT_TIMEOUT, RunOptions
 from femubench.core.version import __version__
@@ -80,8 +80,8 @@ def _checked(ctx: click.Context, cases: Iterable[str], strategies: Iterable[str]
     """Return the plugins; words are known to be right before what runs them is loaded."""
     plugins = plugins_for(ctx)
     if ctx.params["strict_plugins"] and plugins.broken:
-        raise PluginError(f"{counted(len(plugins.broken), 'fault')} in plugins, see above")
-    chosen("strategy", (word.partition(":")[0] for word in strategies), plugins.strategies)
+        raise PluginError(f"{count_noun(len(plugins.broken), 'fault')} in plugins, see above")
+    choose_names("strategy", (word.partition(":")[0] for word in strategies), plugins.strategies)
     case_folders(cases, plugins.scenarios)
     for name in _FIXED if ctx.params["locked"] is not None else ():
         if options.is_given(ctx, name):
@@ -108,9 +108,9 @@ def _compare(old: Run, new: Run) -> int:
     around = environment_differences(old.meta, new.meta)
     results = result_differences(old, new)
     for title, lines in (("environment", around), ("results", results)):
-        click.echo(f"{title}: {counted(len(lines), 'difference')} from run {old.meta['run']}")
+        click.echo(f"{title}: {count_noun(len(lines), 'difference')} from run {old.meta['run']}")
         for line in lines:
-            click.echo(wrapped(line, indent=2, hanging=4))
+            click.echo(wrap_text(line, indent=2, hanging=4))
     return int(bool(results))
 
 
@@ -125,9 +125,9 @@ def _header(plan: Plan, place: str) -> str:
     limits = {"": asked.timeout or DEFAULT_TIMEOUT, **asked.timeouts}
     spoken = ", ".join(f"{name} {say_duration(limit)}".strip() for name, limit in limits.items())
     return (
-        f"femubench {__version__}: {counted(cases, 'case')}{start}, "
-        f"{counted(strategies, 'strategy')}, {named} ({meaning}), {_twins(plan)}"
-        f"{counted(plan.jobs, 'job')}, {place}, timeout {spoken}"
+        f"femubench {__version__}: {count_noun(cases, 'case')}{start}, "
+        f"{count_noun(strategies, 'strategy')}, {named} ({meaning}), {_twins(plan)}"
+        f"{count_noun(plan.jobs, 'job')}, {place}, timeout {spoken}"
     )
 
 
@@ -138,4 +138,4 @@ def _twins(plan: Plan) -> str:
         return ""
     kinds = Counter(" and ".join(twin.families) for twin in twins)
     text = "".join(f"; {number} {kind}" for kind, number in kinds.items())
-    return f"{counted(len(twins), 'twin')} (seed {plan.options.twin_seed}{text}), "
+    return f"{count_noun(len(twins), 'twin')} (seed {plan.options.twin_seed}{text}), "

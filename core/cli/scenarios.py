@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from femubench.core.cli.registry import plugins_for, wrapped
+from femubench.core.cli.registry import plugins_for, wrap_text
 from femubench.core.library.cases import read_cases
 
 
@@ -28,7 +28,7 @@ def list_(ctx: click.Context) -> None:
         star = "*" if scenario.default else " "
         click.echo(f"{star} {name:{width}}  {scenario.title}{cases}")
         if scenario.classes:
-            click.echo(wrapped(", ".join(scenario.classes), indent=width + 4, hanging=width + 4))
+            click.echo(wrap_text(", ".join(scenario.classes), indent=width + 4, hanging=width + 4))
     click.echo("* is run by `bench run` without a case")
 
 
@@ -45,10 +45,10 @@ def show(ctx: click.Context, name: str) -> None:
         scenario = plugins.scenarios[name]
         click.echo(f"{name}: {scenario.title}")
         if scenario.classes:
-            click.echo(wrapped(", ".join(scenario.classes), indent=2, hanging=2))
+            click.echo(wrap_text(", ".join(scenario.classes), indent=2, hanging=2))
     for case in read_cases([name], plugins):
         click.echo()
         (name, _), *rows = case.rows()
         click.echo(name)
         for key, value in [("title", case.title), *rows]:
-            click.echo(wrapped(f"{key + ':':10}{' '.join(value.split())}", indent=2, hanging=12))
+            click.echo(wrap_text(f"{key + ':':10}{' '.join(value.split())}", indent=2, hanging=12))

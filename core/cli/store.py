@@ -9,7 +9,7 @@ import click
 
 from femubench.core.cli import options
 from femubench.core.cli.registry import Verbs
-from femubench.core.display import counted
+from femubench.core.display import count_noun
 from femubench.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -52,8 +52,8 @@ def check(ctx: click.Context, store: Path | None) -> None:
         click.echo(" ".join(str(fault).split()))
     for note in kept.notes_of_old_files():
         click.echo(note)
-    runs = counted(len(kept.runs()), "run")
-    click.echo(f"{kept.folder}: {runs}, {counted(len(faults), 'fault')}")
+    runs = count_noun(len(kept.runs()), "run")
+    click.echo(f"{kept.folder}: {runs}, {count_noun(len(faults), 'fault')}")
     ctx.exit(int(bool(faults)))
 
 
@@ -69,13 +69,17 @@ def repair(store: Path | None) -> None:
     kept = _open(store)
     done = 0
     for file, (records, lost) in convert_old_files(kept).items():
-        click.echo(f"{file}: {counted(records, 'record')} converted, {counted(len(lost), 'fault')}")
+        click.echo(
+            f"{file}: {count_noun(records, 'record')} converted, {count_noun(len(lost), 'fault')}"
+        )
         done += 1
     for file in kept.files:
         with kept.exclusive(file.stem):
             faults = kept.repair(file.stem)
         if faults:
-            click.echo(f"{file}: {counted(len(faults), 'fault')}, as it was in {file.name}.damaged")
+            click.echo(
+                f"{file}: {count_noun(len(faults), 'fault')}, as it was in {file.name}.damaged"
+            )
             done += 1
     if not done:
         click.echo(f"{kept.folder}: nothing to repair")

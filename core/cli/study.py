@@ -10,8 +10,8 @@ import click
 
 from femubench.core.cli import options
 from femubench.core.cli.outputs import RunOutput
-from femubench.core.cli.registry import plugins_for, wrapped
-from femubench.core.display import counted
+from femubench.core.cli.registry import plugins_for, wrap_text
+from femubench.core.display import count_noun
 from femubench.core.schema.run_options import RunOptions
 
 if TYPE_CHECKING:
@@ -56,11 +56,9 @@ def study(ctx: click.Context, /, file: Path, dry_run: bool, **asked: object) -> 
 
 def _title(plan: StudyPlan) -> str:
     named = plan.axes.title or "study"
-    cases = counted(len(plan.axes.values("case")), "case")
-    over = (
-        f"{counted(plan.cells, 'cell')} on {cases}, {counted(len(plan.options.all_seeds), 'seed')}"
-    )
-    return f"{named}: {over}, {counted(plan.jobs, 'job')}"
+    cases = count_noun(len(plan.axes.values("case")), "case")
+    over = f"{count_noun(plan.cells, 'cell')} on {cases}, {count_noun(len(plan.options.all_seeds), 'seed')}"
+    return f"{named}: {over}, {count_noun(plan.jobs, 'job')}"
 
 
 def _forecast(plan: StudyPlan, store: Store, workers: int) -> Iterator[str]:
@@ -69,21 +67,21 @@ def _forecast(plan: StudyPlan, store: Store, workers: int) -> Iterator[str]:
     yield _title(plan)
     for name in axes.names:
         values = ", ".join(map(axes.text_of, axes.values(name)))
-        yield wrapped(values, lead=f"{name}: ", indent=2, hanging=6)
+        yield wrap_text(values, lead=f"{name}: ", indent=2, hanging=6)
     left = found.jobs - found.done
-    yield f"{counted(found.done, 'job')} in {store.folder} already, {left} to run"
+    yield f"{count_noun(found.done, 'job')} in {store.folder} already, {left} to run"
     unknown = sum(found.unknown.values())
     if left > unknown:
         least = "at least " if unknown else "about "
-        yield wrapped(
+        yield wrap_text(
             f"{least}{_spoken(found.seconds)} of processor time, {_spoken(found.wall(workers))} on "
-            f"{counted(workers, 'worker')}: medians of earlier results, and judging; processes "
+            f"{count_noun(workers, 'worker')}: medians of earlier results, and judging; processes "
             "take some time to start besides",
             hanging=2,
         )
     if unknown:
         pairs = ", ".join(f"{name} on {case} {n}" for (case, name), n in found.unknown.items())
-        yield wrapped(f"unknown, since no result is stored, jobs of: {pairs}", hanging=2)
+        yield wrap_text(f"unknown, since no result is stored, jobs of: {pairs}", hanging=2)
 
 
 def _spoken(seconds: float) -> str:

@@ -12,7 +12,7 @@ from femubench.core.cli import options
 from femubench.core.cli.compare import fail_option
 from femubench.core.cli.progress import progress
 from femubench.core.cli.registry import plugins_for
-from femubench.core.plugin.validation import chosen
+from femubench.core.plugin.validation import choose_names
 from femubench.core.schema.run_options import RunOptions, Where
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def submit(
     """
     del asked  # taken from the context
     plugins = plugins_for(ctx)
-    chosen("strategy", (word.partition(":")[0] for word in strategies), plugins.strategies)
+    choose_names("strategy", (word.partition(":")[0] for word in strategies), plugins.strategies)
     from femubench.core.library.submit import submit as prepared, summary_of
 
     given, where = options.read_given(ctx)

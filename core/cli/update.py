@@ -26,11 +26,11 @@ from femubench.core.cli.registry import plugins_for
 def update(ctx: click.Context, case: str, strategy: str, seed: int, output: Path) -> None:
     """Write the updated model of CASE in the format that it came in."""
     from femubench.core.files import check_new
-    from femubench.core.library.models import updated, write_updated
+    from femubench.core.library.models import update_case, write_updated
 
     check_new(output)
     plugins = plugins_for(ctx)
-    read, model = updated(case, strategy, seed, plugins)
+    read, model = update_case(case, strategy, seed, plugins)
     write_updated(read, model, output, plugins)
     for path in sorted(output.rglob("*")):
         if path.is_file():

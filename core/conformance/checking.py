@@ -24,7 +24,7 @@ from femubench.core.conformance.kit import (
 )
 from femubench.core.conformance.problems import UpdatingProblem
 from femubench.core.errors import InputError
-from femubench.core.plugin.loader import Plugins, shown
+from femubench.core.plugin.loader import Plugins, show_entry
 from femubench.core.plugin.validation import KINDS, did_you_mean
 from femubench.core.plugin.variants import strategy_of
 
@@ -127,7 +127,7 @@ def _named(name: str, plugins: Plugins) -> Iterator[tuple[Role, Any]]:
     for role in get_args(Role)[1:]:
         offered = getattr(plugins, KINDS[role])
         if name in offered:
-            yield role, shown(offered, name)
+            yield role, show_entry(offered, name)
 
 
 def _bench(

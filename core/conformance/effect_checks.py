@@ -10,8 +10,8 @@ import numpy as np
 
 from femubench.core.conformance import kit
 from femubench.core.conformance.fingerprints import fingerprint, first_difference
-from femubench.core.conformance.kit import Bench, Verdict, check, failed, passed
-from femubench.core.conformance.place_words import known_place
+from femubench.core.conformance.kit import Bench, Verdict, check, fail_check, pass_check
+from femubench.core.conformance.place_words import has_place
 from femubench.core.conformance.problems import GROUPED, PLAIN, problem
 from femubench.core.conformance.results import (
     Given,
@@ -51,15 +51,15 @@ def _spots(effect: Effect) -> Iterator[tuple[str, Model, str]]:
 def is_described(effect: Effect) -> Verdict:
     """Look for a text of an effect that tells what the model lacks."""
     if getattr(effect, "summary", "") or own_doc(type(effect)):
-        return passed()
-    return failed("neither summary nor docstring, expected what the model lacks")
+        return pass_check()
+    return fail_check("neither summary nor docstring, expected what the model lacks")
 
 
 @check("effect", "picklable", "It can be sent to a worker, and an extended model back.")
 def picklable(bench: Bench) -> Verdict:
     """Pickle the effect and what it makes."""
     sent = kit.picklable(bench, "an effect")
-    return bench.apart(sent_back) if sent.status == "pass" else sent
+    return bench.apart(check_sending) if sent.status == "pass" else sent
 
 
 def _values(parameters: tuple[EffectParameter, ...], x: float) -> list[float]:
@@ -92,13 +92,13 @@ def _with(effect: Effect, model: Model, place: str, values: list[float]) -> Mode
     return found
 
 
-def sent_back(effect: Effect) -> Verdict:
+def check_sending(effect: Effect) -> Verdict:
     """Send extended models as a worker does."""
     for where, model, place in _spots(effect):
         fault = sendable(_given(model, _extended(effect, model, place)))
         if fault:
-            return failed(f"{where}: {fault}")
-    return passed()
+            return fail_check(f"{where}: {fault}")
+    return pass_check()
 
 
 def _given(model: Model, extended: Model) -> Given:
@@ -117,13 +117,13 @@ def places(effect: Effect) -> Verdict:
         for place in found:
             where = f"{name}, place {place!r}"
             if not isinstance(place, str) or found.count(place) > 1:
-                return failed(f"{where}: not a text, or there twice, expected every place once")
-            if not known_place(model, place):
-                return failed(f"{where}: not in the model, expected a word of docs/effects.md")
+                return fail_check(f"{where}: not a text, or there twice, expected every place once")
+            if not has_place(model, place):
+                return fail_check(f"{where}: not in the model, expected a word of docs/effects.md")
             fault = _parameters(effect, model, place)
             if fault:
-                return failed(f"{where}: {fault}")
-    return passed() if count else kit.not_applicable("it has no place in any of the models")
+                return fail_check(f"{where}: {fault}")
+    return pass_check() if count else kit.not_applicable("it has no place in any of the models")
 
 
 def _parameters(effect: Effect, model: Model, place: str) -> str | None:
@@ -154,8 +154,8 @@ def neutral(effect: Effect) -> Verdict:
         if not gap <= _SAME:
             text = f"{where}: neutral values change frequencies by {gap:.2g}, expected {_SAME:g}"
             # A rigid spring may leave the arm behind which it sits.
-            return failed(text) if np.isfinite(values).all() else kit.warned(text)
-    return passed() if spots else kit.not_applicable("it has no place in any of the models")
+            return fail_check(text) if np.isfinite(values).all() else kit.warn_of(text)
+    return pass_check() if spots else kit.not_applicable("it has no place in any of the models")
 
 
 def _distance(model: Model, other: Model) -> float:
@@ -178,11 +178,11 @@ def finite(effect: Effect) -> Verdict:
             given = _given(extended, extended)
             fault = finite_entries(given) or symmetric(given)
             if fault:
-                return failed(f"{where}: {fault}")
+                return fail_check(f"{where}: {fault}")
         same = one.stiffness.shape == more.stiffness.shape
         if not same or not np.isfinite(_distance(one, more) / _STEP):
-            return failed(f"{where}: no rate of change at one scale, expected a smooth change")
-    return passed() if count else kit.not_applicable("it has no place in any of the models")
+            return fail_check(f"{where}: no rate of change at one scale, expected a smooth change")
+    return pass_check() if count else kit.not_applicable("it has no place in any of the models")
 
 
 @kit.check_apart("effect", "deterministic", "Two extensions are equal to the last bit.")
@@ -191,8 +191,8 @@ def deterministic(effect: Effect) -> Verdict:
     for where, extended in _tries(effect, 1.0, 1.0):
         path = first_difference(*(fingerprint(model, "model") for model in extended))
         if path:
-            return failed(f"{where}: {path} differs between two extensions, expected equality")
-    return passed()
+            return fail_check(f"{where}: {path} differs between two extensions, expected equality")
+    return pass_check()
 
 
 @kit.check_apart("effect", "inputs", "The nominal model stays as it was given.")
@@ -204,18 +204,18 @@ def inputs(effect: Effect) -> Verdict:
             _extended(effect, model, place)
         path = first_difference(before, fingerprint(model, "model"))
         if path:
-            return failed(f"{where}: {path} was changed in place, expected a copy")
-    return passed()
+            return fail_check(f"{where}: {path} was changed in place, expected a copy")
+    return pass_check()
 
 
 @kit.check_apart(
     "effect", "worded", "Sizes, hints, wording and looks are of use, where it brings any."
 )
-def worded(effect: Effect) -> Verdict:
+def check_words(effect: Effect) -> Verdict:
     """Read what is optional, and look at every model beside its measurement."""
     hints = _hints(effect)
     if hints:
-        return failed(hints)
+        return fail_check(hints)
     for where, model, place in _spots(effect):
         parameters = tuple(effect.parameters(model, place))
         faults = [*_wordings(effect, parameters), *_sizes(effect, model, place, parameters)]
@@ -225,14 +225,14 @@ def worded(effect: Effect) -> Verdict:
         if half is not None and not (len(half) == len(parameters) and fits):
             faults.append(f"in_half gives {half}, expected a value within bounds a parameter")
         if faults:
-            return failed(f"{where}: {faults[0]}")
+            return fail_check(f"{where}: {faults[0]}")
     for name in _PROBLEMS:
         given = problem(name)
         for item in getattr(effect, "look", lambda seen: ())(Seen(given.model, given.measurement)):
             if not isinstance(item, LookWarning) or item.effect != effect.name or not item.what:
                 expected = f"expected a LookWarning of {effect.name}"
-                return failed(f"{name}: look gives {item!r}, {expected}")
-    return passed()
+                return fail_check(f"{name}: look gives {item!r}, {expected}")
+    return pass_check()
 
 
 def _hints(effect: Effect) -> str:

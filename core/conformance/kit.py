@@ -27,8 +27,8 @@ from femubench.core.conformance.trial import (
 from femubench.core.errors import harmless
 from femubench.core.plugin.foreign import is_foreign
 from femubench.core.plugin.variants import Variant
-from femubench.core.roles import Strategy, declared
-from femubench.core.run.jobs import missing_capability, one_line, sent
+from femubench.core.roles import Strategy, list_declared
+from femubench.core.run.jobs import missing_capability, one_line, pickle_strategy
 
 Status = Literal["pass", "fail", "warn", "not-applicable"]
 Role = Literal["strategy", "effect", "reader", "scenario"]
@@ -45,17 +45,17 @@ class Verdict:
     message: str = ""
 
 
-def passed(message: str = "") -> Verdict:
+def pass_check(message: str = "") -> Verdict:
     """Return that all is well."""
     return Verdict("pass", message)
 
 
-def failed(message: str) -> Verdict:
+def fail_check(message: str) -> Verdict:
     """Return what was seen and what was expected."""
     return Verdict("fail", " ".join(message.split()))
 
 
-def warned(message: str) -> Verdict:
+def warn_of(message: str) -> Verdict:
     """Return what may be meant, but should be known."""
     return Verdict("warn", " ".join(message.split()))
 
@@ -165,7 +165,7 @@ class Bench:
     def code(self) -> bytes | str:
         """Return the pickled subject, or in one line why it cannot be pickled."""
         try:
-            data = sent(self.subject)
+            data = pickle_strategy(self.subject)
         except Exception as error:
             return one_line(error)
         return data
@@ -185,7 +185,7 @@ class Bench:
         self._seen |= {want: kept for want in missing if (kept := self._unrun(want)) is not None}
         tasks = {}
         for want in missing:
-            code = sent(self.reference) if want.reference else self.code
+            code = pickle_strategy(self.reference) if want.reference else self.code
             assert isinstance(code, bytes)
             if want not in self._seen:
                 tasks[want] = run_trial, Trial(code, self._problem(want), want)
@@ -209,7 +209,7 @@ class Bench:
         """Return what is known without a run: that the problem lacks what the strategy needs."""
         given = self._problem(want)
         try:
-            needs = frozenset(declared(self._strategy(want), "needs"))
+            needs = frozenset(list_declared(self._strategy(want), "needs"))
             reason = missing_capability(needs, given.model, given.measurement)
         except Exception as error:  # whatever it says that it needs
             return Observation(want.problem, "error", one_line(error))
@@ -233,14 +233,14 @@ class Bench:
         task = (_judged, (function, pickle.dumps((self.subject, *further))))
         ending = run_apart({0: task}, self.limits, 1)[0]
         if ending.how != "answer":
-            return failed(f"{ending.reason}, expected an answer")
+            return fail_check(f"{ending.reason}, expected an answer")
         try:
             status, message = json.loads(ending.answer)
             if status in get_args(Status):
                 return Verdict(status, harmless(str(message)[:_LONGEST]))
         except (ValueError, TypeError, RecursionError):
             pass
-        return failed("what its process sent is no verdict")
+        return fail_check("what its process sent is no verdict")
 
 
 def _judged(task: tuple[Callable[..., Verdict], bytes]) -> bytes:
@@ -250,16 +250,16 @@ def _judged(task: tuple[Callable[..., Verdict], bytes]) -> bytes:
         subject, *further = pickle.loads(arguments)
         verdict = function(import_subject(subject), *further)
     except BaseException as error:
-        verdict = failed(f"{one_line(error)}, expected no exception")
+        verdict = fail_check(f"{one_line(error)}, expected no exception")
     return json.dumps([verdict.status, verdict.message]).encode()
 
 
 def _sendable(subject: object, what: str) -> Verdict:
     try:
-        sent(subject)
+        pickle_strategy(subject)
     except Exception as error:
-        return failed(f"{one_line(error)}, expected {what} that pickle can send")
-    return passed()
+        return fail_check(f"{one_line(error)}, expected {what} that pickle can send")
+    return pass_check()
 
 
 def picklable(bench: Bench, what: str) -> Verdict:
@@ -267,8 +267,8 @@ def picklable(bench: Bench, what: str) -> Verdict:
     if is_foreign(bench.subject):
         return bench.apart(_sendable, what)
     if isinstance(bench.code, str):
-        return failed(f"{bench.code}, expected {what} that pickle can send")
-    return passed()
+        return fail_check(f"{bench.code}, expected {what} that pickle can send")
+    return pass_check()
 
 
 def judge_check(check: Check, bench: Bench) -> Verdict:

@@ -12,7 +12,7 @@ import numpy as np
 from femubench.core.case.case import Case
 from femubench.core.case.reader import read_case
 from femubench.core.conformance import kit
-from femubench.core.conformance.kit import Bench, Verdict, check, failed, passed
+from femubench.core.conformance.kit import Bench, Verdict, check, fail_check, pass_check
 from femubench.core.errors import FemubenchError, InputError
 from femubench.core.roles import Reader, Scenario
 from femubench.core.run.jobs import one_line
@@ -59,13 +59,15 @@ def refuses(reader: Reader, what: str, content: bytes) -> Verdict:
                     found = getattr(reader, role)(file)
                 except InputError as error:
                     if file.name not in str(error):
-                        return failed(f"{role} of {what}: {error}, expected the name of the file")
+                        return fail_check(
+                            f"{role} of {what}: {error}, expected the name of the file"
+                        )
                     continue
                 except Exception as error:
-                    return failed(f"{role} of {what}: {one_line(error)}, expected InputError")
+                    return fail_check(f"{role} of {what}: {one_line(error)}, expected InputError")
                 seen = type(found).__name__
-                return failed(f"{role} of {what} returned {seen}, expected InputError")
-    return passed()
+                return fail_check(f"{role} of {what} returned {seen}, expected InputError")
+    return pass_check()
 
 
 @kit.check_apart("scenario", "reads", "Every case can be read.")
@@ -75,8 +77,8 @@ def reads(scenario: Scenario, *readers: Reader) -> Verdict:
         try:
             read_case(scenario.folder(name), name, readers)
         except InputError as error:
-            return failed(f"{name}: {error}")
-    return passed()
+            return fail_check(f"{name}: {error}")
+    return pass_check()
 
 
 def _first_fault(scenario: Scenario, fault_of: Callable[[Case], str], *readers: Reader) -> Verdict:
@@ -89,11 +91,11 @@ def _first_fault(scenario: Scenario, fault_of: Callable[[Case], str], *readers: 
             continue
         count += 1
         if fault := fault_of(case):
-            return failed(f"{case.name}: {fault}")
-    return passed() if count else kit.not_applicable("no case can be read")
+            return fail_check(f"{case.name}: {fault}")
+    return pass_check() if count else kit.not_applicable("no case can be read")
 
 
-def held_out_fault(case: Case) -> str:
+def find_held_out_fault(case: Case) -> str:
     """Return what held-out modes and modifications lack."""
     if not case.held_out and not case.modifications:
         return "nothing is held out, expected modes or a modification"
@@ -117,7 +119,7 @@ def source_fault(case: Case) -> str:
 
 
 _CASES = {
-    "held-out": ("Every case holds out data by which a model can be judged.", held_out_fault),
+    "held-out": ("Every case holds out data by which a model can be judged.", find_held_out_fault),
     "solves": (
         "The nominal model of every case has modes that pair with used ones.",
         nominal_fault,

@@ -19,7 +19,7 @@ from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 
 
-def known_place(model: Model, place: str) -> bool:
+def has_place(model: Model, place: str) -> bool:
     """Tell whether a place, without its direction or role, is in a model."""
     bare = split_direction(bare_place(place).removesuffix(":branch"))[0]
     if model.structure is not None:

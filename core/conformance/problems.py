@@ -122,7 +122,7 @@ def sensors_of(frame: Frame) -> Sensors:
     )
 
 
-def measured(truth: Model, sensors: Sensors) -> Measurement:
+def measure(truth: Model, sensors: Sensors) -> Measurement:
     """Return the lowest elastic modes of a model as a test would give them."""
     count = USED
     modes = solve_modes(truth).elastic.take(np.arange(count))
@@ -156,7 +156,7 @@ def frame_problem(
     model = frame(elements=elements, torsion=torsion[0])
     mass = PointMass(Place(joint=members[0][1]), 0.02)
     truth = frame(elements=3 * elements, modulus=TRUE_E, torsion=torsion[1], masses=(mass,))
-    return UpdatingProblem(name, Model.of(model), measured(Model.of(truth), sensors_of(model)))
+    return UpdatingProblem(name, Model.of(model), measure(Model.of(truth), sensors_of(model)))
 
 
 def _as_matrices(problem: UpdatingProblem) -> UpdatingProblem:

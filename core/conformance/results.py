@@ -146,14 +146,14 @@ def _sent(model: Model | None) -> dict[str, str]:
     return found
 
 
-def used_modes(given: Given) -> str | None:
+def find_missing_mode(given: Given) -> str | None:
     """Return which used mode the updated model does not have."""
     worst, error = _worst_used(given)
     within = _within(given, worst)
     return None if error <= within else f"used-modes: {_unmet(worst, within)}"
 
 
-def used_modes_or_stated(given: Given) -> str | None:
+def find_hidden_missing_mode(given: Given) -> str | None:
     """Return which used mode the updated model does not have, where the result hides it."""
     worst, error = _worst_used(given)
     stated, within = given.result.diagnostics.get(USED_ERROR), _within(given, worst)
@@ -208,8 +208,8 @@ def no_negative(given: Given) -> str | None:
 
 
 PROMISES: Mapping[str, Look] = {
-    "used-modes": used_modes,
-    "used-modes-or-stated": used_modes_or_stated,
+    "used-modes": find_missing_mode,
+    "used-modes-or-stated": find_hidden_missing_mode,
     "rigid-body-modes": rigid_body_modes,
     "no-negative-eigenvalue": no_negative,
 }

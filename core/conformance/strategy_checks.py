@@ -9,15 +9,15 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from femubench.core.child.limits import spoken_bytes
+from femubench.core.child.limits import format_bytes
 from femubench.core.conformance import kit
 from femubench.core.conformance.fingerprints import first_difference
-from femubench.core.conformance.kit import Bench, Verdict, check, failed, passed
+from femubench.core.conformance.kit import Bench, Verdict, check, fail_check, pass_check
 from femubench.core.conformance.problems import CROSSED, GROUPED, PLAIN, PROBLEMS
 from femubench.core.conformance.results import PROMISES
 from femubench.core.conformance.trial import Observation, Want, promises_of
 from femubench.core.plugin.variants import Variant
-from femubench.core.roles import CAPABILITIES, Strategy, declared
+from femubench.core.roles import CAPABILITIES, Strategy, list_declared
 
 _MUCH = 100.0  # times what the reference takes
 _LEAST_SECONDS, _LEAST_BYTES = 1e-3, 1e4  # below which a ratio says nothing
@@ -97,11 +97,11 @@ def _survives(bench: Bench, names: Sequence[str]) -> Verdict:
         return kit.not_applicable(f"not looked at: {simpler[0].problem} fails already")
     lost = [item for item in told if not item.survived]
     if lost:
-        return failed(f"{lost[0].problem}: {lost[0].text}, {_HONEST}{_more(lost)}")
+        return fail_check(f"{lost[0].problem}: {lost[0].text}, {_HONEST}{_more(lost)}")
     if all(item.kind == "lacking" for item in told):
         return kit.not_applicable(told[0].text)
     refused = [item for item in told if item.kind in ("not-applicable", "failed")]
-    return passed(f"refused {refused[0].problem}: {refused[0].text}" if refused else "")
+    return pass_check(f"refused {refused[0].problem}: {refused[0].text}" if refused else "")
 
 
 def _of_results(bench: Bench, name: str) -> Verdict:
@@ -113,8 +113,8 @@ def _of_results(bench: Bench, name: str) -> Verdict:
         return kit.not_applicable("there is no result to look at")
     wrong = [item for item in found if name in item.faults]
     if wrong:
-        return failed(f"{wrong[0].problem}: {wrong[0].faults[name]}{_more(wrong)}")
-    return passed()
+        return fail_check(f"{wrong[0].problem}: {wrong[0].faults[name]}{_more(wrong)}")
+    return pass_check()
 
 
 for _name, _sentence in _RESULTS.items():
@@ -132,18 +132,18 @@ def is_described(subject: Strategy) -> Verdict:
     """Look at citation, docstring and promises of a strategy."""
     strategy = subject.base if isinstance(subject, Variant) else subject
     if not str(strategy.citation).strip():
-        return failed("citation is empty, expected author, year, title, equation")
-    promises: object = declared(strategy, "promises")
+        return fail_check("citation is empty, expected author, year, title, equation")
+    promises: object = list_declared(strategy, "promises")
     if not isinstance(promises, frozenset):
-        return failed(f"promises is {promises!r}, expected a frozenset")
+        return fail_check(f"promises is {promises!r}, expected a frozenset")
     unknown = sorted(str(name) for name in promises if name not in PROMISES)
     if unknown:
-        return failed(f"promises {unknown[0]!r}, expected one of {', '.join(PROMISES)}")
+        return fail_check(f"promises {unknown[0]!r}, expected one of {', '.join(PROMISES)}")
     if not own_doc(type(strategy)):
-        return kit.warned(
+        return kit.warn_of(
             f"class {type(strategy).__name__} has no docstring, expected what it does"
         )
-    return passed()
+    return pass_check()
 
 
 @kit.check_apart(
@@ -163,8 +163,8 @@ def names_options(subject: Strategy) -> Verdict:
     names = [field.name for field in fields]
     missing = [name for name in names if not re.search(rf"\b{re.escape(name)}\b", text)]
     if missing:
-        return failed(f"option {missing[0]!r} is not in the docstring, expected a line on it")
-    return passed()
+        return fail_check(f"option {missing[0]!r} is not in the docstring, expected a line on it")
+    return pass_check()
 
 
 def own_doc(cls: type) -> str:
@@ -200,16 +200,16 @@ def deterministic(bench: Bench) -> Verdict:
     for one, other in zip(found[::2], found[1::2], strict=True):
         if (one.kind, one.text) != (other.kind, other.text):
             seen = f"once {one.kind} {one.text!r}, once {other.kind} {other.text!r}"
-            return failed(f"{one.problem}: {seen}, expected the same twice")
+            return fail_check(f"{one.problem}: {seen}, expected the same twice")
         path = first_difference(one.prints, other.prints)
         if path is not None:
-            return failed(
+            return fail_check(
                 f"{one.problem}: {path} differs between two runs with one seed, expected equality "
                 "to the last bit (randomness comes from `rng` alone)"
             )
     if all(item.kind == "lacking" for item in found):
         return kit.not_applicable(found[0].text)
-    return passed()
+    return pass_check()
 
 
 def _twice() -> Sequence[Want]:
@@ -221,8 +221,8 @@ def _untouched(bench: Bench, part: str, wrong: str) -> Verdict:
     """Judge what was seen of the surroundings before and after."""
     for item in bench.observe(_with_results(bench)):
         if getattr(item, part):
-            return failed(f"{item.problem}: {getattr(item, part)} {wrong}")
-    return passed()
+            return fail_check(f"{item.problem}: {getattr(item, part)} {wrong}")
+    return pass_check()
 
 
 for _name, (_sentence, _part, _wrong) in _UNTOUCHED.items():
@@ -247,13 +247,13 @@ def capabilities(bench: Bench) -> Verdict:
         refused = item.kind == "not-applicable" and plain.kind == "result"
         if refused or not item.survived:
             wanted = f"expected a result, or {capability!r} in needs"
-            return failed(f"{item.problem}: {item.text}, {wanted}")
-    return passed()
+            return fail_check(f"{item.problem}: {item.text}, {wanted}")
+    return pass_check()
 
 
 def _withheld(bench: Bench) -> list[tuple[str, Want]]:
     """Return what it does not declare, and a problem that does not have it."""
-    needs = frozenset(declared(bench.subject, "needs"))
+    needs = frozenset(list_declared(bench.subject, "needs"))
     frame = needs & {"elements", "geometry", "joints"}
     bare = GROUPED if "parts" in needs else "matrices alone"
     lacking = {"shapes": "no shapes at all", "elements": bare, "joints": "one member"}
@@ -277,15 +277,15 @@ def resources(bench: Bench) -> Verdict:
     if any(item.kind != "result" for item in found[:2]):
         return kit.not_applicable("there is no result on the plain case")
     seconds, peak = found[0].seconds, float(found[1].peak or 0)
-    text = f"{seconds:.3g} s and {spoken_bytes(peak)}"
+    text = f"{seconds:.3g} s and {format_bytes(peak)}"
     if bench.reference is None or any(item.kind != "result" for item in found[2:]):
-        return passed(text)
+        return pass_check(text)
     slower = seconds / max(found[2].seconds, _LEAST_SECONDS)
     larger = peak / max(float(found[3].peak or 0), _LEAST_BYTES)
     text += f" on the {PLAIN}, {slower:.2g} and {larger:.2g} times those of {bench.reference.name}"
     if max(slower, larger) > _MUCH:
-        return kit.warned(f"{text}, expected at most {_MUCH:g} times")
-    return passed(text)
+        return kit.warn_of(f"{text}, expected at most {_MUCH:g} times")
+    return pass_check(text)
 
 
 def _measured(bench: Bench) -> Sequence[Want]:

@@ -21,9 +21,9 @@ from femubench.core.conformance.problems import UpdatingProblem
 from femubench.core.conformance.results import Given, faults_of
 from femubench.core.errors import NotApplicable, StrategyFailure, harmless
 from femubench.core.fem.model import Model
-from femubench.core.plugin.foreign import imported
+from femubench.core.plugin.foreign import import_thing
 from femubench.core.plugin.variants import Variant
-from femubench.core.roles import Result, Strategy, declared
+from femubench.core.roles import Result, Strategy, list_declared
 from femubench.core.run.answers import pack_outcome
 from femubench.core.run.jobs import JobOutcome, one_line, plain_outcome
 
@@ -160,8 +160,8 @@ def _observe(trial: Trial) -> tuple[Observation, bytes]:
 def import_subject(subject: Any) -> Any:  # noqa: ANN401 - any role
     """Return a subject whose code is there: in a worker that of a stranger may be imported."""
     if isinstance(subject, Variant):
-        return replace(subject, base=imported(subject.base))
-    return imported(subject)
+        return replace(subject, base=import_thing(subject.base))
+    return import_thing(subject)
 
 
 def _inputs(given: UpdatingProblem) -> dict[str, str]:
@@ -201,7 +201,7 @@ def _call_strategy(
 
 def promises_of(strategy: Strategy) -> frozenset[str]:
     """Return what a strategy says that it keeps, with or without options."""
-    promises: object = declared(strategy, "promises")
+    promises: object = list_declared(strategy, "promises")
     return promises if isinstance(promises, frozenset) else frozenset()
 
 

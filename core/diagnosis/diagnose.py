@@ -11,13 +11,13 @@ import numpy as np
 
 from femubench.core.advise.advice import advise
 from femubench.core.case.case import Case
-from femubench.core.diagnosis.faults import fault_causes, mended_case, with_faults
+from femubench.core.diagnosis.faults import correct_case, fault_causes, with_faults
 from femubench.core.diagnosis.proof import (
     Unseen,
     borne_out,
-    extended_by,
+    extend_by,
     gain_of,
-    left_out,
+    predict_left_out,
     rms_gain_of,
     unseen_of,
 )
@@ -26,12 +26,12 @@ from femubench.core.diagnosis.scatter import scatter_rows
 from femubench.core.diagnosis.tables import (
     error_scales,
     evidence_rows,
+    find_tied_places,
+    list_causes,
     odds_rows,
-    placed_causes,
     residual_rows,
     rivals_of,
     smallest_visible,
-    tied_places,
 )
 from femubench.core.diagnosis.verdict import Decision, decide, elsewhere
 from femubench.core.diagnosis.words import sentence_of
@@ -44,12 +44,12 @@ from femubench.core.inference.fault_search import Inquiry, inquire
 from femubench.core.inference.model_error import class_widths
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.search import adequacy
-from femubench.core.inference.settings import changed_settings, settings, shown
+from femubench.core.inference.settings import format_value, list_changed, settings
 from femubench.core.look.localisation import locate
 from femubench.core.look.look import look
 from femubench.core.look.modes import Seen
 from femubench.core.look.readings import look_at_band
-from femubench.core.plugin.loader import registered_effects, registered_faults
+from femubench.core.plugin.loader import list_effects, list_faults
 from femubench.core.roles import Effect, Fault
 from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning
 from femubench.core.score.scoring import score_model
@@ -115,16 +115,16 @@ def diagnose(
     """
     begin, effort = time.perf_counter(), effort or Effort()
     used = case.measurement.select(case.used)
-    registered = registered_effects()
+    registered = list_effects()
     known = registered if effects is None else tuple(effects)
-    wrong = registered_faults() if faults is None else tuple(faults)
+    wrong = list_faults() if faults is None else tuple(faults)
     scatter = case.tolerance if tolerance is None else tolerance
     reference, width, beam = case.used_reference, case.error_width, case.beam_share
     terms = Terms(known, scatter, pairs, reference, width, beam, effort)
     with effort.scope(_expected(case)):
         # Faults of data and input first, then the causes that are left without them.
         inquiry = inquire(case.model, used, wrong, terms)
-        mended = mended_case(case, inquiry.mended)
+        mended = correct_case(case, inquiry.mended)
         proof = _proof(mended, inquiry.examination, terms, case)
         with effort.piece("advice"):
             looks = _looks(case.model, mended, (*registered, *known))
@@ -161,7 +161,7 @@ def _proof(
 ) -> _Proof:
     best, effort = examination.best, terms.effort
     with effort.piece("unseen"):
-        model = extended_by(case.model, best)
+        model = extend_by(case.model, best)
         # This asks for the most modes: all that follows is given those.
         after = score_model(case, model)
         unseen = unseen_of(case, examination, best, model)
@@ -170,11 +170,11 @@ def _proof(
         found = borne_out(case, examination, effort)
         confirmed = found is not None
         if found is not None and found is not best:
-            best, model = found, extended_by(case.model, found)
+            best, model = found, extend_by(case.model, found)
             after = score_model(case, model)
             unseen = unseen_of(case, examination, best, model)
     else:
-        crossed = left_out(examination, terms)
+        crossed = predict_left_out(examination, terms)
         unseen = (crossed,)
         confirmed = crossed.confirms(len(best.parts))
     before = score_model(given, given.model)
@@ -196,7 +196,7 @@ def _written(
     best, posterior = proof.leader, examination.posterior
     group = [best, *(posterior.best(key) for key in decision.group[1:])] if decision.group else []
     shown = group if decision.verdict == "ambiguous" else group[:1]
-    options = [placed_causes(examination, explanation, decision.held) for explanation in shown]
+    options = [list_causes(examination, explanation, decision.held) for explanation in shown]
     causes = _group_causes(options)
     top = posterior.names[decision.group[0]] if decision.group else decision.nothing
     told = decision, causes, options, top, proof.gain_rms
@@ -248,8 +248,8 @@ def _conditions(effort: Effort) -> tuple[str, ...]:
             f"The search for several causes was ended after its budget of {effort.budget:g} s: "
             "causes that explain the data together may have been overlooked."
         )
-    if changed := changed_settings():
-        words = ", ".join(f"{name} = {shown(value)}" for name, value in changed.items())
+    if changed := list_changed():
+        words = ", ".join(f"{name} = {format_value(value)}" for name, value in changed.items())
         notes.append(f"Settings other than the standard ones: {words}.")
     return tuple(notes)
 
@@ -318,7 +318,7 @@ def _notes(
             "these data neither ask for it nor speak against it."
         )
     for e in shown:
-        if tied := tied_places(examination.posterior, e):
+        if tied := find_tied_places(examination.posterior, e):
             name = " + ".join(e.searched)
             notes.append(f"{name} at {e.place} fits exactly as well at {' or at '.join(tied)}.")
     cautions = (getattr(part.hypothesis.effect, "caution", "") for part in best.parts)

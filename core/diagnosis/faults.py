@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from femubench.core.case.case import Case
-from femubench.core.diagnosis.words import listed, percent
+from femubench.core.diagnosis.words import join_names, percent
 from femubench.core.inference.charge import Charge, Mended
 from femubench.core.inference.settings import settings
 from femubench.core.schema.diagnosis import Cause, CauseParameter
 
 
-def mended_case(case: Case, mended: Iterable[Mended]) -> Case:
+def correct_case(case: Case, mended: Iterable[Mended]) -> Case:
     """Return a case with its faults mended, or the datum discounted that is wrong.
 
     Design changes keep their own data: whether those have the fault too is not known.
@@ -60,5 +60,7 @@ def with_faults(sentence: str, mended: Sequence[Cause], loose: Sequence[Cause]) 
 
 
 def _told(faults: Iterable[Cause]) -> str:
-    text = listed(f"{cause.summary} (probability {percent(cause.probability)})" for cause in faults)
+    text = join_names(
+        f"{cause.summary} (probability {percent(cause.probability)})" for cause in faults
+    )
     return text[0].upper() + text[1:]

@@ -14,7 +14,7 @@ from femubench.core.case.case import Case
 from femubench.core.diagnosis.verdict import elsewhere, inseparable
 from femubench.core.fem.model import Model
 from femubench.core.fit.discrepancy import Discrepancy
-from femubench.core.fit.extended_model import extended, raw_residual
+from femubench.core.fit.extended_model import extend_model, raw_residual
 from femubench.core.fit.mesh_error import mesh_bias, mesh_corrections
 from femubench.core.fit.modal_fit import Fit, Problem, bounds_of, state_at
 from femubench.core.fit.noise import Noise
@@ -27,7 +27,7 @@ from femubench.core.modal.eigen import enough_modes, modes_of, once_for
 from femubench.core.modal.measurement import Measurement
 from femubench.core.schema.diagnosis import Gain
 from femubench.core.schema.results import Block
-from femubench.core.score.scoring import frequency_error, many_modifications, modified_modes
+from femubench.core.score.scoring import frequency_error, many_modifications, pair_modified
 from femubench.core.typing import BoolArray, FloatArray
 
 Blocks = Mapping[str, Block]
@@ -140,7 +140,7 @@ class Unseen:
         return self.probability > settings.noise_p or log_bayes > enough
 
 
-def held_out(
+def predict_held_out(
     case: Case,
     nominal: Problem,
     best: Problem,
@@ -197,7 +197,7 @@ def held_out(
     )
 
 
-def modified(
+def predict_modified(
     case: Case, extended: Model, scatter: float, neighbours: Sequence[Model] = ()
 ) -> Unseen:
     """Return the errors of the modified structures, all modes in one list.
@@ -215,13 +215,13 @@ def modified(
     for model in models:
         many = many_modifications(model, case.modifications)
         for change in case.modifications:
-            modified_modes(model, change, many=many)
+            pair_modified(model, change, many=many)
     before, after, std = [], [], []
     for change in case.modifications:
         m = change.measurement
         predicted = np.array(
             [
-                [mode.predicted_hz or np.nan for mode in modified_modes(model, change)]
+                [mode.predicted_hz or np.nan for mode in pair_modified(model, change)]
                 for model in models
             ]
         )
@@ -253,7 +253,7 @@ def _relative_std(measurement: Measurement) -> FloatArray:
     return np.where(known, std, typical)
 
 
-def left_out(examination: Examination, terms: Terms) -> Unseen:
+def predict_left_out(examination: Examination, terms: Terms) -> Unseen:
     """Return the errors of every used mode, predicted from the others alone.
 
     The causes are chosen anew without the mode, so that it has no part in what predicts it.
@@ -327,7 +327,7 @@ def gain_of(before: Blocks, after: Blocks, crossed: Unseen | None) -> Gain:
     return Gain(used, pair("higher"), pair("modified"), cross)  # type: ignore[arg-type]
 
 
-def extended_by(model: Model, explanation: Explanation, x: FloatArray | None = None) -> Model:
+def extend_by(model: Model, explanation: Explanation, x: FloatArray | None = None) -> Model:
     """Return the model with textbook effects and causes in it.
 
     Arguments:
@@ -349,8 +349,8 @@ def extended_by(model: Model, explanation: Explanation, x: FloatArray | None = N
 
 def _extended(model: Model, explanation: Explanation, x: FloatArray) -> Model:
     """Return a model of its own with an explanation in it, at coordinates of its causes."""
-    base = extended(model, explanation.base.parts, explanation.base.x)
-    return extended(base, explanation.parts, x)
+    base = extend_model(model, explanation.base.parts, explanation.base.x)
+    return extend_model(base, explanation.parts, x)
 
 
 def unseen_of(
@@ -373,7 +373,7 @@ def unseen_of(
     """
     near = () if sharply else _neighbours(case.model, explanation)
     return (
-        held_out(
+        predict_held_out(
             case,
             examination.problem,
             examination.problem_of(explanation),
@@ -382,7 +382,7 @@ def unseen_of(
             examination.scatter,
             examination,
         ),
-        modified(case, model, examination.scatter, near),
+        predict_modified(case, model, examination.scatter, near),
     )
 
 
@@ -468,7 +468,7 @@ def borne_out(
 def _judged(case: Case, examination: Examination, found: Explanation) -> tuple[bool, float]:
     """Tell whether unseen data bear an explanation out, and its ln Bayes factor on them."""
     if found is examination.best:
-        model = extended_by(case.model, found)
+        model = extend_by(case.model, found)
     else:  # asked for once: it and its modes need not last
         model = _extended(case.model, found, found.fit.state.x)
     unseen = unseen_of(case, examination, found, model)

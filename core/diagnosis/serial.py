@@ -9,7 +9,7 @@ from typing import Any
 
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.result import Diagnosis
-from femubench.core.drawing.places import PlacedWireframe, placed_wireframe
+from femubench.core.drawing.places import PlacedWireframe, find_wireframe
 from femubench.core.fem.model import Model
 from femubench.core.schema.bounds import Number
 from femubench.core.schema.diagnosis import DiagnosisReport, LookWarning
@@ -29,7 +29,7 @@ def diagnosis_to_json(
         case: what was diagnosed, for the drawing of its structure; a model has no sensors.
     """
     names = [field.name for field in fields(DiagnosisReport)]
-    structure = None if case is None else placed_wireframe(case, _words(diagnosis))
+    structure = None if case is None else find_wireframe(case, _words(diagnosis))
     tables: dict[str, Any] = to_plain({name: getattr(diagnosis, name) for name in names})
     for look in tables["looks"]:
         look["changes"] = [{"mode": mode, "percent": change} for mode, change in look["changes"]]

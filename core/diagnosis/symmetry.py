@@ -8,7 +8,7 @@ from itertools import permutations, product
 import numpy as np
 from scipy.spatial import cKDTree
 
-from femubench.core.drawing.places import PlacedWireframe, placed_wireframe
+from femubench.core.drawing.places import PlacedWireframe, find_wireframe
 from femubench.core.fem.model import Model
 from femubench.core.inference.settings import settings
 from femubench.core.typing import FloatArray, SparseArray
@@ -38,7 +38,7 @@ def mirror_places(model: Model, place: str, others: Iterable[str]) -> tuple[str,
         others: words of places.
     """
     words = tuple(others)
-    wireframe = placed_wireframe(model, (place, *words))
+    wireframe = find_wireframe(model, (place, *words))
     extents = {word: _extent(wireframe, word) for word in (place, *words)}
     middle, size = _middle(model.dofs.xyz)
     own = extents[place] - middle

@@ -110,7 +110,7 @@ def causes_in(
     return causes
 
 
-def spread_over(posterior: Posterior, leader: Explanation) -> FloatArray:
+def find_spread(posterior: Posterior, leader: Explanation) -> FloatArray:
     """Return the standard deviations of a leader's coordinates over all explanations, (k,).
 
     What else may be wrong moves a size, and so does what is taken for model error: every
@@ -153,7 +153,7 @@ def _coordinates(
     return None
 
 
-def placed_causes(
+def list_causes(
     examination: Examination, explanation: Explanation, held: float = 1.0
 ) -> list[Cause]:
     """Return the causes of an explanation, each with the probability of its name and of its place.
@@ -164,7 +164,7 @@ def placed_causes(
         held: probability that any of them holds, at most.
     """
     posterior = examination.posterior
-    spread = spread_over(posterior, explanation)
+    spread = find_spread(posterior, explanation)
     own = examination.own_error(explanation.fit.state)
     causes = causes_in(explanation, 1.0, posterior.earned, spread=spread, own=own)
     first = len(causes) - len(explanation.parts)
@@ -203,7 +203,7 @@ def _tied(posterior: Posterior, best: Explanation) -> list[Explanation]:
     ]
 
 
-def tied_places(posterior: Posterior, best: Explanation) -> tuple[str, ...]:
+def find_tied_places(posterior: Posterior, best: Explanation) -> tuple[str, ...]:
     """Return the other places at which the causes of an explanation are exactly as probable."""
     return tuple(dict.fromkeys(e.place for e in _tied(posterior, best)))
 

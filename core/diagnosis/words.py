@@ -23,7 +23,7 @@ def percent(probability: float) -> str:
     return f"{100.0 * probability:.3g} %"
 
 
-def named(cause: Cause) -> str:
+def name_cause(cause: Cause) -> str:
     """Return a cause with its place."""
     return f"{cause.effect} at {cause.place}" if cause.place != "all" else cause.effect
 
@@ -43,7 +43,7 @@ def _mirrors(cause: Cause) -> str:
     return f"one of {number} mirror places" if count > 1 else ""
 
 
-def listed(names: Iterable[str], last: str = "and") -> str:
+def join_names(names: Iterable[str], last: str = "and") -> str:
     """Return names as in a sentence."""
     unique = tuple(dict.fromkeys(names))
     if len(unique) < 2:
@@ -70,7 +70,7 @@ def sentence_of(
         gain: before and after, as root mean squares.
         reference: whether it is what differs from a reference that was sought.
     """
-    names = listed(named(cause) for cause in causes)
+    names = join_names(name_cause(cause) for cause in causes)
     if decision.verdict == "none":
         nothing = "nothing that differs from the reference" if reference else _NOTHING
         return f"The data show {nothing} (probability {percent(decision.nothing)})."
@@ -99,13 +99,13 @@ def _sure(probability: float, causes: Sequence[Cause]) -> str:
 
 def _either(options: Sequence[Sequence[Cause]], reference: bool) -> str:
     """Return what all options share, and what they leave open."""
-    sets = [dict.fromkeys(named(cause) for cause in option) for option in options]
+    sets = [dict.fromkeys(name_cause(cause) for cause in option) for option in options]
     common = [name for name in sets[0] if all(name in other for other in sets)]
-    mirrored = {named(c): f" ({_mirrors(c)})" if c.mirrors else "" for c in options[0]}
+    mirrored = {name_cause(c): f" ({_mirrors(c)})" if c.mirrors else "" for c in options[0]}
     rest = [" with ".join(n for n in names if n not in common) for names in sets]
-    open_ = listed((words or "nothing more" for words in rest), "or")
+    open_ = join_names((words or "nothing more" for words in rest), "or")
     if common:
-        shared = listed(f"{name}{mirrored[name]}" for name in common)
+        shared = join_names(f"{name}{mirrored[name]}" for name in common)
         lacks = _DIFFERS if reference else _LACKS
         return f"{lacks} {shared}, and these data cannot tell what else: {open_}."
     something = "Something differs from the reference" if reference else f"{_LACKS} something"

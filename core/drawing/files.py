@@ -20,7 +20,7 @@ from femubench.core.errors import InputError, OutputError
 from femubench.core.files import read_bytes, write_atomically
 from femubench.core.schema.bounds import Real
 from femubench.core.schema.records import parse_json, to_plain
-from femubench.core.schema.sealing import TAIL, is_whole, sealed, sum_of
+from femubench.core.schema.sealing import TAIL, is_whole, seal, sum_of
 from femubench.core.schema.validation import read_plain
 
 FOLDER = "exhibits"
@@ -180,7 +180,7 @@ class Exhibits:
             if len(text) > MOST_BYTES - TAIL:
                 return
             self._folder.mkdir(parents=True, exist_ok=True)
-            write_atomically(path, sealed(text.encode()))
+            write_atomically(path, seal(text.encode()))
 
 
 def _whole(path: Path) -> bytes:

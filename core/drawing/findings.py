@@ -13,7 +13,7 @@ from femubench.core.drawing.places import (
     PlacedWireframe,
     PlaceKind,
     Span,
-    placed_wireframe,
+    find_wireframe,
 )
 from femubench.core.drawing.wireframe import Point
 from femubench.core.effect.places import split_direction
@@ -82,7 +82,7 @@ def changes_found(source: Case | Model, parameters: Sequence[Data]) -> list[Find
     words = {word for item in changed for word in _words(item)}
     if len(words) > _MOST_WORDS:
         words = set()
-    structure = placed_wireframe(source, sorted(words))
+    structure = find_wireframe(source, sorted(words))
     places = {place.place: place for place in structure.places}
     groups: dict[_Where, list[Data]] = {}
     for item in changed:

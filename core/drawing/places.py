@@ -76,7 +76,7 @@ class PlacedWireframe(Wireframe):
         return _plain_place(self, word, split_direction(bare_place(word))[0])
 
 
-def placed_wireframe(source: Case | Model, words: Iterable[str]) -> PlacedWireframe:
+def find_wireframe(source: Case | Model, words: Iterable[str]) -> PlacedWireframe:
     """Return a structure with the places that some words stand for.
 
     Arguments:

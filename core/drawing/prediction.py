@@ -14,7 +14,7 @@ from femubench.core.case.case import Case, Modification
 from femubench.core.drawing.element_change import difference_picture, relative_changes
 from femubench.core.drawing.files import Exhibits
 from femubench.core.drawing.findings import changes_found
-from femubench.core.drawing.thinning import thinned
+from femubench.core.drawing.thinning import thin_nodes
 from femubench.core.drawing.wireframe import MOST_NODES, node_positions, wireframe_of
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
@@ -45,7 +45,7 @@ def case_drawing(case: Case) -> dict[str, Any] | None:
     A large frame is thinned out, and `thinned` says how many nodes and elements it has. Returns
     None for large matrices.
     """
-    few = thinned(case)
+    few = thin_nodes(case)
     wireframe = wireframe_of(case) if few is None else few.wireframe(case)
     if not wireframe.nodes:
         return None
@@ -72,7 +72,7 @@ def exhibit_of(
     Raises:
         ModelError: when the model cannot be solved or observed.
     """
-    few = thinned(case)
+    few = thin_nodes(case)
     if few is None and len(node_positions(case.model)) > MOST_NODES:
         return None
     found = changes_found(case, parameters)
@@ -91,7 +91,7 @@ def exhibit_of(
     }
 
 
-def paired_with(model: Model, data: Measurement) -> tuple[Modes, FloatArray, Pairing]:
+def pair_modes(model: Model, data: Measurement) -> tuple[Modes, FloatArray, Pairing]:
     """Return the elastic modes of a model, their readings at the sensors, and the partners.
 
     Arguments:
@@ -128,7 +128,7 @@ def _modes(case: Case, model: Model, nodes: IntArray | None = None) -> dict[str,
     drawn: list[dict[str, Any]] = []
     likeness: dict[str, Any] = {}
     for name, changed, data in _structures(case, model):
-        elastic, at_sensors, pairing = paired_with(changed, data)
+        elastic, at_sensors, pairing = pair_modes(changed, data)
         frequencies = elastic.natural_frequencies
         number = {int(k): n for k, n in zip(pairing.index, data.numbers, strict=True) if k >= 0}
         shown = list(number)[: MOST_CHANGED if name else None]
@@ -139,7 +139,7 @@ def _modes(case: Case, model: Model, nodes: IntArray | None = None) -> dict[str,
             likeness = {
                 "rows": list(data.numbers),
                 "columns": [float(frequencies[k]) for k in shown],
-                "values": rounded(mac(data.shapes, at_sensors[:, shown])),
+                "values": round_values(mac(data.shapes, at_sensors[:, shown])),
             }
         motion = node_motions(changed, case.model, elastic.shapes[:, shown], nodes)
         largest = np.abs(motion).max(axis=(0, 1), initial=0.0)
@@ -201,7 +201,7 @@ def _decibels(values: FloatArray) -> list[float]:
     return [round(float(level), 1) for level in levels]
 
 
-def measured_receptances(case: Case, sensor: str | None = None) -> dict[str, Any]:
+def list_receptances(case: Case, sensor: str | None = None) -> dict[str, Any]:
     """Return receptances as measured, or made of the measured modes and scaled to mass.
 
     Where no frequency responses were measured at the sensor, modes stand for them. A test of free
@@ -214,7 +214,7 @@ def measured_receptances(case: Case, sensor: str | None = None) -> dict[str, Any
     measured: dict[str, Sequence[float | None]] = {}
     alone: list[str] = []
     for name, changed, data in _structures(case, case.model):
-        _, at_sensors, pairing = paired_with(changed, data)
+        _, at_sensors, pairing = pair_modes(changed, data)
         as_measured = None if name else _as_measured(case, drive.labels[0])
         if as_measured is not None:
             measured[name] = as_measured
@@ -233,7 +233,7 @@ def measured_receptances(case: Case, sensor: str | None = None) -> dict[str, Any
     elif alone:
         note += f" Measured modes without a partner there are not in it: {', '.join(alone)}."
     return {
-        "hz": rounded(frequency_axis(case)),
+        "hz": round_values(frequency_axis(case)),
         "damping": damping_of(case),
         "measured": measured,
         "note": note,
@@ -297,11 +297,11 @@ def _stand_in(
     return _decibels(modal_sum(eigenvalues, seen, seen, frequency_axis(case), damping_of(case)))
 
 
-def rounded(values: Any) -> Any:  # noqa: ANN401 - arrays of any shape
+def round_values(values: Any) -> Any:  # noqa: ANN401 - arrays of any shape
     """Return numbers of an array as nested lists with four digits; None where there is none."""
     array = np.asarray(values, dtype=float)
     if array.ndim:
-        return [rounded(item) for item in array]
+        return [round_values(item) for item in array]
     number = float(array)
     return float(f"{number:.{DIGITS}g}") if np.isfinite(number) else None
 
@@ -373,8 +373,8 @@ def _measured(case: Case) -> Sequence[Mapping[str, Any]]:
             "mode": number,
             "block": block,
             "modification": change,
-            "hz": rounded(data.frequencies[k]) and float(data.frequencies[k]),
-            "shape": rounded(_unit(data.shapes[:, k])),
+            "hz": round_values(data.frequencies[k]) and float(data.frequencies[k]),
+            "shape": round_values(_unit(data.shapes[:, k])),
         }
         for block, change, data in measured_blocks(case)
         for k, number in enumerate(data.numbers)
@@ -403,7 +403,7 @@ def keep_drawings(exhibits: Exhibits, cases: Iterable[Case]) -> None:
             drawing = case_drawing(case)
             if drawing is not None:
                 more = {
-                    "receptance": measured_receptances(case),
+                    "receptance": list_receptances(case),
                     "nominal": exhibit_of(case, case.model),
                 }
                 exhibits.put_case(case.digest, {**drawing, **more})

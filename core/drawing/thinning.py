@@ -57,7 +57,7 @@ class Thinned:
         )
 
 
-def thinned(case: Case) -> Thinned | None:
+def thin_nodes(case: Case) -> Thinned | None:
     """Return which nodes of a frame to draw; None where all can be, or where there are no elements.
 
     Nodes at sensors come before others.

@@ -17,7 +17,7 @@ from femubench.core.fem.kinematics import node_at, point_rows
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import DIRECTIONS
-from femubench.core.modal.eigen import cached_by_model, modes_of
+from femubench.core.modal.eigen import cache_by_model, modes_of
 from femubench.core.modal.rigid import mass_orthonormal, rigid_body_vectors, rigid_share
 from femubench.core.typing import FloatArray, SparseArray
 
@@ -43,7 +43,7 @@ def point_in(model: Model, place: str) -> Place:
     return point_of(model.structure.frame, place)
 
 
-def directed_point(source: Frame | Model, place: str) -> tuple[Place, str]:
+def find_directed_point(source: Frame | Model, place: str) -> tuple[Place, str]:
     """Return the point and the direction that a place with a direction stands for.
 
     Out of plane there is one translation, which goes unsaid.
@@ -68,7 +68,7 @@ def directed_point(source: Frame | Model, place: str) -> tuple[Place, str]:
     return Place(joint=head) if frame is None else point_of(frame, head), direction
 
 
-def directed_places(model: Model, points: Sequence[str]) -> tuple[str, ...]:
+def list_directed_places(model: Model, points: Sequence[str]) -> tuple[str, ...]:
     """Return the places of points in each direction that they can move in.
 
     Arguments:
@@ -84,7 +84,7 @@ def directed_places(model: Model, points: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"{p}:{d}" for p in points for d in free_translations(model, point_in(model, p)))
 
 
-@cached_by_model
+@cache_by_model
 def point_motion(model: Model, at: Place) -> SparseArray:
     """Return the displacement and rotation of a point from the dofs, sparse (6, n).
 
@@ -115,7 +115,7 @@ def point_motion(model: Model, at: Place) -> SparseArray:
     return sp.csr_array((np.ones(len(entries)), index), shape=(6, model.size))
 
 
-@cached_by_model
+@cache_by_model
 def free_translations(model: Model, at: Place) -> tuple[str, ...]:
     """Return the global directions in which a point can move, of x, y, z.
 
@@ -217,7 +217,7 @@ def total_mass(model: Model) -> float:
     return model.total_mass
 
 
-@cached_by_model
+@cache_by_model
 def elastic_band(model: Model) -> FloatArray:
     """Return the lowest six elastic natural frequencies in Hz, fewer where there are fewer.
 

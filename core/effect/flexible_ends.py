@@ -140,7 +140,7 @@ def end_stiffness(frame: Frame, ends: Sequence[str]) -> tuple[float, float, floa
     return own, lateral, torsion or own
 
 
-def softened_ends(
+def soften_ends(
     frame: Frame, stiffness: Mapping[str, Mapping[str, float]], arm: float = 1.0
 ) -> Frame:
     """Return the frame with rotational springs at member ends, in series with those there.

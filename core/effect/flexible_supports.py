@@ -28,13 +28,13 @@ from femubench.core.effect.places import point_of, supports_of
 from femubench.core.fem.frame import Frame, GroundSpring
 from femubench.core.fem.model import Model, common_dofs
 from femubench.core.fem.sensors import DIRECTIONS
-from femubench.core.modal.eigen import cached_by_model
+from femubench.core.modal.eigen import cache_by_model
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 Held = tuple[str, str]  # the word of a support, and a direction that it holds
 
 
-def softened_supports(frame: Frame, series: Mapping[Held, float]) -> Frame:
+def soften_supports(frame: Frame, series: Mapping[Held, float]) -> Frame:
     """Return the frame with springs in series with its supports and its springs to ground.
 
     Arguments:
@@ -134,7 +134,7 @@ def _condensed(model: Model, held: Sequence[Held], columns: Sequence[int]) -> Ch
     return Change(tuple(terms), coefficients)
 
 
-@cached_by_model
+@cache_by_model
 def _release_supports(model: Model) -> tuple[SparseArray, SparseArray, dict[Held, int]]:
     """Return stiffness and mass with the dofs of all supports behind the free ones, and which."""
     structure = model.frame_structure
@@ -142,7 +142,7 @@ def _release_supports(model: Model) -> tuple[SparseArray, SparseArray, dict[Held
     held = [(word, d) for word, own in listed for d, k in own.items() if np.isinf(k)]
     # Between the dofs that are held there is no stress of a preload to find.
     bare = replace(structure.frame, preloads=())
-    released = Model.of(structure.rebuilt(softened_supports(bare, dict.fromkeys(held, 0.0))))
+    released = Model.of(structure.rebuilt(soften_supports(bare, dict.fromkeys(held, 0.0))))
     frame = released.frame_structure.frame
     rows = [
         point_motion(released, point_of(frame, word))[[DIRECTIONS.index(direction)]].indices[0]

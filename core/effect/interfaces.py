@@ -14,7 +14,7 @@ from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Place
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.model import Model
-from femubench.core.modal.eigen import cached_by_model
+from femubench.core.modal.eigen import cache_by_model
 from femubench.core.typing import FloatArray
 
 _MOST = 300  # pairs
@@ -29,7 +29,7 @@ def _nodes(model: Model) -> dict[str, FloatArray]:
     return model.geometry.places if isinstance(model.geometry, MatrixGeometry) else {}
 
 
-@cached_by_model
+@cache_by_model
 def facing_nodes(model: Model) -> tuple[Pair, ...]:
     """Return the pairs of joints or nodes that share a place, 300 at most.
 

@@ -162,7 +162,7 @@ def _stable_order(keys: IntArray, size: int) -> IntArray:
     return np.asarray(rows.tocsc().indices)
 
 
-def narrowed(matrix: SparseArray) -> SparseArray:
+def narrow_indices(matrix: SparseArray) -> SparseArray:
     """Return a sparse matrix by rows, with indices of 32 bits where these are enough."""
     found = sp.csr_array(matrix)
     if max(found.nnz, *found.shape) < 2**31:

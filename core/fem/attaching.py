@@ -89,7 +89,7 @@ def attach(
     if len(origin) == whole:
         kept = {name: value for name, value in vars(structure).items() if name in _OF_THE_MESH}
         new.__dict__.update(kept)
-    mass, ground = new.attached(masses, springs)
+    mass, ground = new.assemble_attachments(masses, springs)
     more_mass, stiffness = _of_pieces(structure, new, origin)
     return new, MatrixChange(mass + more_mass, ground + stiffness, ground)
 
@@ -185,7 +185,7 @@ def _of_pieces(
     return sp.csc_array(mass), sp.csc_array(stiffness)
 
 
-def grown(matrix: SparseArray, size: int) -> SparseArray:
+def grow_matrix(matrix: SparseArray, size: int) -> SparseArray:
     """Return a matrix with empty rows and columns behind its own, sparse (size, size)."""
     larger = matrix.copy()
     larger.resize((size, size))

@@ -97,7 +97,7 @@ def elastic_stiffness(structure: MeshedFrame) -> SparseArray:
         stiffness = stiffness + structure.once(
             "springs",
             structure.interpolation,
-            lambda: structure.attached((), structure.frame.springs)[1],
+            lambda: structure.assemble_attachments((), structure.frame.springs)[1],
         )
     if structure.frame.braces:
         rows = brace_rows(structure)

@@ -142,7 +142,7 @@ class BeamProperties:
         """Return the entries of some elements."""
         return BeamProperties(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
 
-    def scaled(self, name: str, factor: FloatArray) -> BeamProperties:
+    def scale(self, name: str, factor: FloatArray) -> BeamProperties:
         """Return a batch in which one property is multiplied, one factor an element."""
         return replace(self, **{name: getattr(self, name) * factor})
 

@@ -64,7 +64,7 @@ class Touched:
         return tuple((name, -1.0 if name in divided else 1.0) for name in names)
 
 
-def touched(structure: MeshedFrame, parameters: Sequence[Property]) -> tuple[Touched, ...]:
+def list_touched(structure: MeshedFrame, parameters: Sequence[Property]) -> tuple[Touched, ...]:
     """Return what parameters touch, kind by kind; those of the last call are kept.
 
     Raises:
@@ -133,7 +133,7 @@ def apply_values(
         raise ValueError(f"{len(parameters)} parameters have {len(given)} values")
     own, springs = structure.properties, structure.springs
     arrays: dict[str, FloatArray] = {}
-    for part in touched(structure, parameters):
+    for part in list_touched(structure, parameters):
         value = given[part.columns]
         for name in (part.kind,) if not part.is_factor else (n for n, _ in part.slopes):
             if name not in arrays:
@@ -216,7 +216,7 @@ class Derivatives:
             found += (self.springs @ slips.reshape(len(slips), -1)).reshape(found.shape)
         return found
 
-    def combined(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
+    def combine(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
         """Return the sum of weights[p] dK/dp @ vector, (n, k).
 
         Arguments:
@@ -268,7 +268,7 @@ def derivatives(structure: MeshedFrame, parameters: Sequence[Property]) -> Deriv
     count, size = len(parameters), len(structure.properties)
     springs = sp.csr_array((count, len(structure.springs)))
     parts = []
-    for part in touched(structure, parameters):
+    for part in list_touched(structure, parameters):
         if part.kind == _SPRING:
             springs = part.incidence(len(structure.springs), count)
         else:
@@ -293,7 +293,7 @@ def element_masses(structure: MeshedFrame, parameters: Sequence[Property]) -> Fl
     p = structure.properties
     mass = p.rhoA * (p.length - p.rigid_mass_1 - p.rigid_mass_2)
     result = np.zeros(len(parameters))
-    for part in touched(structure, parameters):
+    for part in list_touched(structure, parameters):
         if part.kind in ("rhoA", "density"):
             result += part.incidence(len(p), len(parameters)) @ mass
     return result

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.assembly import narrowed
+from femubench.core.fem.assembly import narrow_indices
 from femubench.core.fem.beam import BeamProperties, shape_functions
 from femubench.core.fem.frame import ACTIVE, Frame, GroundSpring, Oscillator, Place
 from femubench.core.fem.links import Linkage, linkage, rigid_arm
@@ -279,7 +279,7 @@ def _assemble_transform(
         node, direction, axes = node[order], direction[order], axes[order]
         transform = transform[:, order].tocsr()
     return Kinematics(
-        transform=narrowed(transform),
+        transform=narrow_indices(transform),
         node=node,
         direction=tuple(map(DIRECTIONS.__getitem__, direction.tolist())),
         axes=axes,

@@ -13,7 +13,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.assembly import AssemblyPlan, narrowed, plan_assembly
+from femubench.core.fem.assembly import AssemblyPlan, narrow_indices, plan_assembly
 from femubench.core.fem.beam import BeamProperties
 from femubench.core.fem.frame import Frame, GroundSpring, PointMass
 from femubench.core.fem.kinematics import Kinematics, point_rows, spring_rows
@@ -96,9 +96,9 @@ class MeshedFrame:
             (mesh.axes.reshape(-1)[9 * element + entry % 9], columns, bounds),
             shape=(12 * count, 6 * len(mesh.xyz)),
         )
-        gather = narrowed(turn) @ self.kinematics.transform
+        gather = narrow_indices(turn) @ self.kinematics.transform
         gather.eliminate_zeros()
-        return narrowed(gather)
+        return narrow_indices(gather)
 
     @cached_property
     def plan(self) -> AssemblyPlan:
@@ -218,7 +218,7 @@ class MeshedFrame:
         lumps = sum(item.mass for item in self.frame.masses)
         return float(members + lumps + sum(item.mass for item in self.frame.oscillators))
 
-    def attached(
+    def assemble_attachments(
         self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]
     ) -> tuple[SparseArray, SparseArray]:
         """Return the mass and stiffness that attachments add on the free dofs, (n, n) each."""

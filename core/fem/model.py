@@ -11,10 +11,10 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from femubench.core.display import Shown, counted
+from femubench.core.display import Shown, count_noun
 from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.assembly import prune
-from femubench.core.fem.attaching import MatrixChange, attach, grown
+from femubench.core.fem.attaching import MatrixChange, attach, grow_matrix
 from femubench.core.fem.frame import Frame, GroundSpring, PointMass
 from femubench.core.fem.sensors import Sensors, unit_motions
 from femubench.core.fem.structure import Structure
@@ -101,7 +101,7 @@ class Geometry(Protocol):
         """Return sensor readings from dofs, sparse (n_sensors, n)."""
         ...
 
-    def attached(
+    def assemble_attachments(
         self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]
     ) -> tuple[SparseArray, SparseArray]:
         """Return the mass and stiffness that attachments add, sparse (n, n) each."""
@@ -155,8 +155,8 @@ class Model(Shown):
         size, what = f"{self.size} degrees of freedom", "matrices from files"
         if self.structure is not None:
             frame = self.structure.frame
-            members, joints = counted(len(frame.members), "member"), len(frame.joints)
-            what = f"{frame.plane}, {members}, {counted(joints, 'joint')}"
+            members, joints = count_noun(len(frame.members), "member"), len(frame.joints)
+            what = f"{frame.plane}, {members}, {count_noun(joints, 'joint')}"
         found = [("", f"{size}, {what}")]
         for name in ("mass", "stiffness"):
             matrix, change = getattr(self, name), getattr(self, f"{name}_change")
@@ -234,7 +234,7 @@ class Model(Shown):
         Raises:
             ModelError: when an attachment lies off the structure.
         """
-        found = self.attached(masses, springs)
+        found = self.assemble_attachments(masses, springs)
         if found is None:
             meshed = self.frame_structure
             frame = meshed.frame.with_attachments(tuple(masses), tuple(springs))
@@ -245,7 +245,7 @@ class Model(Shown):
             return _changed_at(new, keep, mass, stiffness, self)
         structure, change = found
         size = change.mass.shape[0]
-        mass, stiffness = grown(self.mass, size), grown(self.stiffness, size)
+        mass, stiffness = grow_matrix(self.mass, size), grow_matrix(self.stiffness, size)
         mass, stiffness = mass + change.mass, stiffness + change.stiffness
         if structure is None:
             return replace(self, mass=mass, stiffness=stiffness)
@@ -262,7 +262,7 @@ class Model(Shown):
             stiffness_change=_spread_low_rank(self.stiffness_change, np.arange(self.size), size),
         )
 
-    def attached(
+    def assemble_attachments(
         self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]
     ) -> tuple[Structure | None, MatrixChange] | None:
         """Return the structure with attachments and what they add; None where no change is local.
@@ -272,7 +272,7 @@ class Model(Shown):
         """
         if self.structure is not None:
             return attach(self.structure, masses, springs)
-        mass, stiffness = self.geometry.attached(masses, springs)
+        mass, stiffness = self.geometry.assemble_attachments(masses, springs)
         return None, MatrixChange(mass, stiffness, stiffness)
 
 

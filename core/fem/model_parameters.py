@@ -43,7 +43,7 @@ def matrix_slopes(model: Model, parameters: Sequence[Property]) -> MatrixSlopes:
     return derivatives(model.structure, parameters)
 
 
-def updated_mass(model: Model) -> float:
+def find_updated_mass(model: Model) -> float:
     """Return the mass in kg that `mass_slopes` are the slopes of."""
     return model.total_mass if model.structure is None else model.structure.total_mass
 

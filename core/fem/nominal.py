@@ -24,7 +24,7 @@ MAY_VANISH = ("shear", "rotary")
 _Item = TypeVar("_Item", Coupling, Eccentricity)
 
 
-def meshed(frame: Frame) -> MeshedFrame:
+def mesh_frame(frame: Frame) -> MeshedFrame:
     """Return a frame with its mesh, dofs and element properties, factors included.
 
     Raises:

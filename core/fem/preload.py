@@ -43,7 +43,7 @@ from femubench.core.fem.frame import ACTIVE, Frame, Support
 from femubench.core.fem.kinematics import build_kinematics, node_at, point_rows, rigid_motions
 from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.meshed_frame import MeshedFrame
-from femubench.core.fem.nominal import meshed
+from femubench.core.fem.nominal import mesh_frame
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 _TRANSLATIONS = ("x", "y", "z")
@@ -82,7 +82,7 @@ class StressState:
         """Return the largest magnitude of a normal force in N."""
         return float(np.abs(np.concatenate([self.force[:, 0], self.brace_force])).max())
 
-    def scaled(self, factor: float) -> StressState:
+    def scale(self, factor: float) -> StressState:
         """Return a multiple of the state."""
         return StressState(*(factor * values for values in vars(self).values()))
 
@@ -127,7 +127,7 @@ class Statics:
                 f"nothing resists a lack of fit of member {member!r}: the frame is not redundant",
                 next((item for item in structure.frame.preloads if item.member == member), None),
             )
-        return state.scaled(np.sign(tension) / state.largest)
+        return state.scale(np.sign(tension) / state.largest)
 
     def under_weight(self, frame: Frame) -> StressState:
         """Return the state under the weight of all that the frame consists of, down along z.
@@ -240,7 +240,7 @@ def statics_of(structure: MeshedFrame) -> Statics:
         ModelError: when the frame is a mechanism in its plane.
     """
     if "statics" not in structure.kept:
-        source = meshed(structure.frame) if structure.changes else structure
+        source = mesh_frame(structure.frame) if structure.changes else structure
         structure.kept["statics"] = _prepare(source)
     statics: Statics = structure.kept["statics"]
     return statics

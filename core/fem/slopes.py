@@ -54,7 +54,7 @@ class TermSlopes:
                 found[used] += own[used, None, None] * form
         return found
 
-    def combined(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
+    def combine(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
         """Return the sum of weights[p] dK/dx @ vector, (n, k), of weights (n_parameters, k)."""
         return self.products(vector, 0.0) @ weights
 
@@ -94,9 +94,9 @@ class JoinedSlopes:
             found[own] = part.inner(left, right)
         return found
 
-    def combined(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
+    def combine(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
         """Return the sum of weights[p] dK/dx @ vector, (n, k), of weights (n_parameters, k)."""
-        products = [part.combined(vector, weights[own]) for part, own in self.parts]
+        products = [part.combine(vector, weights[own]) for part, own in self.parts]
         return sum(products[1:], start=products[0])
 
     def products(self, vector: FloatArray, eigenvalue: float) -> FloatArray:

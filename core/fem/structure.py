@@ -17,7 +17,7 @@ from femubench.core.fem.frame import Frame
 from femubench.core.fem.kinematics import point_block
 from femubench.core.fem.mesh import SAME_STATION, locate
 from femubench.core.fem.meshed_frame import MeshedFrame
-from femubench.core.fem.nominal import meshed
+from femubench.core.fem.nominal import mesh_frame
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.preload import gravity_stiffness, preload_stiffness
 from femubench.core.fem.sensors import Sensors
@@ -40,7 +40,7 @@ class Structure(MeshedFrame):
         Raises:
             ModelError: when the frame cannot be meshed.
         """
-        found = meshed(frame)
+        found = mesh_frame(frame)
         return cls(found.frame, found.mesh, found.kinematics, found.properties, found.springs)
 
     def with_values(
@@ -98,7 +98,9 @@ class Structure(MeshedFrame):
         mass = self.plan.assemble_from(lambda rows: mass_matrices(self.properties.take(rows)))
         if self.frame.masses:
             mass = mass + self.once(
-                "masses", self.interpolation, lambda: self.attached(self.frame.masses, ())[0]
+                "masses",
+                self.interpolation,
+                lambda: self.assemble_attachments(self.frame.masses, ())[0],
             )
         if self.frame.oscillators:
             mass = mass + oscillator_matrices(self)[0]

@@ -19,7 +19,7 @@ _RIGID = 1e4  # of what a spring is measured by, above which it is taken for rig
 _AGREES = 0.3  # deviations in all, below which a fit and its model are the same to the data
 
 
-def extended(model: Model, parts: Sequence[Projection], x: FloatArray) -> Model:
+def extend_model(model: Model, parts: Sequence[Projection], x: FloatArray) -> Model:
     """Return the model with effects in it, at their coordinates.
 
     Raises:
@@ -57,14 +57,14 @@ def raw_residual(problem: Problem, model: Model) -> FloatArray:
     order = np.argsort(modes.eigenvalues)
     hertz = signed_hz(modes.eigenvalues[order])[None]
     seen = np.asarray(model.observe(data.measurement.sensors) @ modes.shapes[:, order])[None]
-    seen = data.aligned(hertz, seen, problem.space.zero)
-    hertz, seen = data.predicted(hertz, seen, problem.space.zero)
+    seen = data.align(hertz, seen, problem.space.zero)
+    hertz, seen = data.predict(hertz, seen, problem.space.zero)
     partner = data.pair(hertz, seen)[0]
     residual = data.residual(hertz[:, partner], seen[:, :, partner], np.array([model.total_mass]))
     return np.asarray(residual[0])
 
 
-def agreed(found: Fit) -> Fit | None:
+def check_joint_fit(found: Fit) -> Fit | None:
     """Return a fit of several causes that its own model bears out; None where there is no such.
 
     Each cause may be possible and all together not: two rigid ends that fill an element.
@@ -77,7 +77,7 @@ def agreed(found: Fit) -> Fit | None:
     for _ in range(_ROUNDS):
         state = best.state
         try:
-            exact = raw_residual(problem, extended(problem.model, best.parts, state.x))
+            exact = raw_residual(problem, extend_model(problem.model, best.parts, state.x))
         except FemubenchError:
             return None
         offset = exact - (state.raw - state.problem.offset)
@@ -105,6 +105,6 @@ def departure(found: Fit, model: Model | None = None) -> float:
     """
     state = found.state
     if model is None:
-        model = extended(state.problem.model, state.parts, state.x)
+        model = extend_model(state.problem.model, state.parts, state.x)
     exact = raw_residual(state.problem, model)
     return float(np.linalg.norm(state.problem.noise.whiten(exact - state.raw)))

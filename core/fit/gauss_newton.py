@@ -72,7 +72,7 @@ class Linearised:
         Raises:
             NotApplicable: for more coordinates than a dense matrix holds, without any penalty.
         """
-        return bounded_step(self._solver(ridge, damping), self.x, low, high, longest)
+        return solve_bounded_step(self._solver(ridge, damping), self.x, low, high, longest)
 
     def _solver(self, ridge: float, damping: float) -> Callable[[BoolArray], FloatArray]:
         """Return what solves for the step of the coordinates that are free."""
@@ -98,7 +98,7 @@ class Linearised:
         return lambda free: np.asarray(np.linalg.lstsq(rows[:, free], stacked, rcond=None)[0])
 
 
-def bounded_step(
+def solve_bounded_step(
     solve: Callable[[BoolArray], FloatArray],
     at: FloatArray,
     low: FloatArray,

@@ -17,7 +17,7 @@ from femubench.core.typing import FloatArray
 _MARGIN = 4
 
 
-def refined(structure: Structure) -> Frame:
+def refine_mesh(structure: Structure) -> Frame:
     """Return the frame with every element cut in two, with all the rest of it as it was.
 
     The flexible part of an element is halved. Labels `member/k` keep their meaning, so factors
@@ -53,7 +53,7 @@ def mesh_bias(model: Model, count: int, modes: Modes | None = None) -> FloatArra
         return None
     try:
         coarse = elastic_modes(model, count + _MARGIN) if modes is None else modes
-        fine = once_for(model, "fine", lambda: Model.of(structure.rebuilt(refined(structure))))
+        fine = once_for(model, "fine", lambda: Model.of(structure.rebuilt(refine_mesh(structure))))
         keep = common_dofs(structure, fine.frame_structure)
         return frequency_changes(model, coarse, fine, count, lambda shapes: shapes[keep])
     except ModelError:

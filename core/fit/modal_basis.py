@@ -55,7 +55,7 @@ class Space:
         """Tell which eigenvalues count as zero."""
         return np.asarray(np.abs(eigenvalues) <= np.square(2.0 * np.pi * self.zero))
 
-    def assembled(
+    def assemble(
         self, parts: Sequence[Projection], x: FloatArray
     ) -> tuple[FloatArray, FloatArray, float]:
         """Return stiffness, mass and total mass with some hypotheses at their coordinates.
@@ -118,16 +118,16 @@ class Space:
                     forces[columns, index] += part.rows.T @ (core @ (seen * scale))
         return np.moveaxis(forces, 0, 2), masses
 
-    def padded_readings(self, size: int) -> FloatArray:
+    def pad_readings(self, size: int) -> FloatArray:
         """Return the readings with zeros for added coordinates, (n_sensors, size)."""
         more = size - self.readings.shape[1]
         return np.pad(self.readings, ((0, 0), (0, more))) if more else self.readings
 
-    def rebased(self, parts: Sequence[Projection], x: FloatArray) -> Space:
+    def rebase(self, parts: Sequence[Projection], x: FloatArray) -> Space:
         """Return the modal coordinates of the model with some hypotheses in it."""
-        stiffness, mass, weight = self.assembled(parts, x)
+        stiffness, mass, weight = self.assemble(parts, x)
         values, turn = solve_pencil(stiffness, mass)
-        readings = self.padded_readings(len(stiffness)) @ turn
+        readings = self.pad_readings(len(stiffness)) @ turn
         # All rows at once: one product of large matrices is faster than hundreds of small ones.
         known = [part.rows for part in self.projections]
         n = len(self)

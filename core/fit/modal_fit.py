@@ -108,7 +108,7 @@ class State:
     def readings(self) -> FloatArray:
         """Return the readings of the partners at the sensors, 0 of still ones, (n_sensors, m)."""
         space = self.problem.space
-        seen = space.padded_readings(len(self.vectors)) @ self.vectors[:, self.partner]
+        seen = space.pad_readings(len(self.vectors)) @ self.vectors[:, self.partner]
         return np.where(space.still(self.eigenvalues[self.partner]), 0.0, seen)
 
     @cached_property
@@ -149,7 +149,7 @@ class State:
         gap[np.logical_and.outer(still, still[self.partner])] = np.inf
         slope = share[self.partner, np.arange(len(values))]
         turn = share / gap[:, :, None]
-        seen = self.problem.space.padded_readings(len(self.vectors)) @ self.vectors
+        seen = self.problem.space.pad_readings(len(self.vectors)) @ self.vectors
         change = np.tensordot(seen, turn, axes=1)
         moving = np.where(still[self.partner], np.inf, np.abs(signed_hz(values)))
         hertz = slope / (8.0 * np.pi**2 * moving)[:, None]
@@ -167,11 +167,11 @@ def state_at(problem: Problem, parts: Sequence[Projection], x: FloatArray) -> St
     Raises:
         ModelError: when they make the mass indefinite.
     """
-    stiffness, mass, weight = problem.space.assembled(parts, x)
+    stiffness, mass, weight = problem.space.assemble(parts, x)
     values, vectors = solve_pencil(stiffness, mass)
     data = problem.data
     count = min(len(values), problem.space.rigid + 2 * len(data.measurement) + 8)
-    seen = problem.space.padded_readings(len(vectors)) @ vectors[:, :count]
+    seen = problem.space.pad_readings(len(vectors)) @ vectors[:, :count]
     hertz = signed_hz(values[:count])
     for group, turn in data.turns(hertz, seen, problem.space.zero) if data.closeness else ():
         vectors[:, group] = vectors[:, group] @ turn
@@ -186,8 +186,8 @@ def _predicted(
     """Return the frequencies and readings of enough modes, (1, q) and (1, n_sensors, q)."""
     space, data = problem.space, problem.data
     count = min(len(values), space.rigid + 2 * len(data.measurement) + 8)
-    seen = space.padded_readings(len(vectors)) @ vectors[:, :count]
-    return data.predicted(signed_hz(values[None, :count]), seen[None], space.zero)
+    seen = space.pad_readings(len(vectors)) @ vectors[:, :count]
+    return data.predict(signed_hz(values[None, :count]), seen[None], space.zero)
 
 
 def _compared(

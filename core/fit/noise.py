@@ -63,7 +63,7 @@ class Noise:
         """Return vectors along the last axis in units of the noise, same shape."""
         return np.asarray(rows @ self._inverse.T)
 
-    def reweighed(self, rows: FloatArray, ratios: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def reweigh(self, rows: FloatArray, ratios: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return chi-square, (k,), and ln of the root of the determinant, of reweighed data, (k,).
 
         The mean is no part of it, nor the weight. What is not measurement stays as it is, so that

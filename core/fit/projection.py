@@ -69,7 +69,7 @@ class Projection:
         core = self.core(factors, mass=mass)
         return None if core is None else np.asarray(self.rows.T @ (core @ self.rows))
 
-    def turned(self, first: int, turn: FloatArray) -> Projection:
+    def turn(self, first: int, turn: FloatArray) -> Projection:
         """Return the same in coordinates of which some are combinations of those here.
 
         Arguments:
@@ -80,7 +80,7 @@ class Projection:
         rows[:, own] = rows[:, own] @ turn
         return replace(self, rows=rows, whole=False)
 
-    def restricted(self, kept: IntArray) -> Projection:
+    def restrict(self, kept: IntArray) -> Projection:
         """Return the same in some of the coordinates."""
         if self.whole:
             cores = self.cores[:, kept[:, None], kept]
@@ -133,7 +133,7 @@ class Projector:
         weights = np.where(is_mass, known, 0.0)
         return Projection(hypothesis, rows, cores, is_mass, weights, small is None)
 
-    def widened(self, projection: Projection, added: FloatArray) -> Projection:
+    def widen(self, projection: Projection, added: FloatArray) -> Projection:
         """Return a projection on further vectors besides, which stand behind those of the basis.
 
         Arguments:
@@ -161,7 +161,7 @@ class Projector:
             core[np.ix_(new, new)] = own
         return replace(projection, rows=np.eye(size), cores=cores)
 
-    def crossed(self, terms: Sequence[Term], near: FloatArray) -> list[FloatArray]:
+    def cross(self, terms: Sequence[Term], near: FloatArray) -> list[FloatArray]:
         """Return each of some fixed matrices, times some vectors, in the basis, (N, m) each.
 
         Arguments:

@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment
 from femubench.core.errors import NotApplicable
 from femubench.core.modal.close_modes import clusters_of, turn_towards
 from femubench.core.modal.correlated_errors import root_of, undone
-from femubench.core.modal.correlation import UNSEEN, seen_modes
+from femubench.core.modal.correlation import UNSEEN, find_seen_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import WINDOW
 from femubench.core.typing import FloatArray, IntArray
@@ -58,7 +58,7 @@ class Data:
         """Return 1/sigma of every shape component, 0 where there is none, (n_sensors, m)."""
         shapes, std = self.measurement.shapes, self.measurement.shape_std
         known = np.isfinite(shapes) & np.isfinite(std) & (std > 0.0)
-        known &= (known.sum(axis=0) > 1) & seen_modes(shapes)
+        known &= (known.sum(axis=0) > 1) & find_seen_modes(shapes)
         return np.where(known, 1.0 / np.where(known, std, 1.0), 0.0)
 
     @cached_property
@@ -122,7 +122,7 @@ class Data:
                 found.append((moving[group], turn))
         return found
 
-    def aligned(self, frequencies: FloatArray, readings: FloatArray, rigid: float) -> FloatArray:
+    def align(self, frequencies: FloatArray, readings: FloatArray, rigid: float) -> FloatArray:
         """Return readings with close modes turned to the measured shapes, for every candidate.
 
         Arguments:
@@ -176,7 +176,7 @@ class Data:
             best[g] = linear_sum_assignment(cost[g])[1]
         return np.asarray(best)
 
-    def scaled(self, readings: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def scale(self, readings: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return paired shapes times their modal scale factor, and the factors.
 
         Arguments:
@@ -206,7 +206,7 @@ class Data:
         """
         m = self.measurement
         mode, sensor = self.shape_rows
-        scaled, _ = self.scaled(readings)
+        scaled, _ = self.scale(readings)
         misfit = self.weight * (self.shapes - scaled)
         apart = (m.frequencies - frequencies) / m.frequency_std
         if m.frequency_correlation is not None:
@@ -229,7 +229,7 @@ class Data:
         """
         square = np.square(self.weight)
         mode, sensor = self.shape_rows
-        scaled, factor = self.scaled(readings[None])
+        scaled, factor = self.scale(readings[None])
         rest = self.shapes - 2.0 * scaled[0]
         slip = np.einsum("sm,smp->mp", square * rest, turn)
         slip = slip * self._inverse_norm(readings[None])[0][:, None]
@@ -255,7 +255,7 @@ class Data:
         m = len(self.measurement)
         return np.concatenate([np.tensordot(root_of(correlation), rows[:m], 1), rows[m:]])
 
-    def predicted(
+    def predict(
         self, frequencies: FloatArray, readings: FloatArray, rigid: float
     ) -> tuple[FloatArray, FloatArray]:
         """Return frequencies corrected for the mesh, and readings without rigid-body motions.
@@ -269,10 +269,10 @@ class Data:
             rigid: what counts as zero in Hz.
         """
         still = np.abs(frequencies) <= rigid
-        hertz = np.where(still, 0.0, self.corrected(frequencies, rigid))
+        hertz = np.where(still, 0.0, self.correct_for_mesh(frequencies, rigid))
         return hertz, np.where(still[:, None], 0.0, readings)
 
-    def corrected(self, frequencies: FloatArray, rigid: float) -> FloatArray:
+    def correct_for_mesh(self, frequencies: FloatArray, rigid: float) -> FloatArray:
         """Return frequencies with the correction for the mesh, counted from the first elastic one.
 
         The first elastic one is that of the model on which the corrections were found.

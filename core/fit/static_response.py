@@ -190,7 +190,7 @@ class Basis:
             whole = np.ones(moved.shape[1])
         return blocks
 
-    def enriched(self, space: Space, parts: Sequence[Projection], rounds: int = 2) -> Coordinates:
+    def enrich(self, space: Space, parts: Sequence[Projection], rounds: int = 2) -> Coordinates:
         """Return coordinates of their own for some hypotheses.
 
         Arguments:
@@ -200,12 +200,12 @@ class Basis:
                 exert on this response besides, and to its inertia.
         """
         near = self.modes.take(np.arange(self.tracked))
-        forces = [exerted(part.hypothesis, near) for part in parts]
+        forces = [find_forces(part.hypothesis, near) for part in parts]
         nothing = np.zeros((self.model.size, 0))
         added = self.response(np.hstack([nothing, *forces]), _FROM_HYPOTHESIS * len(parts))
         if rounds > 1 and added.shape[1]:
             there = Modes(np.full(added.shape[1], near.eigenvalues[-1]), added, near.rigid[:0])
-            forces = [exerted(part.hypothesis, there) for part in parts]
+            forces = [find_forces(part.hypothesis, there) for part in parts]
             forces.append(self.model.mass_times(added))
             more = self.response(np.hstack(forces), _FROM_HYPOTHESIS * len(parts), added)
             added = np.hstack([added, more])
@@ -226,11 +226,11 @@ class Basis:
         waiting: list[tuple[Projection, FloatArray]] = []
         for part in parts:
             kept = np.delete(np.arange(known + part.extra), np.arange(self.exact, known))
-            force = exerted(part.hypothesis, near)
+            force = find_forces(part.hypothesis, near)
             if sum(f.shape[1] for _, f in waiting) + force.shape[1] > _AT_ONCE:
                 yield from self._answered(space, waiting)
                 waiting = []
-            waiting.append((part.restricted(kept), force))
+            waiting.append((part.restrict(kept), force))
         yield from self._answered(space, waiting)
         self.forget()
 
@@ -265,7 +265,7 @@ class Basis:
         there = Coordinates(
             self, replace(space, eigenvalues=values, readings=readings), added, turn
         )
-        own = tuple(map(there.projected, parts))
+        own = tuple(map(there.project, parts))
         return replace(there, space=replace(there.space, projections=own))
 
 
@@ -293,13 +293,13 @@ class Coordinates:
         tail += self.added @ self.turn[shapes.shape[1] - exact :]
         return np.hstack([shapes[:, :exact], tail])
 
-    def projected(self, part: Projection) -> Projection:
+    def project(self, part: Projection) -> Projection:
         """Return a hypothesis in these coordinates, from how it is in those of the basis."""
-        widened = self.basis.projector.widened(part, self.added)
-        return widened.turned(self.basis.exact, self.turn)
+        widened = self.basis.projector.widen(part, self.added)
+        return widened.turn(self.basis.exact, self.turn)
 
 
-def exerted(hypothesis: Hypothesis, near: Modes) -> FloatArray:
+def find_forces(hypothesis: Hypothesis, near: Modes) -> FloatArray:
     """Return forces that span what a hypothesis exerts on some modes at any magnitude, (n, r)."""
     change, shapes = hypothesis.change, near.shapes
     rows = _touched(change.terms, len(shapes))
@@ -415,7 +415,7 @@ class LargeProblem(Problem):
         return self.basis
 
 
-def enriched(
+def enrich_problem(
     problem: Problem, parts: Sequence[Projection], rounds: int = 2
 ) -> tuple[Problem, tuple[Projection, ...]]:
     """Return the data in coordinates that hold the response to some hypotheses, and these there.
@@ -429,11 +429,11 @@ def enriched(
     """
     if not isinstance(problem, LargeProblem) or not parts:
         return problem, tuple(parts)
-    space = problem.common.enriched(problem.space, parts, rounds).space
+    space = problem.common.enrich(problem.space, parts, rounds).space
     return replace(problem, space=space), space.projections
 
 
-def placed(basis: Basis, data: Data, noise: Noise, hypotheses: Sequence[Hypothesis]) -> Problem:
+def place_data(basis: Basis, data: Data, noise: Noise, hypotheses: Sequence[Hypothesis]) -> Problem:
     """Return data in modal coordinates; none of the hypotheses is in them yet if some lack.
 
     Arguments:

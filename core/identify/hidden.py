@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from femubench.core.identify.basis import Lines
-from femubench.core.identify.modal_fit import ModalModel, predicted
+from femubench.core.identify.modal_fit import ModalModel, predict_responses
 from femubench.core.typing import AnyArray
 
 _DAMPING = (0.0025, 0.006, 0.015)
@@ -14,7 +14,7 @@ _MOST = 12
 _APART = 2.0  # half-power bandwidths between candidates
 
 
-def hidden_poles(lines: Lines, fit: ModalModel) -> tuple[AnyArray, AnyArray]:
+def find_hidden_poles(lines: Lines, fit: ModalModel) -> tuple[AnyArray, AnyArray]:
     """Return poles that would explain most of what a fit leaves, (n,), and participations.
 
     What is left is compared with single resonances on a grid of frequencies and dampings: a mode
@@ -26,7 +26,7 @@ def hidden_poles(lines: Lines, fit: ModalModel) -> tuple[AnyArray, AnyArray]:
 
     Returns participations (n_ref, n).
     """
-    left = (lines.responses - predicted(fit, lines)) * fit.weights
+    left = (lines.responses - predict_responses(fit, lines)) * fit.weights
     low, high = lines.omega[0], lines.omega[-1]
     omega = np.geomspace(low, high, max(2, int(np.log(high / low) / _STEP)))
     damping = np.repeat(_DAMPING, len(omega))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femubench.core.display import Shown, counted
+from femubench.core.display import Shown, count_noun
 from femubench.core.fem.sensors import Sensors
 from femubench.core.identify.complexity import mean_phase_deviation, phase_collinearity
 from femubench.core.identify.lscf import Poles
@@ -56,7 +56,7 @@ class Identification(Shown):
     def rows(self) -> list[tuple[str, str]]:
         """Return frequency, damping and collinearity of every mode."""
         low, high = self.band
-        found = [("", f"{counted(len(self), 'mode')} from {low:.6g} to {high:.6g} Hz")]
+        found = [("", f"{count_noun(len(self), 'mode')} from {low:.6g} to {high:.6g} Hz")]
         for k in range(len(self)):
             text = f"{self.frequencies[k]:.6g} Hz, std {self.frequency_std[k]:.2g} Hz"
             text += f", damping {self.damping[k]:.3g}, MPC {self.collinearity[k]:.3f}"

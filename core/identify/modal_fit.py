@@ -236,7 +236,7 @@ def _result(point: _Point, weights: FloatArray) -> ModalModel:
     )
 
 
-def predicted(fit: ModalModel, lines: Lines) -> AnyArray:
+def predict_responses(fit: ModalModel, lines: Lines) -> AnyArray:
     """Return the responses of a fit at the lines, whitened, complex, (n_f, n_out, n_ref)."""
     base = lines.modes(fit.poles)[:, :, :2]
     residues = fit.shapes[:, None, :] * fit.participation[None]  # (out, ref, n)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from femubench.core.identify.basis import RESIDUALS, Lines
-from femubench.core.identify.modal_fit import ModalModel, predicted
+from femubench.core.identify.modal_fit import ModalModel, predict_responses
 from femubench.core.typing import AnyArray, BoolArray, FloatArray
 
 # Lines over which the level is averaged: these, and as many as give so many values of all channels.
@@ -52,7 +52,7 @@ def noise_left(
         rough: take the course over frequency from second differences of the lines alone, in which
             a mode that the fit lacks does not show.
     """
-    error = lines.responses - predicted(fit, lines)
+    error = lines.responses - predict_responses(fit, lines)
     scaled = error * fit.weights
     if rough:
         padded = np.concatenate([scaled[1:2], scaled, scaled[-2:-1]])
@@ -77,7 +77,7 @@ def unevenness(fit: ModalModel, lines: Lines) -> FloatArray:
     channel's own response it is largest where a mode is seen best. The first column weighs lines
     as poles depend on them, the second as shapes do.
     """
-    error = np.square(np.abs((lines.responses - predicted(fit, lines)) * fit.weights))
+    error = np.square(np.abs((lines.responses - predict_responses(fit, lines)) * fit.weights))
     resonance = np.abs((1j * lines.omega[:, None]) ** lines.derivative / lines.noise[:, None])
     resonance = resonance / np.square(np.abs(1j * lines.omega[:, None] - fit.poles))
     seen = (

@@ -10,12 +10,12 @@ import numpy as np
 from femubench.core.errors import InputError
 from femubench.core.identify.basis import Lines
 from femubench.core.identify.clusters import Cluster, clusters_of
-from femubench.core.identify.hidden import hidden_poles
+from femubench.core.identify.hidden import find_hidden_poles
 from femubench.core.identify.identification import Identification
 from femubench.core.identify.lscf import Poles, lscf_poles
-from femubench.core.identify.modal_fit import ModalModel, fit_modes, predicted
+from femubench.core.identify.modal_fit import ModalModel, fit_modes, predict_responses
 from femubench.core.identify.noise import first_weights, noise_left, unevenness
-from femubench.core.identify.selection import needed, select
+from femubench.core.identify.selection import find_needed, select
 from femubench.core.modal.complex_modes import mean_phase
 from femubench.core.modal.correlation import mac
 from femubench.core.modal.frf import DERIVATIVES, FrequencyResponses
@@ -49,7 +49,7 @@ def identify_responses(
     data = measured if band is None else measured.within(*band)
     data = data.within(np.nextafter(0.0, 1.0), np.inf)
     if len(data.references) > len(data.responses):
-        data = data.turned()
+        data = data.transpose()
     if len(data.frequencies) < _FEWEST_LINES:
         what = f"{len(data.frequencies)} lines above 0 Hz in the band"
         raise InputError(what, key="band", expected=f"{_FEWEST_LINES} or more")
@@ -104,9 +104,9 @@ def _fitted(lines: Lines, clusters: Sequence[Cluster], seen: BoolArray) -> tuple
     for _ in range(_ROUNDS):
         lines, weights = noise_left(fit, lines, seen, rough=True)
         fit = fit_modes(lines, fit.poles, fit.participation, weights)
-        poles, forces = hidden_poles(lines, fit)
+        poles, forces = find_hidden_poles(lines, fit)
         more = select(lines, poles, weights, fit.poles)
-        keep = needed(lines, fit.poles, weights) & ~_twice(fit)
+        keep = find_needed(lines, fit.poles, weights) & ~_twice(fit)
         if not len(more) and keep.all():
             break
         start = np.concatenate([fit.poles[keep], poles[more]])
@@ -172,7 +172,7 @@ def _identification(
         poles=poles,
         band=(low, high),
         measured=data,
-        synthesised=predicted(fit, lines) * lines.noise[:, None, None],
+        synthesised=predict_responses(fit, lines) * lines.noise[:, None, None],
     )
 
 

@@ -12,7 +12,7 @@ _BLOCK = 4  # functions of a mode
 _SURE = 8.0  # standard deviations above what a mode of noise explains
 
 
-def explained(
+def find_gain(
     products: Products, chosen: IntArray, candidates: IntArray, weights: FloatArray
 ) -> FloatArray:
     """Return how much smaller the misfit gets by each candidate, in units of the noise, (n,).
@@ -72,14 +72,14 @@ def select(lines: Lines, candidates: AnyArray, weights: FloatArray, chosen: AnyA
     inside = list(range(len(chosen)))
     waiting = list(range(len(chosen), len(chosen) + len(candidates)))
     while waiting:
-        gains = explained(products, np.array(inside, dtype=int), np.array(waiting), weights)
+        gains = find_gain(products, np.array(inside, dtype=int), np.array(waiting), weights)
         if gains.max() < least_gain(weights):
             break
         inside.append(waiting.pop(int(gains.argmax())))
     return np.array(inside[len(chosen) :], dtype=np.int64) - len(chosen)
 
 
-def needed(lines: Lines, poles: AnyArray, weights: FloatArray) -> BoolArray:
+def find_needed(lines: Lines, poles: AnyArray, weights: FloatArray) -> BoolArray:
     """Tell which modes the data need beside all others, (n,); at most one is not, the weakest.
 
     Arguments:
@@ -89,7 +89,7 @@ def needed(lines: Lines, poles: AnyArray, weights: FloatArray) -> BoolArray:
     """
     keep = np.ones(len(poles), dtype=bool)
     products, every = Products.of(lines, poles), np.arange(len(poles))
-    gains = [explained(products, np.delete(every, k), every[[k]], weights)[0] for k in every]
+    gains = [find_gain(products, np.delete(every, k), every[[k]], weights)[0] for k in every]
     if len(poles) > 1:
         keep[np.argmin(gains)] = min(gains) >= least_gain(weights)
     return keep

@@ -39,7 +39,7 @@ class Charge:
     x: float = 0.0
     std: float = 0.0
 
-    def corrected(self, x: float) -> Corrected:
+    def correct(self, x: float) -> Corrected:
         """Return model and data as they are right at a coordinate of the parameter."""
         parameter = self.suspect.parameter
         value = 0.0 if parameter is None else float(parameter.value(np.array(x)))
@@ -50,7 +50,7 @@ class Charge:
         """Return how many frequencies and readings mending it changes."""
         if self.fault.side == "input":
             return 0
-        _, other = self.corrected(1.0)
+        _, other = self.correct(1.0)
         pairs = ((getattr(self.measurement, name), getattr(other, name)) for name in _VALUES)
         return sum(
             int(((one != two) & ~(np.isnan(one) & np.isnan(two))).sum()) for one, two in pairs
@@ -83,9 +83,9 @@ class Charge:
         A single datum cannot tell its own error: it is discounted, by what the error may be.
         """
         if not self.single:
-            return self.corrected(self.x)
+            return self.correct(self.x)
         step = settings.slope_step
-        (_, less), (_, more) = self.corrected(-step), self.corrected(step)
+        (_, less), (_, more) = self.correct(-step), self.correct(step)
         wide = {
             std: np.hypot(
                 getattr(self.measurement, std),

@@ -87,7 +87,7 @@ class Effort:
         for kind in ("single", "together", "more"):
             self.expect(kind, _times(searches, each[kind]))
 
-    def explained(self, adequate: bool) -> None:
+    def note_adequacy(self, adequate: bool) -> None:
         """Say whether what was found leaves no more than noise, which decides on what follows."""
         self._adequate = adequate
 

@@ -18,13 +18,13 @@ from femubench.core.fit.mesh_error import mesh_bias
 from femubench.core.fit.modal_fit import Fit, Problem, State, fit, log_evidence, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
-from femubench.core.fit.static_response import Basis, placed
+from femubench.core.fit.static_response import Basis, place_data
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.model_error import (
     Fitted,
     Inadequacy,
     class_widths,
-    conditioned,
+    condition_noise,
     error_slopes,
     rows_of,
     scatter_slopes,
@@ -236,14 +236,14 @@ def examine(
     with threadpool_limits(1):
         hypotheses, known = _candidates(model, tuple(effects), reference)
         basis = Basis.of(model, measurement)
-        problem, slopes = posed(model, measurement, hypotheses, tolerance, basis)
+        problem, slopes = pose_problem(model, measurement, hypotheses, tolerance, basis)
         before = None if reference is None else before_of(problem, reference)
         explanations: list[Explanation] = []
         error = None
         if width > 0.0:
             error = model_error_of(problem, basis, before, width, log(1.0 - beam))
             with effort.scope():
-                explanations = searched(problem, error, known, pairs, effort)
+                explanations = search_explanations(problem, error, known, pairs, effort)
         own = replace(problem, noise=beam_noise(basis, slopes, before, tolerance, log(beam)))
         slopes = slopes[: len(measurement)].copy()  # those of shapes fill the memory
         floor = max((e.log_weight for e in explanations), default=-np.inf) - settings.lag
@@ -286,7 +286,7 @@ def before_of(problem: Problem, reference: Measurement) -> State:
     return state_at(replace(problem, data=data, noise=Noise(np.eye(len(data)))), (), np.zeros(0))
 
 
-def searched(
+def search_explanations(
     problem: Problem, error: Inadequacy, effects: Sequence[Effect], pairs: bool, effort: Effort
 ) -> list[Explanation]:
     """Return explanations beside a model error, each with scales of its own where it matters.
@@ -300,7 +300,7 @@ def searched(
         own = replace(problem, noise=error.noise(scales))
         return Search(own, effects, pairs=pairs, effort=effort).run()[0]
 
-    scales = error.fitted(nothing)
+    scales = error.fit(nothing)
     explanations: list[Explanation] = []
     effort.expect_alike(settings.scale_rounds, pairs)
     if len(error.residual):
@@ -312,7 +312,7 @@ def searched(
         effort.expect_alike(left, pairs)
         explanations += sought(scales, pairs)
         best = by_weight(explanations)[0].fit.state
-        before, scales = scales, error.fitted(best, scales)
+        before, scales = scales, error.fit(best, scales)
         gain = error.log_density(best, scales.v) - error.log_density(best, before.v)
         if gain < settings.worth_scales:
             break
@@ -341,8 +341,8 @@ def with_scales(
     """Return an explanation with the scales of model error that suit it best."""
     state = explanation.fit.state
     if state.parts:
-        error = error.beside(nothing, state)
-    problem = replace(state.problem, noise=error.noise(error.fitted(state, near)))
+        error = error.add_own_error(nothing, state)
+    problem = replace(state.problem, noise=error.noise(error.fit(state, near)))
     found: Fit | None
     if state.parts:
         found = fit(problem, state.parts, state.x, steps=settings.few_steps)
@@ -383,10 +383,10 @@ def beam_noise(
         earlier = scatter_slopes(before.problem, basis.modes)[:, : slopes.shape[1]]
         rows, known = np.vstack([earlier, slopes]), before.raw
     covariance = np.eye(len(rows)) + tolerance**2 * (rows @ rows.T)
-    return conditioned(covariance, known, weight, beam=True)
+    return condition_noise(covariance, known, weight, beam=True)
 
 
-def posed(
+def pose_problem(
     model: Model,
     measurement: Measurement,
     hypotheses: Iterable[Hypothesis],
@@ -401,6 +401,6 @@ def posed(
     bias = mesh_bias(model, 2 * len(measurement) + settings.spare_modes)
     still = basis.modes.rigid | (basis.modes.eigenvalues <= zero_tolerance(basis.modes))
     data = Data(measurement, np.zeros(0) if bias is None else bias, int(still.sum()))
-    plain = placed(basis, data, Noise(np.eye(len(data))), tuple(hypotheses))
+    plain = place_data(basis, data, Noise(np.eye(len(data))), tuple(hypotheses))
     slopes = scatter_slopes(plain, basis.modes) if tolerance else np.zeros((len(data), 0))
     return with_shortlist(replace(plain, noise=Noise.of(slopes, tolerance))), slopes

@@ -31,10 +31,16 @@ from femubench.core.fit.extended_model import raw_residual
 from femubench.core.fit.modal_fit import State, log_evidence, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
-from femubench.core.fit.static_response import Basis, placed
+from femubench.core.fit.static_response import Basis, place_data
 from femubench.core.inference.charge import Charge, Mended, charges_of
 from femubench.core.inference.effort import Effort
-from femubench.core.inference.examine import Examination, Terms, before_of, model_error_of, posed
+from femubench.core.inference.examine import (
+    Examination,
+    Terms,
+    before_of,
+    model_error_of,
+    pose_problem,
+)
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import DENSE_LIMIT
@@ -95,7 +101,7 @@ def inquire(
         if found is None:
             break
         mended.append(found)
-        now = now.mended(found.charge)
+        now = now.remove_fault(found.charge)
         ranked = _weighed(now, known, effort)
     reweighing = [charge for charge, _ in ranked if charge.reweighs]
     with effort.scope({"single": (0.0, float(settings.candidates * bool(reweighing)))}):
@@ -133,7 +139,7 @@ def _definite(now: _Drawn, ranked: Weighed, terms: Terms) -> Mended | None:
     best = int(np.argmax(densities))
     rest = [now.log_density + gain for _, gain in pairs[len(tried) :]]
     probability = exp(densities[best] - float(logsumexp([without, *densities, *rest])))
-    found = now.refined(tried[best][0])
+    found = now.refine(tried[best][0])
     sure = probability > settings.sure_fault and _inside(found)
     return Mended(found, probability) if sure else None
 
@@ -144,9 +150,9 @@ def _reweighed(
     """Return other deviations, if those are more probable than the stated ones."""
     plain, caused = now.log_density, log_density(seen, now.measurement)
     without = float(np.logaddexp(plain, caused))
-    best = now.beside(seen.best)
+    best = now.add_causes(seen.best)
     found = [(charge, plain + now.gain(charge)) for charge in charges]
-    again = (best.screened(charge) for charge in charges)
+    again = (best.screen(charge) for charge in charges)
     found += [(charge, caused + gain) for charge, gain in again]
     charge, density = max(found, key=lambda pair: pair[1], default=(None, -np.inf))
     if charge is None or density < without - settings.lag:
@@ -157,7 +163,7 @@ def _reweighed(
     for _ in range(settings.few_steps if charge.loosens < 1.0 else 0):
         mended = terms.single().examine(*charge.mended)
         density = log_density(mended, now.measurement) + now.prior(charge)
-        charge = now.beside(mended.best).estimated(charge)
+        charge = now.add_causes(mended.best).estimate(charge)
         if not _inside(charge):
             return None
     odds = density - without
@@ -211,11 +217,11 @@ class _Drawn:
     @cached_property
     def state(self) -> State:
         """Return the prediction, and the noise with scales that suit these data best."""
-        problem, _ = posed(self.model, self.measurement, (), 0.0, self.basis)
+        problem, _ = pose_problem(self.model, self.measurement, (), 0.0, self.basis)
         before = None if self.reference is None else before_of(problem, self.reference)
         error = model_error_of(problem, self.basis, before, self.width, 0.0)
         found = state_at(problem, (), np.zeros(0))
-        noise = error.noise(error.fitted(found))
+        noise = error.noise(error.fit(found))
         return replace(found, problem=replace(problem, noise=noise))
 
     @cached_property
@@ -224,7 +230,7 @@ class _Drawn:
         data = self.state.problem.data
         return log_evidence(self.state) - float(np.log(data.std).sum())
 
-    def beside(self, explanation: Explanation) -> _Drawn:
+    def add_causes(self, explanation: Explanation) -> _Drawn:
         """Return the same with causes in the model, whose sizes are free to first order."""
         other = _Drawn(self.model, self.measurement, self.reference, self.width, self.basis)
         state = explanation.fit.state
@@ -235,7 +241,7 @@ class _Drawn:
         other.state = replace(state, problem=problem, raw=state.raw + moved)
         return other
 
-    def mended(self, charge: Charge) -> _Drawn:
+    def remove_fault(self, charge: Charge) -> _Drawn:
         """Return the same without a fault."""
         if charge not in self._without:
             model, measurement = charge.mended
@@ -252,18 +258,18 @@ class _Drawn:
         """
         if gain <= -settings.as_well:
             return charge, -np.inf
-        found = charge if charge.single else self.refined(charge)
+        found = charge if charge.single else self.refine(charge)
         return found, self.gain(found) if _inside(found) else -np.inf
 
-    def refined(self, charge: Charge) -> Charge:
+    def refine(self, charge: Charge) -> Charge:
         """Return a fault with its parameter at the scales that suit the data without it."""
         known = charge.suspect.parameter is None
-        return charge if known else self.mended(charge).estimated(charge)
+        return charge if known else self.remove_fault(charge).estimate(charge)
 
     def gain(self, charge: Charge) -> float:
         """Return by how many nats a fault is likelier than none, at scales of its own."""
         try:
-            other = self.mended(charge)
+            other = self.remove_fault(charge)
             found = other.log_density
         except (FemubenchError, la.LinAlgError):
             return -np.inf
@@ -285,11 +291,11 @@ class _Drawn:
         leaves little to be wrong.
         """
         if charge.fault.side == "input":
-            before, after = self.state.raw, self.mended(charge).state.raw
+            before, after = self.state.raw, self.remove_fault(charge).state.raw
             return float(after @ after) < settings.fault_remainder * float(before @ before)
         if not charge.single:
             return True
-        wide = self.mended(charge).measurement
+        wide = self.remove_fault(charge).measurement
         m = self.measurement
         raw = self.state.raw - self.state.problem.noise.mean
         rows = self.state.problem.data.by_mode(raw)[: len(m)]
@@ -307,7 +313,7 @@ class _Drawn:
             return found
         ratio = np.array([own.std / one.std for one in same])
         apart = np.array([self.state.against(one) for one in same])
-        chi2, log_det = noise.reweighed(apart / ratio - noise.mean, ratio)
+        chi2, log_det = noise.reweigh(apart / ratio - noise.mean, ratio)
         sizes = np.array([_log_size(one) for one in same]) - self._log_size
         found[rows] = sizes - 0.5 * chi2 - log_det - self._plain
         return found
@@ -321,12 +327,12 @@ class _Drawn:
     def _log_size(self) -> float:
         return _log_size(self.state.problem.data)
 
-    def screened(self, charge: Charge) -> tuple[Charge, float]:
+    def screen(self, charge: Charge) -> tuple[Charge, float]:
         """Return a fault with its parameter estimated, and what it gains at the present scales."""
         try:
             if charge.suspect.parameter is None or charge.single:
                 return charge, float(self.likelier([charge.mended[1]])[0]) + charge.log_prior
-            found = self.estimated(charge)
+            found = self.estimate(charge)
             if not _inside(found):
                 return found, -np.inf
             return found, float(self.likelier([found.mended[1]])[0]) + self.prior(found)
@@ -342,16 +348,16 @@ class _Drawn:
             with suppress(FemubenchError, la.LinAlgError):
                 gains.update(zip(some, self.likelier(c.mended[1] for c in some), strict=True))
         return [
-            (c, float(gains[c]) + c.log_prior) if c in gains else self.screened(c) for c in charges
+            (c, float(gains[c]) + c.log_prior) if c in gains else self.screen(c) for c in charges
         ]
 
-    def estimated(self, charge: Charge) -> Charge:
+    def estimate(self, charge: Charge) -> Charge:
         """Return a fault with its parameter at the most probable value."""
         if charge.suspect.parameter is None:
             return charge
 
         def costs(points: FloatArray) -> FloatArray:
-            gains = self.likelier([charge.corrected(float(x))[1] for x in points])
+            gains = self.likelier([charge.correct(float(x))[1] for x in points])
             return 0.5 * np.square(points) - np.where(np.isfinite(gains), gains, -1e300)
 
         def cost(x: float) -> float:
@@ -374,7 +380,7 @@ class _Drawn:
             return []
         return charges[: settings.shortlist // 2 if self.model.size > DENSE_LIMIT else len(charges)]
 
-    def typed(self, charge: Charge) -> Weighed:
+    def weigh_input(self, charge: Charge) -> Weighed:
         """Return a fault of what was typed in with what it gains at the present scales."""
         problem, noise = self.state.problem, self.state.problem.noise
         try:
@@ -408,7 +414,7 @@ def _weighed(now: _Drawn, faults: Sequence[Fault], effort: Effort) -> Weighed:
         promises: Weighed = []
         for charge in typed:
             with effort.piece("typed"):
-                promises += now.typed(charge)
+                promises += now.weigh_input(charge)
         with effort.piece("faults"):
             promises = [*now.all_screened(data), *promises]
             kinds: dict[str, Weighed] = {}
@@ -447,7 +453,7 @@ def _half_chi2(charge: Charge | None, model: Model, measurement: Measurement) ->
             model, measurement = charge.mended
         data = Data(measurement, np.zeros(0))
         noise = Noise.of(np.zeros((len(data), 0)), 0.0)
-        problem = placed(Basis.of(model, measurement), data, noise, ())
+        problem = place_data(Basis.of(model, measurement), data, noise, ())
         return 0.5 * float(np.square(state_at(problem, (), np.zeros(0)).raw).sum())
     except (FemubenchError, la.LinAlgError):
         return np.inf

@@ -42,7 +42,7 @@ class Screened:
     log_evidence: float
 
 
-def interpolated(
+def interpolate_best(
     projections: Sequence[Projection], residuals: FloatArray, still: FloatArray
 ) -> list[Screened]:
     """Return the best point of every hypothesis.
@@ -176,7 +176,7 @@ def screen(
     density = problem.noise.log_density
     return [
         replace(item, log_evidence=item.log_evidence + density)
-        for item in interpolated(projections, residuals, still)
+        for item in interpolate_best(projections, residuals, still)
     ]
 
 
@@ -198,7 +198,7 @@ def likely(
         return []
     both = np.concatenate([item.residuals for item in screened]) + (state.residual - still)
     seen = marginal(both, state.jacobian), marginal(state.residual, state.jacobian)
-    rows = interpolated(projections, *seen)
+    rows = interpolate_best(projections, *seen)
     promising = in_order(
         (row for row in rows if state.chi2 - row.cost > least), lambda row: row.cost
     )
@@ -261,7 +261,7 @@ def residuals_at(
     count = min(size, space.rigid + 2 * len(problem.data.measurement) + settings.spare_modes)
     values, vectors = _solve(stiffness, None if heavy is None else mass, count)
     kept = values[:, 0] < settings.far / 2.0
-    seen = space.padded_readings(size) @ vectors[kept]
+    seen = space.pad_readings(size) @ vectors[kept]
     weight = space.mass + factors[kept] @ projection.weights
     return grid[kept], _compared(problem, signed_hz(values[kept]), seen, weight)
 
@@ -276,8 +276,8 @@ def _compared(
         mass: of the structure in kg, (g,).
     """
     data, zero = problem.data, problem.space.zero
-    seen = data.aligned(hertz, seen, zero)
-    hertz, seen = data.predicted(hertz, seen, zero)
+    seen = data.align(hertz, seen, zero)
+    hertz, seen = data.predict(hertz, seen, zero)
     partner = data.pair(hertz, seen)
     each = np.arange(len(partner))[:, None]
     paired = np.moveaxis(np.moveaxis(seen, 2, 1)[each, partner], 1, 2)

@@ -289,7 +289,7 @@ class Inadequacy:
             log_prior,
         )
 
-    def beside(self, nothing: State, state: State) -> Inadequacy:
+    def add_own_error(self, nothing: State, state: State) -> Inadequacy:
         """Return the model error where part of what an explanation changes is its own error.
 
         An effect at a place is an idealisation, and the beams that carry it to the sensors are.
@@ -361,7 +361,7 @@ class Inadequacy:
             found = np.append(found, float(self._own(v) @ weight.diagonal()))
         return np.asarray(2.0 * settings.error_scale_spread * found)
 
-    def fitted(self, state: State, near: Fitted | None = None) -> Fitted:
+    def fit(self, state: State, near: Fitted | None = None) -> Fitted:
         """Return the most probable scales where the causes of a state may still move.
 
         Arguments:
@@ -491,7 +491,7 @@ class Inadequacy:
         """Return the noise of the data at definite scales, given the reference."""
         total = self.covariance(found.v)
         weight = found.log_volume - 0.5 * float(found.v @ found.v) + self.log_prior
-        noise = conditioned(total, self.residual, weight, beam=False)
+        noise = condition_noise(total, self.residual, weight, beam=False)
         # Source: Grünwald (2012), the safe Bayesian; Miller & Dunson (2019), coarsened posteriors.
         return replace(noise, scales=found.v, trust=settings.trust_in_model_error)
 
@@ -501,7 +501,7 @@ def _scale(v: FloatArray) -> FloatArray:
     return Discrepancy(settings.error_scale_median, settings.error_scale_spread).std(v)
 
 
-def conditioned(total: FloatArray, known: FloatArray, weight: float, *, beam: bool) -> Noise:
+def condition_noise(total: FloatArray, known: FloatArray, weight: float, *, beam: bool) -> Noise:
     """Return the noise of data whose reference is known.
 
     Arguments:

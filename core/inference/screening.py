@@ -52,7 +52,7 @@ def with_shortlist(problem: Problem) -> Problem:
     return replace(problem, space=space)
 
 
-def screened(
+def screen_hypotheses(
     problem: Problem, base: State, projections: Sequence[Projection], effort: Effort
 ) -> list[Screened]:
     """Return the atlas; of a large model, each hypothesis in coordinates of its own."""
@@ -87,7 +87,7 @@ def _tried(own: Problem, projection: Projection) -> Screened | None:
     return Screened(projection, grid, residuals, state.x, state.cost, found.log_evidence)
 
 
-def beside(problem: Problem, seed: Fit) -> Problem:
+def rebase_problem(problem: Problem, seed: Fit) -> Problem:
     """Return the data in the modal coordinates of the model with some causes in it.
 
     Arguments:
@@ -96,9 +96,9 @@ def beside(problem: Problem, seed: Fit) -> Problem:
     """
     state = seed.state
     if not isinstance(problem, LargeProblem):
-        space = problem.space.rebased(seed.parts, state.x)
+        space = problem.space.rebase(seed.parts, state.x)
         return replace(problem, space=space, offset=state.problem.offset)
-    found = problem.common.enriched(problem.space, seed.parts)
+    found = problem.common.enrich(problem.space, seed.parts)
     space = found.space
     own = replace(problem, space=space, offset=state.problem.offset)
     there = state_at(own, space.projections, state.x)
@@ -109,8 +109,8 @@ def beside(problem: Problem, seed: Fit) -> Problem:
     known = {id(p.hypothesis): p for p in problem.space.projections}
     chosen = _chosen(ranked, settings.large_shortlist // 4, settings.of_a_kind)
     parts = [known.get(id(h)) or problem.common.projector(h) for h in chosen]
-    partners = tuple(map(found.projected, parts))
-    rebased = replace(space, projections=partners).rebased(space.projections, state.x)
+    partners = tuple(map(found.project, parts))
+    rebased = replace(space, projections=partners).rebase(space.projections, state.x)
     return replace(own, space=rebased)
 
 
@@ -212,7 +212,7 @@ def _pulls(
         return _followed(projector(hypothesis), grid, factors, near, values)
     terms = hypothesis.change.terms
     heavy = np.array([term.matrix == "mass" for term in terms])
-    forces = np.array(projector.crossed(terms, near))
+    forces = np.array(projector.cross(terms, near))
     forces *= np.where(heavy[:, None], -values, 1.0)[:, None]
     weights = projector(hypothesis).weights if weighed else np.zeros(len(terms))
     return _Pulls(grid, factors, forces, weights)

@@ -16,15 +16,15 @@ from femubench.core.change.hypothesis import (
     hypotheses_of,
 )
 from femubench.core.errors import ModelError
-from femubench.core.fit.extended_model import agreed, extended
+from femubench.core.fit.extended_model import check_joint_fit, extend_model
 from femubench.core.fit.modal_fit import Fit, Problem, State, fit, log_evidence, state_at
 from femubench.core.fit.projection import Projection
-from femubench.core.fit.static_response import Basis, LargeProblem, enriched, placed
+from femubench.core.fit.static_response import Basis, LargeProblem, enrich_problem, place_data
 from femubench.core.inference.effort import Effort, of_a_search
 from femubench.core.inference.grid_search import Screened, likely, screen
 from femubench.core.inference.posterior import Explanation, by_weight
 from femubench.core.inference.prior import Base, selection_cost, textbook_bases
-from femubench.core.inference.screening import beside, screened, with_shortlist
+from femubench.core.inference.screening import rebase_problem, screen_hypotheses, with_shortlist
 from femubench.core.inference.settings import settings
 from femubench.core.roles import Effect
 from femubench.core.ties import in_order
@@ -119,17 +119,17 @@ class Search:
     def _run(self, bases: Sequence[Base]) -> tuple[list[Explanation], list[Found]]:
         found = [self.on(bases[0])]
         bare = [self.bare(base) for base in bases[1:]]
-        self.effort.explained(self.enough(found) or any(map(self.adequate, bare)))
+        self.effort.note_adequacy(self.enough(found) or any(map(self.adequate, bare)))
         promising = self.promising(bare, found[0])
         self.effort.expect("single", len(promising))
         for base in promising:
             found.append(self.on(base))
-            self.effort.explained(self.enough(found) or any(map(self.adequate, bare)))
+            self.effort.note_adequacy(self.enough(found) or any(map(self.adequate, bare)))
         explanations = [e for item in found for e in item.explanations]
         searched = {item.base.names for item in found}
         explanations += [e for e in bare if e.base.names not in searched]
         if self.pairs and self.names and _best(explanations).log_weight > self.floor:
-            explanations += self.combined(found)
+            explanations += self.combine(found)
             self.effort.expect("together", 0)
             self.effort.expect("more", 0)
             for best in by_weight(explanations)[: settings.candidates]:
@@ -141,7 +141,7 @@ class Search:
 
     def bare(self, base: Base) -> Explanation:
         """Return a textbook set with nothing on top, in the coordinates of the model as drawn."""
-        state = state_at(*enriched(self.problem, base.parts), base.x)
+        state = state_at(*enrich_problem(self.problem, base.parts), base.x)
         alone = replace(state, parts=(), x=np.zeros(0))
         return Explanation(base, Fit(alone, log_evidence(alone)), self.names)
 
@@ -167,7 +167,7 @@ class Search:
         if isinstance(best.fit.state.problem, LargeProblem):
             best.fit.state.problem.common.forget()  # a solution takes its room
         others = [e for e in explanations if e is not best]
-        borne = agreed(best.fit)
+        borne = check_joint_fit(best.fit)
         return others if borne is None else [*others, replace(best, fit=borne)]
 
     def promising(self, bare: Sequence[Explanation], plain: Found) -> list[Base]:
@@ -185,11 +185,11 @@ class Search:
     def on(self, base: Base) -> Found:
         """Return nothing and every single cause on top of a textbook set."""
         with self.effort.piece("single"):
-            problem = self.grounded(base) if base.parts else self.problem
+            problem = self.ground(base) if base.parts else self.problem
             start = fit(problem, (), np.zeros(0))
             assert start is not None
-            atlas = screened(problem, start.state, problem.space.projections, self.effort)
-            fits = self.refined(problem, start, atlas)
+            atlas = screen_hypotheses(problem, start.state, problem.space.projections, self.effort)
+            fits = self.refine(problem, start, atlas)
             explanations = [Explanation(base, item, self.names) for item in (start, *fits)]
             ranked = by_weight(explanations[1:])
             # What tells more may carry most of it: the best of what it refines count anywhere.
@@ -199,18 +199,18 @@ class Search:
             explanations += [e for one in (*ranked[:most], *own[:most]) for e in self.split(one)]
             return Found(base, problem, tuple(explanations), tuple(atlas))
 
-    def grounded(self, base: Base) -> Problem:
+    def ground(self, base: Base) -> Problem:
         """Return the data in the modal coordinates of the model with textbook effects in it.
 
         All effects are sought there anew: what they do depends on what is there, and a textbook
         value may be off.
         """
-        model = extended(self.problem.model, base.parts, base.x)
+        model = extend_model(self.problem.model, base.parts, base.x)
         known = hypotheses_of(model, by_themselves(self.effects))
         basis = Basis.of(model, self.problem.data.measurement)
-        return with_shortlist(placed(basis, self.problem.data, self.problem.noise, known))
+        return with_shortlist(place_data(basis, self.problem.data, self.problem.noise, known))
 
-    def refined(self, problem: Problem, start: Fit, screened: Sequence[Screened]) -> list[Fit]:
+    def refine(self, problem: Problem, start: Fit, screened: Sequence[Screened]) -> list[Fit]:
         """Return exact fits of the hypotheses that the atlas does not rule out."""
         if not screened:
             return []
@@ -230,7 +230,7 @@ class Search:
         best = start.state.cost
         for number, item in enumerate((*near, *chances)):
             self.effort.step(number, len(near) + len(chances))
-            own, parts = enriched(problem, (item.projection,))
+            own, parts = enrich_problem(problem, (item.projection,))
             give_up = best + settings.given_up if id(item) in known else np.inf
             result = fit(own, parts, item.x, give_up=give_up)
             if result is not None:
@@ -238,7 +238,7 @@ class Search:
                 best = min(best, result.state.cost)
         return fits
 
-    def combined(self, found: Sequence[Found]) -> list[Explanation]:
+    def combine(self, found: Sequence[Found]) -> list[Explanation]:
         """Return explanations with two causes, then greedily more while that is worth it."""
         by_base = {item.base.names: item for item in found}
         singles = by_weight(e for item in found for e in item.explanations if e.parts)
@@ -249,20 +249,20 @@ class Search:
         result: list[Explanation] = []
         tried: set[tuple[object, ...]] = set()
         for seed in seeds:
-            result += self.grown(by_base[seed.base.names], seed, tried)
-            self.effort.explained(enough or (bool(result) and self.adequate(_best(result))))
+            result += self.grow(by_base[seed.base.names], seed, tried)
+            self.effort.note_adequacy(enough or (bool(result) and self.adequate(_best(result))))
         if not result:
             return result
         best = _best(result)
         self.effort.expect("together", len(best.parts))
-        result += self.swapped(by_base[best.base.names], best, tried)
+        result += self.swap(by_base[best.base.names], best, tried)
         self.effort.expect("together", 0)
         while True:
             best = _best(result)
-            self.effort.explained(enough or self.adequate(best))
+            self.effort.note_adequacy(enough or self.adequate(best))
             if len(best.parts) >= settings.most_causes or self.adequate(best):
                 return result
-            result += self.grown(by_base[best.base.names], best, tried)
+            result += self.grow(by_base[best.base.names], best, tried)
             if _best(result) is best:
                 return result
 
@@ -274,7 +274,7 @@ class Search:
         """Tell whether nothing or one cause leaves no more than noise."""
         return any(self.adequate(e) for item in found for e in item.explanations)
 
-    def grown(
+    def grow(
         self, found: Found, seed: Explanation, tried: set[tuple[object, ...]]
     ) -> list[Explanation]:
         """Return an explanation with one cause more, for every partner that is worth it."""
@@ -288,7 +288,7 @@ class Search:
     ) -> list[Explanation]:
         problem, state = found.problem, seed.fit.state
         floor = 0.5 * selection_cost(self.names, self.places)
-        above = beside(worthwhile(found, seed, settings.promise_share * floor), seed.fit)
+        above = rebase_problem(worthwhile(found, seed, settings.promise_share * floor), seed.fit)
         start = fit(above, (), np.zeros(0))
         assert start is not None
         originals = {id(p.hypothesis): p for p in problem.space.projections}
@@ -320,12 +320,12 @@ class Search:
         if key in tried:
             return None
         tried.add(key)
-        own, parts = enriched(problem, parts)
+        own, parts = enrich_problem(problem, parts)
         found = fit(own, parts, np.concatenate([first, last]))
         # A large model is solved anew for the best explanation alone.
-        return found if found is None or isinstance(own, LargeProblem) else agreed(found)
+        return found if found is None or isinstance(own, LargeProblem) else check_joint_fit(found)
 
-    def swapped(
+    def swap(
         self, found: Found, pair: Explanation, tried: set[tuple[object, ...]]
     ) -> list[Explanation]:
         """Return pairs in which either cause of the best pair has another partner."""
@@ -334,11 +334,11 @@ class Search:
             counts = [len(p.hypothesis.parameters) for p in pair.parts]
             first = sum(counts[:i])
             x = pair.fit.state.x[first : first + counts[i]]
-            own, parts = enriched(found.problem, (part,))
+            own, parts = enrich_problem(found.problem, (part,))
             alone = fit(own, parts, x, steps=0)
             if alone is not None:
                 seed = Explanation(found.base, alone, self.names)
-                result += self.grown(found, seed, tried)
+                result += self.grow(found, seed, tried)
         return result
 
 
@@ -357,7 +357,7 @@ def _fit_from_grid(
     first = sum(len(part.hypothesis.parameters) for part in parts[:new])
     last = first + len(known.parts[new].hypothesis.parameters)
     x = known.state.x
-    own, parts = enriched(problem, parts)
+    own, parts = enrich_problem(problem, parts)
     starts = [np.concatenate([x[:first], point, x[last:]]) for point in parts[new].hypothesis.grid]
     states = []
     for start in starts:
@@ -366,7 +366,7 @@ def _fit_from_grid(
     if not states:
         return None
     found = fit(own, parts, in_order(states, lambda state: state.cost)[0].x)
-    return found if found is None or isinstance(own, LargeProblem) else agreed(found)
+    return found if found is None or isinstance(own, LargeProblem) else check_joint_fit(found)
 
 
 def _best(explanations: Sequence[Explanation]) -> Explanation:

@@ -389,14 +389,14 @@ def overridden(values: Mapping[str, Value]) -> Iterator[None]:
         _CURRENT.reset(token)
 
 
-def changed_settings() -> dict[str, Value]:
+def list_changed() -> dict[str, Value]:
     """Return the numbers that have other values in this block than in the table."""
     standard = Settings()
     table = settings_table().items()
     return {name: s.value for name, s in table if s.value != getattr(standard, name)}
 
 
-def shown(value: Value) -> str:
+def format_value(value: Value) -> str:
     """Return a value as it is written in words and options."""
     return ",".join(f"{x:g}" for x in (value if isinstance(value, tuple) else (value,)))
 
@@ -455,5 +455,7 @@ def _check_value(name: str, value: Value, known: Setting) -> None:
         below = "" if most == inf else f" and < {most:g}"
         kind = f"{count} numbers > 0, by comma" if several else f"a number > 0{below}"
         kind = "a whole number >= 1" if whole else kind
-        given = shown(value) or "no number"
-        raise InputError(f"{name} = {given}", expected=f"{kind}, such as {shown(known.value)}")
+        given = format_value(value) or "no number"
+        raise InputError(
+            f"{name} = {given}", expected=f"{kind}, such as {format_value(known.value)}"
+        )

@@ -9,10 +9,10 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
-from femubench.core.display import clipped
+from femubench.core.display import clip_text
 from femubench.core.errors import InputError
 from femubench.core.plugin.loader import Plugins, load_plugins
-from femubench.core.plugin.validation import chosen, unknown
+from femubench.core.plugin.validation import choose_names, unknown
 from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Effect, Reader, Scenario
 
@@ -106,7 +106,7 @@ class Catalogue(Mapping[str, Thing], Generic[Thing]):
             UnknownNameError: an InputError and a KeyError, with the near matches.
         """
         plugins = usable_plugins()
-        chosen(self._kind, [name], self._names(plugins))
+        choose_names(self._kind, [name], self._names(plugins))
         return self._make(plugins, name)
 
     def _known(self) -> tuple[str, ...]:
@@ -122,7 +122,7 @@ class Catalogue(Mapping[str, Thing], Generic[Thing]):
         return name in self._known()
 
     def __repr__(self) -> str:
-        return clipped(f"{self._kind}: {', '.join(self._known())}")
+        return clip_text(f"{self._kind}: {', '.join(self._known())}")
 
 
 def scenarios_of(scenarios: Mapping[str, Scenario]) -> dict[str, Scenario]:
@@ -161,7 +161,7 @@ effects: Catalogue[Effect] = Catalogue(
 )
 
 
-def listed(given: Any) -> list[Any]:  # noqa: ANN401 - one of anything, or several
+def as_list(given: Any) -> list[Any]:  # noqa: ANN401 - one of anything, or several
     """Return one thing as a list of one, several as a list."""
     if isinstance(given, Iterable) and not isinstance(given, (str, PathLike)):
         return list(given)
@@ -216,7 +216,7 @@ def case_folders(
     """
     # By resolved folder, so that each runs once; messages name it as it was typed.
     wanted: dict[object, tuple[str | None, Path] | Case] = {}
-    for word in listed(given) or _default_set(scenarios):
+    for word in as_list(given) or _default_set(scenarios):
         if not isinstance(word, (str, PathLike)):
             wanted.setdefault(id(word), word)
             continue

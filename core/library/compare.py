@@ -8,9 +8,9 @@ from collections.abc import Iterable
 from os import PathLike
 
 from femubench.core.errors import InputError
-from femubench.core.library.cases import listed
+from femubench.core.library.cases import as_list
 from femubench.core.library.rank import read_run
-from femubench.core.plugin.validation import chosen
+from femubench.core.plugin.validation import choose_names
 from femubench.core.run.store import Store
 from femubench.core.schema.results import Run
 from femubench.core.score.comparison import (
@@ -58,9 +58,9 @@ def compare(
     other = one if after is None else read_run(after, store)
     known = [[result.strategy for result in run.results] for run in (one, other)]
     for name, there in zip(against or (), known, strict=False):
-        chosen("strategy", [name], there)
-    wanted = chosen("strategy", map(str, listed(strategies)), (*known[0], *known[1]))
-    limits = tuple(threshold_of(item) if isinstance(item, str) else item for item in listed(fail))
+        choose_names("strategy", [name], there)
+    wanted = choose_names("strategy", map(str, as_list(strategies)), (*known[0], *known[1]))
+    limits = tuple(threshold_of(item) if isinstance(item, str) else item for item in as_list(fail))
     pair = None if against is None else Against(*against)
     limits = limits or DEFAULT_THRESHOLDS
     return compare_runs(one, other, thresholds=limits, strategies=wanted, against=pair)

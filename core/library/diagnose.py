@@ -18,10 +18,10 @@ from femubench.core.errors import InputError, NotApplicable
 from femubench.core.files import check_new, make_folder
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.settings import Value, overridden
-from femubench.core.library.cases import CaseLike, listed, one_case, usable_plugins, way_of
+from femubench.core.library.cases import CaseLike, as_list, one_case, usable_plugins, way_of
 from femubench.core.pace import Told
-from femubench.core.plugin.loader import Plugins, registered_faults
-from femubench.core.plugin.validation import check_effect, chosen
+from femubench.core.plugin.loader import Plugins, list_faults
+from femubench.core.plugin.validation import check_effect, choose_names
 from femubench.core.roles import Effect
 
 # Verdicts that leave no model to write.
@@ -107,7 +107,7 @@ def diagnosis_of(
         # Many small matrices: threads would only wait for each other.
         with threadpool_limits(1), overridden(decisions or {}):
             effort = Effort(budget, told)
-            wrong = (registered_faults(*others) if others else None) if faults else ()
+            wrong = (list_faults(*others) if others else None) if faults else ()
             return search(read, effects=wanted, faults=wrong, pairs=pairs, effort=effort)
     except NotApplicable as fault:
         raise InputError(f"cannot be diagnosed: {fault}", file=read.folder) from fault
@@ -119,13 +119,13 @@ def _effects(given: object, plugins: Plugins, others: Sequence[str]) -> list[Eff
     Raises:
         InputError: for an unknown one, or an unknown plugin.
     """
-    chosen("plugin", others, (plugin.plugin for plugin in plugins.loaded))
+    choose_names("plugin", others, (plugin.plugin for plugin in plugins.loaded))
     strange = [plugin for plugin in plugins.loaded if not plugin.own]
     added = [name for p in strange if p.plugin in others for name in p.offers["effects"]]
     left = {name for p in strange for name in p.offers["effects"]}.difference(added)
-    wanted = [*plugins.effects] if given is None else [*listed(given), *added]
+    wanted = [*plugins.effects] if given is None else [*as_list(given), *added]
     wanted = [item for item in wanted if given is not None or item not in left]
-    chosen("effect", (item for item in wanted if isinstance(item, str)), plugins.effects)
+    choose_names("effect", (item for item in wanted if isinstance(item, str)), plugins.effects)
     unique = [item for i, item in enumerate(wanted) if item not in wanted[:i]]
     return [plugins.effects[e] if isinstance(e, str) else check_effect(e) for e in unique]
 

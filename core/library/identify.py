@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from femubench.core.case.response_files import Responses, located, read_responses
+from femubench.core.case.response_files import Responses, locate_sensors, read_responses
 from femubench.core.case.table_text import common_share, modes_csv, sensors_csv
 from femubench.core.case.writing import new_folder
 from femubench.core.errors import InputError
@@ -81,7 +81,7 @@ def identification_of(
         measured = read_responses(file, tuple(plugins.readers.values()))
     if sensors is not None:
         check_regular(Path(sensors), 2**26)
-        measured = located(measured, Path(sensors))
+        measured = locate_sensors(measured, Path(sensors))
     try:
         with threadpool_limits(1):
             if isinstance(measured, TimeSignals):

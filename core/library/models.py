@@ -23,9 +23,9 @@ from femubench.core.fem.model import Model
 from femubench.core.files import folder_made
 from femubench.core.library.cases import CaseLike, one_case, usable_plugins
 from femubench.core.plugin.loader import Plugins
-from femubench.core.plugin.validation import chosen
+from femubench.core.plugin.validation import choose_names
 from femubench.core.plugin.variants import strategy_of
-from femubench.core.roles import Reader, declared
+from femubench.core.roles import Reader, list_declared
 from femubench.core.run.jobs import missing_capability, seed_words
 
 FileLike = str | PathLike[str]
@@ -99,7 +99,7 @@ def _readers(unit: LengthUnit) -> tuple[Reader, ...]:
     return tuple(usable_plugins().readers.values())
 
 
-def updated(case: CaseLike, strategy: str, seed: int, plugins: Plugins) -> tuple[Case, Model]:
+def update_case(case: CaseLike, strategy: str, seed: int, plugins: Plugins) -> tuple[Case, Model]:
     """Return a case and its model as a strategy updates it, from the model as drawn.
 
     Arguments:
@@ -111,11 +111,11 @@ def updated(case: CaseLike, strategy: str, seed: int, plugins: Plugins) -> tuple
     Raises:
         InputError: where the strategy gives no model, with its reason.
     """
-    chosen("strategy", [strategy.partition(":")[0]], plugins.strategies)
+    choose_names("strategy", [strategy.partition(":")[0]], plugins.strategies)
     method, read = strategy_of(strategy, plugins.strategies), one_case(case, plugins)
     measurement = read.used_measurement()
     try:
-        needs = frozenset(declared(method, "needs"))
+        needs = frozenset(list_declared(method, "needs"))
         if reason := missing_capability(needs, read.model, measurement):
             raise NotApplicable(reason)
         words = np.random.SeedSequence(seed_words(read.name, method.name, seed))

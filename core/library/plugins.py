@@ -14,7 +14,7 @@ from femubench.core.conformance import SECONDS
 from femubench.core.conformance.checking import CheckResult, findings, subjects
 from femubench.core.conformance.problems import of_case
 from femubench.core.errors import InputError
-from femubench.core.library.cases import CaseLike, listed, read_cases, usable_plugins
+from femubench.core.library.cases import CaseLike, as_list, read_cases, usable_plugins
 from femubench.core.library.new_case import begin_case
 from femubench.core.library.new_package import write_package
 from femubench.core.plugin.validation import check_strategy
@@ -103,6 +103,6 @@ def check(
         strategy = check_strategy(plugin)
         name = strategy.name
         plugins = replace(plugins, strategies={**plugins.strategies, name: strategy})
-    problems = [of_case(case) for case in read_cases(cases, plugins)] if listed(cases) else []
+    problems = [of_case(case) for case in read_cases(cases, plugins)] if as_list(cases) else []
     wanted = subjects(name, plugins, cases=problems, seconds=timeout)
     return tuple(finding for subject in wanted for finding in findings(subject))

@@ -11,9 +11,9 @@ from typing import Any
 
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
-from femubench.core.files import check_can_make, resolved
-from femubench.core.library.cases import listed, read_cases, scenarios_of, usable_plugins, way_of
-from femubench.core.library.rank import classes_of, drawn_twins, textbook_of
+from femubench.core.files import check_can_make, resolve_path
+from femubench.core.library.cases import as_list, read_cases, scenarios_of, usable_plugins, way_of
+from femubench.core.library.rank import classes_of, draw_twins_of, textbook_of
 from femubench.core.plugin.loader import Plugins
 from femubench.core.publish.publishing import Published, publish as merge
 from femubench.core.publish.submissions import Verify, read_submission
@@ -49,10 +49,10 @@ def publish(
         >>> len(femubench.publish("site", run, unverified=True).added)
         1
     """
-    check_can_make(resolved(Path(folder)).parent)
+    check_can_make(resolve_path(Path(folder)).parent)
     with TemporaryDirectory() as scratch:
         files = []
-        for number, run in enumerate(listed(runs)):
+        for number, run in enumerate(as_list(runs)):
             file = Path(scratch, f"{number}.json") if isinstance(run, Run) else Path(str(run))
             if isinstance(run, Run):
                 file.write_text(json.dumps(run_to_json(run), allow_nan=False), encoding="utf-8")
@@ -108,7 +108,7 @@ class InstalledCases:
 
     def twins(self, cases: Sequence[Case], number: int, seed: int) -> Sequence[Twin]:
         """Return the twins that a run of these cases draws from a seed."""
-        return drawn_twins(cases, self._classes, number, seed)
+        return draw_twins_of(cases, self._classes, number, seed)
 
     def yardstick(self, case: Case) -> Case:
         """Return a case with the model that all errors are measured against."""

@@ -17,12 +17,12 @@ from pydantic import TypeAdapter, ValidationError
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError, NotApplicable
 from femubench.core.fem.model import differ
-from femubench.core.library.cases import CaseLike, case_words, listed, read_cases, usable_plugins
+from femubench.core.library.cases import CaseLike, as_list, case_words, read_cases, usable_plugins
 from femubench.core.plugin.loader import Plugins
-from femubench.core.plugin.validation import check_strategy, chosen
-from femubench.core.plugin.variants import Variant, labelled, strategy_of
+from femubench.core.plugin.validation import check_strategy, choose_names
+from femubench.core.plugin.variants import Variant, label_variant, strategy_of
 from femubench.core.roles import Strategy
-from femubench.core.run.beside import Beside, beside
+from femubench.core.run.beside import Beside, choose_beside
 from femubench.core.run.executor import open_executor
 from femubench.core.run.frames import modes_frame, results_frame
 from femubench.core.run.recording import Progress
@@ -183,10 +183,12 @@ def plan_run(
         given: options by field of `RunOptions`, as `split_keywords` has them.
         store: whose last run is meant where the run resumes, and has neither cases nor strategies.
     """
-    words, wanted = listed(cases), listed(strategies)
+    words, wanted = as_list(cases), as_list(strategies)
     resumed = store if store is not None and given.get("resume") and store.runs() else None
     if resumed is not None and not words and not wanted:
-        return plan_again(_changed(request_of(results.Run(resumed.begun(), ())), given), plugins)
+        return plan_again(
+            _changed(request_of(results.Run(resumed.read_start(), ())), given), plugins
+        )
     found = _strategies(wanted, plugins)
     read = read_cases(cases, plugins)
     plain = all(isinstance(item, (str, PathLike)) for item in words)
@@ -237,19 +239,19 @@ def _plan(
     Raises:
         InputError: for a time limit of a strategy that does not run.
     """
-    chosen("strategy to limit", request.timeouts, [strategy.name for strategy in strategies])
+    choose_names("strategy to limit", request.timeouts, [strategy.name for strategy in strategies])
     classes = classes_of(plugins)
     drawn: Sequence[Twin] = ()
     others = Beside()
     if request.twins:
-        drawn = drawn_twins(cases, classes, request.twins, request.twin_seed or 0)
-        others = beside(cases, drawn, request.twins, request.twin_seed or 0)
+        drawn = draw_twins_of(cases, classes, request.twins, request.twin_seed or 0)
+        others = choose_beside(cases, drawn, request.twins, request.twin_seed or 0)
     starts = Starts(textbook_of([*cases, *drawn]), request.nominal, classes, others)
     kept = request.to_json() if repeatable else {"nominal": request.nominal}
     return Plan(cases, strategies, request, starts, kept)
 
 
-def drawn_twins(
+def draw_twins_of(
     cases: Sequence[Case], classes: Mapping[str, Sequence[str]], number: int, seed: int
 ) -> list[Twin]:
     """Return twins of the cases whose truth was computed.
@@ -272,7 +274,7 @@ def _twin_seed(request: Request, resumed: Store | None) -> int:
     if not number or seed is not None:
         return seed or 0
     if resumed is not None:
-        kept = resumed.begun().get("request") or {}
+        kept = resumed.read_start().get("request") or {}
         if kept.get("twins") == number:
             return int(kept["twin_seed"])
     return secrets.randbelow(2**31)
@@ -284,9 +286,9 @@ def textbook_of(cases: Sequence[Case]) -> dict[str, Case]:
     They are made of this package's own effects: no plugin moves what all are measured against.
     """
     from femubench.core.effect.textbook import textbook_model
-    from femubench.core.plugin.loader import registered_effects
+    from femubench.core.plugin.loader import list_effects
 
-    known = registered_effects()
+    known = list_effects()
     found = {}
     for case in cases:
         with suppress(NotApplicable):
@@ -312,9 +314,11 @@ def _strategies(given: Sequence[object], plugins: Plugins) -> list[Strategy]:
     """
     wanted = [item for i, item in enumerate(given) if item not in given[:i]]
     words = [word for word in wanted if isinstance(word, str)]
-    chosen("strategy", (word.partition(":")[0] for word in words), plugins.strategies)
+    choose_names("strategy", (word.partition(":")[0] for word in words), plugins.strategies)
     found = [
-        strategy_of(item, plugins.strategies) if isinstance(item, str) else named(item, plugins)
+        strategy_of(item, plugins.strategies)
+        if isinstance(item, str)
+        else name_strategy(item, plugins)
         for item in wanted or plugins.strategies
     ]
     if not found:
@@ -322,13 +326,13 @@ def _strategies(given: Sequence[object], plugins: Plugins) -> list[Strategy]:
     return found
 
 
-def named(given: object, plugins: Plugins) -> Strategy:
+def name_strategy(given: object, plugins: Plugins) -> Strategy:
     """Return a strategy under a name that tells its options where they are not the usual ones."""
     strategy = check_strategy(given.base if isinstance(given, Variant) else given)
     usual = plugins.strategies.get(strategy.name)
     variant = given if isinstance(given, Variant) else None
     if variant is None:
-        variant = labelled(strategy, usual if type(usual) is type(strategy) else None)
+        variant = label_variant(strategy, usual if type(usual) is type(strategy) else None)
     return strategy if variant.name == strategy.name else variant
 
 

@@ -19,9 +19,9 @@ from femubench.core.files import check_writable, read_bytes, write_atomically
 from femubench.core.library.cases import usable_plugins, way_of
 from femubench.core.library.rank import Run as Tables, read_run, store_in
 from femubench.core.plugin.apart import Origin
-from femubench.core.plugin.importing import offered_by
+from femubench.core.plugin.importing import import_offer
 from femubench.core.plugin.loader import Plugins
-from femubench.core.plugin.validation import chosen, unknown
+from femubench.core.plugin.validation import choose_names, unknown
 from femubench.core.reproduction.study import Study, cells_to_json
 from femubench.core.roles import Reporter
 from femubench.core.run.store import Store
@@ -76,8 +76,8 @@ def report(
         if style is None and path is not None:
             writer = reporter_for(plugins, path)
         else:
-            writer = plugins.reporters[chosen("report format", [name], plugins.reporters)[0]]
-        content = rendered(writer, found, None if kept is None else kept.exhibits)
+            writer = plugins.reporters[choose_names("report format", [name], plugins.reporters)[0]]
+        content = render_report(writer, found, None if kept is None else kept.exhibits)
     else:
         ending = ".txt" if path is None else path.suffix.lower()
         by_suffix = {suffix: name for name, suffix in SUFFIXES.items()}
@@ -133,11 +133,11 @@ def rendering(what: object, style: str) -> str:
 
 def drawings(studies: Sequence[Study]) -> Iterator[tuple[str, str]]:
     """Yield name and drawing, as SVG, of every figure of the studies."""
-    from femubench.core.plot.figure import drawn
+    from femubench.core.plot.figure import render_figure
 
     for study in studies:
         for figure in study.figures:
-            yield figure.name, drawn(figure)
+            yield figure.name, render_figure(figure)
 
 
 def reporter(plugins: Plugins, name: str) -> Reporter:
@@ -151,7 +151,7 @@ def reporter(plugins: Plugins, name: str) -> Reporter:
     return plugins.reporters[name]
 
 
-def rendered(found: Reporter, run: Run, exhibits: object = None) -> str | bytes:
+def render_report(found: Reporter, run: Run, exhibits: object = None) -> str | bytes:
     """Return a reporter's text, or its bytes where the format is no text.
 
     Arguments:
@@ -183,14 +183,14 @@ def rendered(found: Reporter, run: Run, exhibits: object = None) -> str | bytes:
     return content
 
 
-def written_apart(origin: Origin, question: Mapping[str, Any]) -> dict[str, Any]:
+def write_apart(origin: Origin, question: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the reporter of a stranger writes; runs in a process of its own.
 
     Arguments:
         origin: the plugin.
         question: ``name`` of the reporter, ``way`` of writing, ``run``, folder of the ``store``.
     """
-    found = offered_by(origin, "reporters", question["name"])
+    found = import_offer(origin, "reporters", question["name"])
     run, way, store = Tables.of(run_from_json(question["run"])), question["way"], question["store"]
     further = [Exhibits(Path(store)) if store else None] if way == "render_with" else []
     content = getattr(found, way)(run, *further)

@@ -11,12 +11,12 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from femubench.core.files import check_can_make, make_folder, write_atomically
-from femubench.core.library.cases import listed, read_cases, usable_plugins, way_of
+from femubench.core.library.cases import as_list, read_cases, usable_plugins, way_of
 from femubench.core.library.report import drawings, rendering
 from femubench.core.pace import Advance, Told
 from femubench.core.plugin.foreign import is_foreign
-from femubench.core.plugin.loader import Plugins, shown
-from femubench.core.plugin.validation import chosen
+from femubench.core.plugin.loader import Plugins, show_entry
+from femubench.core.plugin.validation import choose_names
 from femubench.core.reproduction.study import FIGURES, Study
 from femubench.core.reproduction.workbench import Workbench
 
@@ -54,8 +54,8 @@ def papers_of(plugins: Plugins, papers: str | Sequence[str] | None = None) -> tu
     Raises:
         InputError: for an unknown one.
     """
-    own = [name for name in plugins.papers if not is_foreign(shown(plugins.papers, name))]
-    return chosen("paper", own if papers is None else listed(papers), plugins.papers)
+    own = [name for name in plugins.papers if not is_foreign(show_entry(plugins.papers, name))]
+    return choose_names("paper", own if papers is None else as_list(papers), plugins.papers)
 
 
 def studies_of(

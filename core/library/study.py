@@ -15,7 +15,7 @@ from femubench.core.errors import InputError
 from femubench.core.library.cases import case_names, read_cases, usable_plugins
 from femubench.core.library.rank import Run, classes_of, store_in, textbook_of
 from femubench.core.plugin.loader import Plugins
-from femubench.core.plugin.validation import chosen, unknown
+from femubench.core.plugin.validation import choose_names, unknown
 from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Strategy
 from femubench.core.run.executor import open_executor
@@ -33,7 +33,7 @@ from femubench.core.schema.run_options import (
 )
 from femubench.core.score.scoring import reference_of
 from femubench.core.study.axes import CaseConditions, OptionSet, StudyAxes
-from femubench.core.study.conditions import varied
+from femubench.core.study.conditions import vary_case
 from femubench.core.study.estimate import Forecast, forecast
 from femubench.core.study.study_file import StudyFile, grid, read_study
 
@@ -83,7 +83,7 @@ class StudyPlan(Plan):
         """
         bases = {name: choice.strategy for name, choice in self.axes.strategies.items()}
         limits = given.get("timeouts", {})
-        chosen("strategy to limit", limits, [*bases, *bases.values()])
+        choose_names("strategy to limit", limits, [*bases, *bases.values()])
         own = {name: limits.get(name, limits.get(base)) for name, base in bases.items()}
         timeouts = {name: limit for name, limit in own.items() if limit is not None}
         return replace(self, options=replace(self.options, **{**given, "timeouts": timeouts}))
@@ -143,12 +143,12 @@ def study_plan(read: StudyFile, plugins: Plugins) -> StudyPlan:
     known, settings = dict[str, Case](), dict[str, CaseConditions]()
     for original in originals:
         for noise, left_out in product(axes.noise, axes.sensors_left_out):
-            case = varied(original, noise, left_out)
+            case = vary_case(original, noise, left_out)
             settings[case.name] = CaseConditions(original.name, noise, left_out)
             first = not cases or settings[cases[-1].name].case != original.name
             cases.append(case if first else replace(case, notes=()))
             if original.name in textbook:
-                known[case.name] = varied(textbook[original.name], noise, left_out)
+                known[case.name] = vary_case(textbook[original.name], noise, left_out)
     options = read.options
     shown = read.tables.heat_map
     found = StudyAxes(
@@ -175,7 +175,7 @@ def _strategies(read: StudyFile, plugins: Plugins) -> tuple[list[Strategy], dict
     choices: dict[str, OptionSet] = {}
     for number, asked in enumerate(read.tables.strategies):
         with read.at("strategies", number, "name"):
-            chosen("strategy", [asked.name], plugins.strategies)
+            choose_names("strategy", [asked.name], plugins.strategies)
         base = plugins.strategies[asked.name]
         for options in grid(asked.options):
             with read.at("strategies", number, "options"):

@@ -8,15 +8,15 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from femubench.core.display import counted
+from femubench.core.display import count_noun
 from femubench.core.errors import InputError
 from femubench.core.files import check_writable
-from femubench.core.library.cases import listed, usable_plugins, way_of
+from femubench.core.library.cases import as_list, usable_plugins, way_of
 from femubench.core.library.compare import compare
 from femubench.core.library.plugins import check
 from femubench.core.library.publish import refusal_of
 from femubench.core.library.rank import Run, plan_run, read_run
-from femubench.core.library.report import rendered, rendering, report, reporter
+from femubench.core.library.report import render_report, rendering, report, reporter
 from femubench.core.pace import Told
 from femubench.core.run.executor import open_executor
 from femubench.core.run.runner import Receivers
@@ -73,7 +73,7 @@ def submit(
     Raises:
         InputError: for an unknown name, a faulty case or baseline, or no job in common with it.
     """
-    names = [str(name) for name in listed(strategies)]
+    names = [str(name) for name in as_list(strategies)]
     file = Path(output)
     check_writable(file)
     if baseline is not None and not Path(baseline).is_file():
@@ -109,7 +109,7 @@ def _unanswered(run: Run, names: Iterable[str]) -> Iterator[str]:
             if cases:
                 what = "crashed" if status == "crashed" else "ran out of time"
                 left = len(cases) - _MOST_NAMED
-                more = f" and {counted(left, 'more case')}" if left > 0 else ""
+                more = f" and {count_noun(left, 'more case')}" if left > 0 else ""
                 yield f"{name} {what} on {', '.join(cases[:_MOST_NAMED])}{more}"
 
 
@@ -135,5 +135,5 @@ def summary_of(found: SubmissionReview) -> str:
     parts = [way_of("markdown", "render_list")(f"Submission: {verdict}", lines)]
     if found.comparison is not None:
         parts.append(str(rendering(found.comparison, "markdown")))
-    parts.append(str(rendered(markdown, found.run)))
+    parts.append(str(render_report(markdown, found.run)))
     return "\n\n".join(parts) + "\n"

@@ -17,7 +17,7 @@ from femubench.core.modal.frequency_changes import (
     SOLVED_LIMIT,
     elastic_modes,
     frequency_changes,
-    matched,
+    match_rows,
 )
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import Pairing, pair_measured
@@ -128,7 +128,7 @@ class Seen:
         stiffness = shapes.T @ other.stiffness_times(shapes)
         mass = shapes.T @ other.mass_times(shapes)
         values, turn = la.eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
-        partner = matched(np.square(turn))[: self.count]
+        partner = match_rows(np.square(turn))[: self.count]
         ratio = values[partner] / self.modes.eigenvalues[: self.count]
         return np.asarray(np.sqrt(np.maximum(ratio, 0.0)) - 1.0)
 

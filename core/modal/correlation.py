@@ -11,7 +11,7 @@ from femubench.core.typing import BoolArray, FloatArray
 UNSEEN = 1e-9  # of the largest reading of any mode
 
 
-def seen_modes(readings: Any) -> BoolArray:  # noqa: ANN401 - real or complex arrays
+def find_seen_modes(readings: Any) -> BoolArray:  # noqa: ANN401 - real or complex arrays
     """Tell which modes the sensors see, (m,).
 
     What is left of a mode that moves across all sensors is rounding, of which a MAC, or a scale

@@ -37,7 +37,7 @@ _counting: list[Evaluations] = []
 
 
 @contextmanager
-def counted_evaluations() -> Iterator[Evaluations]:
+def count_evaluations() -> Iterator[Evaluations]:
     """Count the eigenvalue solutions made inside the block, blocks inside it included."""
     counter = Evaluations()
     _counting.append(counter)
@@ -255,7 +255,7 @@ def once_for(model: Model, key: Hashable, make: Callable[[], _Kept]) -> _Kept:
     return value
 
 
-def cached_by_model(
+def cache_by_model(
     function: Callable[Concatenate[Model, _Given], _Kept],
 ) -> Callable[Concatenate[Model, _Given], _Kept]:
     """Let a function of a model and of hashable values find each result once, as `once_for`."""

@@ -11,7 +11,7 @@ from femubench.core.modal.eigen import dense_matrices
 from femubench.core.typing import BoolArray, FloatArray, SparseArray
 
 
-def measured_rows(shapes: FloatArray) -> BoolArray:
+def find_measured_rows(shapes: FloatArray) -> BoolArray:
     """Return which sensors have a reading in every mode, (n_sensors,).
 
     Raises:

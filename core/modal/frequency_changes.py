@@ -24,7 +24,7 @@ def elastic_modes(model: Model, count: int) -> Modes:
     return modes.take(alive)
 
 
-def matched(likeness: FloatArray) -> IntArray:
+def match_rows(likeness: FloatArray) -> IntArray:
     """Return the column that belongs to every row, all likenesses together as large as can be.
 
     Two models on the same dofs: every mode has a partner, in the metric of the mass. What was
@@ -59,6 +59,6 @@ def frequency_changes(
     likeness = np.square(model.mass_times(modes.shapes[:, :count]).T @ shapes)
     likeness /= np.maximum(norms, np.finfo(float).tiny)
     ratios = further.eigenvalues[None, :] / modes.eigenvalues[:count, None]
-    partner = matched(likeness - FREQUENCY_WEIGHT * np.abs(np.log(ratios)) / 2.0)
+    partner = match_rows(likeness - FREQUENCY_WEIGHT * np.abs(np.log(ratios)) / 2.0)
     ratio = ratios[np.arange(count), partner]
     return np.asarray(np.sqrt(ratio) - 1.0)

@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from femubench.core.display import Shown, counted
+from femubench.core.display import Shown, count_noun
 from femubench.core.errors import ModelError
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import Modes
@@ -44,7 +44,10 @@ class FrequencyResponses(Shown):
 
     def rows(self) -> list[tuple[str, str]]:
         """Return what was measured, where, and the band."""
-        sizes = counted(len(self.responses), "response"), counted(len(self.references), "force")
+        sizes = (
+            count_noun(len(self.responses), "response"),
+            count_noun(len(self.references), "force"),
+        )
         low, high = (f"{hz:.6g}" for hz in self.frequencies[[0, -1]])
         return [
             ("", f"{self.quantity} of {sizes[0]} to {sizes[1]}"),
@@ -66,7 +69,7 @@ class FrequencyResponses(Shown):
         keep = (self.frequencies >= low) & (self.frequencies <= high)
         return replace(self, frequencies=self.frequencies[keep], values=self.values[keep])
 
-    def turned(self) -> FrequencyResponses:
+    def transpose(self) -> FrequencyResponses:
         """Return the responses with forces and motions exchanged, as reciprocity allows."""
         return replace(
             self,

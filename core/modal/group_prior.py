@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.fem.model import Model
-from femubench.core.modal.eigen import cached_by_model
+from femubench.core.modal.eigen import cache_by_model
 from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.typing import FloatArray, SparseArray
 
@@ -17,7 +17,7 @@ _FREE = 1e-8  # of the energy that the entries would have without cancelling eac
 _HELD = 0.1  # of it; a part of the structure with some dofs removed has less
 
 
-@cached_by_model
+@cache_by_model
 def support_groups(model: Model) -> frozenset[str]:
     """Return the groups of the stiffness that hold the structure to ground.
 

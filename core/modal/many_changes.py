@@ -125,7 +125,7 @@ class ManyChanges:
         hertz: float = 0.0,
     ) -> Modes | None:
         """Return the modes as in `after`; None where so few modes and steps do not prove them."""
-        attached = self.model.attached(masses, springs)
+        attached = self.model.assemble_attachments(masses, springs)
         if attached is None or count >= len(self.modes):
             return None
         structure, change = attached

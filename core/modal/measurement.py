@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femubench.core.display import Shown, counted
+from femubench.core.display import Shown, count_noun
 from femubench.core.fem.sensors import Sensors
 from femubench.core.typing import FloatArray
 
@@ -44,7 +44,9 @@ class Measurement(Shown):
 
     def rows(self) -> list[tuple[str, str]]:
         """Return the sensors, and frequency, deviation and damping of every mode."""
-        found = [("", f"{counted(len(self), 'mode')} at {counted(len(self.sensors), 'sensor')}")]
+        found = [
+            ("", f"{count_noun(len(self), 'mode')} at {count_noun(len(self.sensors), 'sensor')}")
+        ]
         for row in zip(
             self.numbers, self.frequencies, self.frequency_std, self.damping, strict=True
         ):
@@ -68,7 +70,7 @@ class Measurement(Shown):
             self.frequency_std[:, None] * self.frequency_correlation * self.frequency_std
         )
 
-    def widened(self, std: FloatArray) -> Measurement:
+    def widen(self, std: FloatArray) -> Measurement:
         """Return the same modes with errors of their own besides.
 
         Arguments:

@@ -15,7 +15,7 @@ from femubench.core.typing import FloatArray
 _SAME = 1e-10  # of the largest: below it two directions of a basis are one
 
 
-def followed_frequencies(sample: Model, modes: Modes) -> FloatArray:
+def follow_frequencies(sample: Model, modes: Modes) -> FloatArray:
     """Return the frequencies of a sample's modes that are most like the given ones, (m,), in Hz.
 
     The given shapes after one step of inverse iteration with the sample's own matrices span the

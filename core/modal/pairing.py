@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from femubench.core.modal.correlation import mac, seen_modes
+from femubench.core.modal.correlation import find_seen_modes, mac
 from femubench.core.modal.eigen import Modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray, IntArray
@@ -98,8 +98,10 @@ def pair_modes(
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.abs(np.log(predicted)[None, :] - np.log(measured)[:, None])
     distance = np.where(np.isfinite(ratio), ratio, np.inf)
-    shaped = seen_modes(measured_shapes)[:, None]
-    likeness = np.where(seen_modes(predicted_shapes), mac(measured_shapes, predicted_shapes), 0.0)
+    shaped = find_seen_modes(measured_shapes)[:, None]
+    likeness = np.where(
+        find_seen_modes(predicted_shapes), mac(measured_shapes, predicted_shapes), 0.0
+    )
     common = np.isfinite(measured_shapes).T.astype(int) @ np.isfinite(predicted_shapes).astype(int)
     by_shape = shaped & np.asarray(common >= LEAST_SENSORS)
     edge = float(np.log(window))

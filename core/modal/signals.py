@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from femubench.core.display import Shown, counted
+from femubench.core.display import Shown, count_noun
 from femubench.core.fem.sensors import Sensors
 from femubench.core.typing import FloatArray
 
@@ -32,6 +32,6 @@ class TimeSignals(Shown):
         """Return what was measured, and for how long."""
         count = len(self.values)
         return [
-            ("", f"{counted(count, 'sample')} at {counted(len(self.sensors), 'sensor')}"),
+            ("", f"{count_noun(count, 'sample')} at {count_noun(len(self.sensors), 'sensor')}"),
             ("length", f"{count / self.rate:.6g} s at {self.rate:.6g} Hz"),
         ]

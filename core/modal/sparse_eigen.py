@@ -44,7 +44,7 @@ class ShiftedModel:
     shift: float
     spent: Cholesky | None = field(default=None, repr=False, compare=False)
 
-    def moved(self, shift: float) -> ShiftedModel:
+    def move(self, shift: float) -> ShiftedModel:
         """Return the model at another shift; the factors of this one go, for their memory.
 
         This one may be used again once the other is not: it is factorised anew.
@@ -183,7 +183,7 @@ def _below_elastic(model: Model, rigid: _KnownModes) -> tuple[ShiftedModel, Floa
         quotient = start @ model.stiffness_times(start) / (start @ model.mass_times(start))
         if not 0.0 < quotient < -shifted.shift:
             break
-        shifted = shifted.moved(-0.01 * float(quotient))
+        shifted = shifted.move(-0.01 * float(quotient))
     return shifted, start
 
 
@@ -286,7 +286,7 @@ def _missed(shifted: ShiftedModel, eigenvalues: FloatArray, rigid: int) -> int:
         shifts = [float(lower + share * gaps.max()) for share in (0.5, 0.4, 0.6)]
     for shift in shifts:
         found = rigid + int(np.sum(eigenvalues < shift))
-        below = shifted.moved(shift).eigenvalues_below(found)
+        below = shifted.move(shift).eigenvalues_below(found)
         if below is not None:
             return below - found
     raise ModelError(f"eigenvalues below {top:.6g} cannot be counted")

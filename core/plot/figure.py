@@ -216,7 +216,7 @@ def _power(value: float, position: int | None) -> str:
     return "10" + str(exponent).translate(_RAISED)
 
 
-def drawn(figure: Figure) -> str:
+def render_figure(figure: Figure) -> str:
     """Return a figure as one ``<svg>`` element that needs no other file.
 
     Arguments:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femubench.core.case.case import Case
-from femubench.core.drawing.prediction import node_motions, paired_with
+from femubench.core.drawing.prediction import node_motions, pair_modes
 from femubench.core.drawing.wireframe import MOST_NODES, Wireframe, wireframe_of
 from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
@@ -108,7 +108,7 @@ def _draw_measured(
 ) -> tuple[str, FloatArray]:
     """Draw the measured partner of a mode as arrows; return words on it and the arrows' tips."""
     data = case.measurement
-    _, at_sensors, pairing = paired_with(case.model, data)
+    _, at_sensors, pairing = pair_modes(case.model, data)
     found = np.flatnonzero(pairing.index == column)
     nothing = np.empty((0, 2))
     if not len(found):

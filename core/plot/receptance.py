@@ -11,7 +11,7 @@ from femubench.core.case.case import Case
 from femubench.core.drawing.prediction import (
     drive_sensor,
     frequency_axis,
-    measured_receptances,
+    list_receptances,
     receptances,
 )
 from femubench.core.errors import InputError
@@ -69,7 +69,7 @@ def receptance(
         raise InputError(f"there is no modification {modification!r}", expected=expected)
     change = modification or ""
     named = models if isinstance(models, Mapping) else {} if models is None else {"updated": models}
-    measured = measured_receptances(case, label)["measured"].get(change)
+    measured = list_receptances(case, label)["measured"].get(change)
     named_so = "measured" if case.frfs is not None and not change else "measured modes"
     known = np.asarray(measured if measured is not None else [], dtype=float)
     curves: list[tuple[str, str, Any]] = [(named_so, "measured", known)] if len(known) else []

@@ -18,12 +18,12 @@ from femubench.core.plugin.importing import (
     BrokenPlugin,
     Offers,
     broken_plugin,
-    offered_by,
+    import_offer,
     offers_of,
     source_of,
 )
 from femubench.core.plugin.options import options_of, with_options
-from femubench.core.roles import Scenario, declared
+from femubench.core.roles import Scenario, list_declared
 
 _LONGEST_TRACE = 20_000  # characters
 _WAYS = {
@@ -36,7 +36,7 @@ _WAYS = {
 _FLAGS = ("baseline", "yardstick")
 
 
-def described(origin: Origin, _: Mapping[str, Any]) -> dict[str, Any]:
+def describe_plugin(origin: Origin, _: Mapping[str, Any]) -> dict[str, Any]:
     """Say what a plugin offers and what is wrong with it."""
     source = source_of(origin)
     broken: list[BrokenPlugin] = []
@@ -68,7 +68,7 @@ def _told(origin: Origin, kind: str, offered: Any) -> dict[str, Any]:  # noqa: A
 
 
 def _strategy(strategy: Any) -> dict[str, Any]:  # noqa: ANN401 - with what it likes besides
-    promises: object = declared(strategy, "promises")
+    promises: object = list_declared(strategy, "promises")
     own: dict[str, object] = {}
     held: object = strategy
     if is_dataclass(held):
@@ -77,7 +77,7 @@ def _strategy(strategy: Any) -> dict[str, Any]:  # noqa: ANN401 - with what it l
     return {
         **_common(strategy),
         "citation": str(strategy.citation),
-        "needs": sorted(declared(strategy, "needs")),
+        "needs": sorted(list_declared(strategy, "needs")),
         "promises": sorted(promises) if isinstance(promises, frozenset) else repr(promises),
         "settings": [str(words) for words in getattr(strategy, "settings", ())],
         "options": options_of(strategy),
@@ -123,15 +123,15 @@ def _common(offered: Any) -> dict[str, Any]:  # noqa: ANN401 - of any role
     return {"name": str(offered.name), "doc": doc_of(offered), "module": own.__module__}
 
 
-def varied(origin: Origin, question: Mapping[str, Any]) -> dict[str, Any]:
+def describe_variant(origin: Origin, question: Mapping[str, Any]) -> dict[str, Any]:
     """Say what a strategy is with other options."""
-    base = offered_by(origin, "strategies", question["name"])
+    base = import_offer(origin, "strategies", question["name"])
     return _told(origin, "strategies", with_options(base, question["options"]))
 
 
 def folder(origin: Origin, question: Mapping[str, Any]) -> dict[str, Any]:
     """Make the folder of a case."""
-    scenario: Scenario = offered_by(origin, "scenarios", question["name"])
+    scenario: Scenario = import_offer(origin, "scenarios", question["name"])
     return {"folder": str(scenario.folder(question["case"]).absolute())}
 
 

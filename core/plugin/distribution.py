@@ -27,7 +27,7 @@ def about(name: str, doi: object = "") -> dict[str, str]:
         name: of the distribution.
         doi: that the strategy states, if any.
     """
-    return known_about({**_packaged(name), "doi": str(doi)})
+    return select_known({**_packaged(name), "doi": str(doi)})
 
 
 @lru_cache(maxsize=100)
@@ -50,7 +50,7 @@ def _packaged(name: str) -> dict[str, str]:
     }
 
 
-def known_about(told: Mapping[str, object]) -> dict[str, str]:
+def select_known(told: Mapping[str, object]) -> dict[str, str]:
     """Return the part of a description that can be shown; an address is one of the web or none."""
     forms = {"homepage": HOMEPAGE, "doi": DOI, "summary": "", "author": ""}
     lines = {name: harmless(str(told.get(name) or ""))[:LONGEST_LINE] for name in forms}

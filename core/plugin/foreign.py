@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any
 from femubench.core.errors import PluginError, harmless
 from femubench.core.plugin import apart
 from femubench.core.plugin.apart import Origin
-from femubench.core.plugin.distribution import known_about
-from femubench.core.plugin.importing import Later, offered_by
+from femubench.core.plugin.distribution import select_known
+from femubench.core.plugin.importing import Later, import_offer
 from femubench.core.plugin.options import SIMPLE, ToldOptions, with_options
 from femubench.core.plugin.validation import (
     CHECKS,
     check_name,
-    listed_texts,
+    check_texts,
     of_type,
 )
 from femubench.core.roles import CAPABILITIES, Scenario
@@ -59,7 +59,7 @@ class Handle:
         Raises:
             PluginError: when it cannot be imported or does not offer the thing.
         """
-        return offered_by(self.origin, self.kind, self.name)
+        return import_offer(self.origin, self.kind, self.name)
 
 
 @dataclass(frozen=True)
@@ -336,7 +336,7 @@ def is_foreign(offered: object) -> bool:
     return isinstance(offered, (Foreign, ForeignStrategy, ForeignReader, ForeignReporter))
 
 
-def imported(offered: Any) -> Any:  # noqa: ANN401 - as the kind has it
+def import_thing(offered: Any) -> Any:  # noqa: ANN401 - as the kind has it
     """Import a thing in this process where it is a stranger's; return it as it is otherwise."""
     if isinstance(offered, ForeignStrategy):
         return offered.load()
@@ -362,17 +362,17 @@ def strategy_of(handle: Handle, told: Mapping[str, Any]) -> ForeignStrategy:
             raise PluginError(f"option {key[:80]!r} is no plain value")
     plain = {
         "citation": harmless(of_type(told.get("citation"), str, "citation")),
-        "needs": listed_texts(told.get("needs"), "needs", known=CAPABILITIES),
-        "promises": listed_texts(promises, "promises") if isinstance(promises, list)
+        "needs": check_texts(told.get("needs"), "needs", known=CAPABILITIES),
+        "promises": check_texts(promises, "promises") if isinstance(promises, list)
         else harmless(of_type(promises, str, "promises")),
-        "settings": listed_texts(told.get("settings"), "settings"),
+        "settings": check_texts(told.get("settings"), "settings"),
         "options": options,
-        "open": listed_texts(told.get("open"), "open options"),
+        "open": check_texts(told.get("open"), "open options"),
         "baseline": told.get("baseline") is True,
         "yardstick": told.get("yardstick") is True,
         "module": harmless(of_type(told.get("module"), str, "module")),
         "doc": _doc(told),
-        "about": known_about(of_type(told.get("about"), dict, "what its package says")),
+        "about": select_known(of_type(told.get("about"), dict, "what its package says")),
     }  # fmt: skip
     return ForeignStrategy(handle, json.dumps(plain))
 
@@ -389,12 +389,12 @@ def _scenario(handle: Handle, told: Mapping[str, Any]) -> Scenario:
     for name, folder in of_type(told.get("cases"), dict, "cases").items():
         cases[name] = Path(folder) if isinstance(folder, str) else _Maker(handle, name)
     title = harmless(of_type(told.get("title"), str, "title"))
-    classes = tuple(listed_texts(told.get("classes"), "classes"))
+    classes = tuple(check_texts(told.get("classes"), "classes"))
     return Scenario(handle.name, title, cases, classes, told.get("default") is True)
 
 
 def _reader(handle: Handle, told: Mapping[str, Any]) -> ForeignReader:
-    suffixes = tuple(listed_texts(told.get("suffixes"), "suffixes"))
+    suffixes = tuple(check_texts(told.get("suffixes"), "suffixes"))
     return ForeignReader(handle, suffixes, _ways(told), _doc(told))
 
 
@@ -404,7 +404,7 @@ def _reporter(handle: Handle, told: Mapping[str, Any]) -> ForeignReporter:
 
 
 def _ways(told: Mapping[str, Any]) -> frozenset[str]:
-    return frozenset(listed_texts(told.get("ways"), "methods"))
+    return frozenset(check_texts(told.get("ways"), "methods"))
 
 
 def _effect(handle: Handle, told: Mapping[str, Any]) -> Foreign:
@@ -434,7 +434,7 @@ _MADE: Mapping[str, Callable[[Handle, Mapping[str, Any]], Any]] = {
 }
 
 
-def made(origin: Origin, kind: str, told: object) -> Any:  # noqa: ANN401 - as the kind has it
+def make_proxy(origin: Origin, kind: str, told: object) -> Any:  # noqa: ANN401 - as the kind has it
     """Return what stands for a thing that a plugin describes.
 
     Raises:

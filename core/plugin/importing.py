@@ -190,7 +190,7 @@ def offers_of(source: Source, broken: list[BrokenPlugin]) -> dict[str, Offers] |
     return None if take(source, found, broken) is None else found
 
 
-def offered_by(origin: Origin, kind: str, name: str) -> Any:  # noqa: ANN401 - as the kind has it
+def import_offer(origin: Origin, kind: str, name: str) -> Any:  # noqa: ANN401 - as the kind has it
     """Import a stranger's plugin here and return one thing that it offers.
 
     Raises:

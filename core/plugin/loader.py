@@ -19,7 +19,7 @@ from typing import Any
 from femubench.core.errors import PluginError, harmless
 from femubench.core.plugin import apart
 from femubench.core.plugin.apart import Origin
-from femubench.core.plugin.foreign import Foreign, made
+from femubench.core.plugin.foreign import Foreign, make_proxy
 from femubench.core.plugin.importing import (
     PREFIX,
     BrokenPlugin,
@@ -28,7 +28,7 @@ from femubench.core.plugin.importing import (
     take,
 )
 from femubench.core.plugin.markers import PROJECT
-from femubench.core.plugin.validation import CHECKS, chosen, of_type
+from femubench.core.plugin.validation import CHECKS, choose_names, of_type
 from femubench.core.roles import Effect, Fault, Paper, Reader, Reporter, Scenario, Strategy
 from femubench.core.source_files import stamps
 from femubench.core.version import __version__
@@ -55,7 +55,7 @@ class LoadedPlugin:
     own: bool = True
 
 
-def shown(offers: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401 - as the kind has it
+def show_entry(offers: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401 - as the kind has it
     """Return an entry, of a stranger's effect or fault what is known of it without its code."""
     entry = offers.data[name] if isinstance(offers, Offers) else None
     return entry if isinstance(entry, Foreign) else offers[name]
@@ -163,7 +163,7 @@ def _described(
 ) -> Iterator[str]:
     for item in offered:
         try:
-            entry = made(origin, kind, item)
+            entry = make_proxy(origin, kind, item)
             if entry.name in taken:
                 raise PluginError(f"the name {entry.name!r} is taken by another of the {kind}")
         except PluginError as fault:
@@ -188,7 +188,7 @@ def _printable(line: str) -> str:
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
 
 
-def registered_effects(*plugins: str) -> tuple[Effect, ...]:
+def list_effects(*plugins: str) -> tuple[Effect, ...]:
     """Return the effects that come with femubench, and all of some other plugins.
 
     Arguments:
@@ -204,7 +204,7 @@ def registered_effects(*plugins: str) -> tuple[Effect, ...]:
     return tuple(_registered("effects", plugins))
 
 
-def registered_faults(*plugins: str) -> tuple[Fault, ...]:
+def list_faults(*plugins: str) -> tuple[Fault, ...]:
     """Return the faults of data or input that come with femubench, and all of some other plugins.
 
     Arguments:
@@ -218,7 +218,7 @@ def registered_faults(*plugins: str) -> tuple[Fault, ...]:
 
 def _registered(kind: str, plugins: Sequence[str]) -> Iterator[Any]:
     found = load_plugins(strangers=bool(plugins))
-    chosen("plugin", plugins, (plugin.plugin for plugin in found.loaded))
+    choose_names("plugin", plugins, (plugin.plugin for plugin in found.loaded))
     offers: Offers = getattr(found, kind)
     for plugin in found.loaded:
         for name in plugin.offers[kind]:

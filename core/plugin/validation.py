@@ -19,7 +19,7 @@ from femubench.core.roles import (
     Reporter,
     Scenario,
     Strategy,
-    declared,
+    list_declared,
 )
 
 Thing = TypeVar("Thing")
@@ -37,7 +37,7 @@ def check_strategy(offered: object) -> Strategy:
     strategy: Strategy = _filled(offered, "Strategy", "update")
     if not _is_text(getattr(strategy, "citation", None)):
         raise PluginError(f"{_label(offered)}: citation is missing (author, year, title, equation)")
-    needs: object = declared(strategy, "needs")
+    needs: object = list_declared(strategy, "needs")
     if not isinstance(needs, frozenset | set | tuple | list):
         raise PluginError(f"{_label(offered)}: needs is {needs!r}, not a set of capabilities")
     for need in needs:
@@ -180,7 +180,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
     return UnknownNameError(f"no {kind} {name!r}{near}")
 
 
-def chosen(kind: str, names: Iterable[str], known: Iterable[str]) -> tuple[str, ...]:
+def choose_names(kind: str, names: Iterable[str], known: Iterable[str]) -> tuple[str, ...]:
     """Return the names without repetition.
 
     Raises:
@@ -214,7 +214,7 @@ def of_type(value: object, wanted: type[Thing], what: str) -> Thing:
     return value
 
 
-def listed_texts(value: object, what: str, known: Iterable[str] | None = None) -> list[str]:
+def check_texts(value: object, what: str, known: Iterable[str] | None = None) -> list[str]:
     """Return a list of lines that a process of a stranger told.
 
     Raises:

@@ -15,7 +15,7 @@ from typing import Any, cast
 from femubench.core.errors import InputError
 from femubench.core.plugin.options import SIMPLE, ToldOptions, entry_of, options_of, with_options
 from femubench.core.plugin.validation import did_you_mean
-from femubench.core.roles import Strategy, declared
+from femubench.core.roles import Strategy, list_declared
 
 _UNKNOWN = object()
 
@@ -40,12 +40,12 @@ class Variant:
     @property
     def needs(self) -> frozenset[str]:
         """Return those of the strategy."""
-        return declared(self.base, "needs")
+        return list_declared(self.base, "needs")
 
     @property
     def promises(self) -> frozenset[str]:
         """Return those of the strategy."""
-        return declared(self.base, "promises")
+        return list_declared(self.base, "promises")
 
     def update(self, model: Any, measurement: Any, rng: Any) -> Any:  # noqa: ANN401
         """Return what the strategy returns, mostly an `UpdateResult`."""
@@ -60,7 +60,7 @@ class Variant:
         Raises:
             InputError: for an option that it does not have, or a value of another type.
         """
-        return labelled(_changed(self.base, options), self.base)
+        return label_variant(_changed(self.base, options), self.base)
 
 
 def strategy_of(words: str, strategies: Mapping[str, Strategy]) -> Strategy:
@@ -84,7 +84,7 @@ def strategy_of(words: str, strategies: Mapping[str, Strategy]) -> Strategy:
     return Variant(_changed(base, {key.strip(): _Typed(text) for key, _, text in pairs}), words)
 
 
-def labelled(strategy: Strategy, default: Strategy | None = None) -> Variant:
+def label_variant(strategy: Strategy, default: Strategy | None = None) -> Variant:
     """Return a strategy under its name and the options that are not the default ones.
 
     Arguments:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from femubench.core.score.ranking import ranked
+from femubench.core.score.ranking import rank_items
 
 _MOST = 100  # entries that are kept, the latest
 
@@ -52,7 +52,7 @@ def _leaders(present: Mapping[str, Mapping[str, Any]]) -> list[str]:
         for name, version in present.items()
         if version["complete"] and version["skill"] is not None and not version["unphysical"]
     }
-    listed = ranked(sound, lambda name: ((), 1.0 - sound[name]["skill"], name))
+    listed = rank_items(sound, lambda name: ((), 1.0 - sound[name]["skill"], name))
     return [name for rank, name in listed if rank == 1]
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from femubench.core.publish.agreement import Outcome, References
 from femubench.core.schema.results import BLOCKS, DONE, JobResult
 from femubench.core.score.counting import block_shares
-from femubench.core.score.ranking import geometric_mean, ranked as in_order, score_of
+from femubench.core.score.ranking import geometric_mean, rank_items as in_order, score_of
 from femubench.core.score.statistics import FEWEST, evidence_of, interval_over_structures
 
 _FEWEST_OF_CLASS = 2  # structures; a class of one is its case

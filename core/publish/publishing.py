@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from femubench.core.errors import InputError, OutputError, harmless
-from femubench.core.files import MIB, read_text, resolved
+from femubench.core.files import MIB, read_text, resolve_path
 from femubench.core.publish.board import index_of
 from femubench.core.publish.submissions import SCHEMA, Submission, Verify, read_submission
 from femubench.core.schema.records import parse_json
@@ -68,7 +68,7 @@ def publish(
             that is none.
         OutputError: where the site cannot be written; then it is as it was.
     """
-    folder = resolved(folder)
+    folder = resolve_path(folder)
     # Its files are read as carefully as those that anybody sends.
     check_site(folder)
     data = folder / DATA

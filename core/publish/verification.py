@@ -19,7 +19,7 @@ from femubench.core.run.provenance import plan_digest
 from femubench.core.schema.results import JobResult, Nominal, Run
 from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.ranking import score_of
-from femubench.core.score.scoring import given_errors, reference_of
+from femubench.core.score.scoring import find_given_errors, reference_of
 from femubench.core.twin.twins import Twin
 
 SANDBOX = "namespaces"  # what a run calls the one that it can have
@@ -72,7 +72,7 @@ class _Known:
     @cached_property
     def given(self) -> dict[str, float]:
         """Return the errors of the model as drawn; nothing where it is the textbook model."""
-        return given_errors(self.case, self.reference)
+        return find_given_errors(self.case, self.reference)
 
 
 def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) -> None:

@@ -28,7 +28,7 @@ class Beside:
     seed: int = 0
     number: int = 0
 
-    def repeated(self, references: Mapping[str, Reference]) -> dict[str, Reference]:
+    def add_repeated(self, references: Mapping[str, Reference]) -> dict[str, Reference]:
         """Return references with that of the repeated case under its second name too."""
         return {**references, **{name: references[case] for name, case in self._again.items()}}
 
@@ -60,7 +60,7 @@ class Beside:
 NOTHING = Beside()
 
 
-def beside(cases: Sequence[Case], twins: Sequence[Twin], number: int, seed: int) -> Beside:
+def choose_beside(cases: Sequence[Case], twins: Sequence[Twin], number: int, seed: int) -> Beside:
     """Return twins, and the case with the smallest model to run again.
 
     Arguments:

@@ -20,7 +20,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from femubench.core.child.sandbox import OFF, Enclosure, enclosure
-from femubench.core.display import counted
+from femubench.core.display import count_noun
 from femubench.core.errors import FemubenchError, InputError, require
 from femubench.core.roles import Strategy
 from femubench.core.run.cluster_worker import (
@@ -80,7 +80,7 @@ class DaskWorkers:
     @property
     def spoken(self) -> str:
         """Return the number of jobs at a time, and where."""
-        return f"{counted(self.workers, 'worker')} of {self._where}"
+        return f"{count_noun(self.workers, 'worker')} of {self._where}"
 
     def admit(self, strategies: Sequence[Strategy], memory: int | None) -> None:
         """Make sure that every worker has the versions that are here, and enough memory and cores.
@@ -133,7 +133,7 @@ class DaskWorkers:
             return max(_AHEAD * threads, _LEAST_AHEAD)
 
         try:
-            yield from flight.landed(wanted, capacity)
+            yield from flight.yield_results(wanted, capacity)
         finally:
             flight.call_off()
 
@@ -158,7 +158,7 @@ class _Flight:
         self._yardsticks: dict[Start, Future[Yardstick]] = {}
         self._coming = as_completed(loop=client.loop, with_results=True, raise_errors=False)
 
-    def landed(
+    def yield_results(
         self, wanted: Iterable[int], capacity: Callable[[], int]
     ) -> Iterator[tuple[int, JobResult]]:
         """Yield results as they arrive; a job is made when there is room for it on the way."""
@@ -179,7 +179,7 @@ class _Flight:
         """Send a job to the cluster, unless it could not be made."""
         slot = self._load.slots[index]
         if isinstance(slot.code, JobOutcome):
-            yield index, self._load.unjudged(index, slot.code)
+            yield index, self._load.make_unjudged(index, slot.code)
             return
         limits, shown = self._load.limits[slot.strategy], self._load.is_shown(slot)
         errand = Errand(slot.strategy, slot.seed, slot.code, limits, shown)
@@ -233,7 +233,7 @@ class _Flight:
             return
         killed = isinstance(fault, KilledWorker)
         reason = "every worker that ran it died" if killed else one_line(fault)
-        yield index, self._load.unjudged(index, JobOutcome("crashed", reason))
+        yield index, self._load.make_unjudged(index, JobOutcome("crashed", reason))
 
     def call_off(self) -> None:
         """End what is still on its way."""

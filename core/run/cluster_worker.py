@@ -12,7 +12,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from femubench.core.child.limits import LEAST, Limits, memory_share, spoken_bytes
+from femubench.core.child.limits import LEAST, Limits, format_bytes, memory_share
 from femubench.core.child.sandbox import enclosure, missing
 from femubench.core.child.workers import adopt_orphans
 from femubench.core.errors import FemubenchError
@@ -101,8 +101,8 @@ def unfit(demand: Demand, dask_worker: Any) -> str | None:  # noqa: ANN401 - a d
     memory = dask_worker.memory_manager.memory_limit
     needed = LEAST if demand.memory is None else demand.memory
     if memory and needed * threads > memory:
-        room = spoken_bytes(memory / threads)
-        return f"{room} of memory a thread, and a job may take {spoken_bytes(needed)}"
+        room = format_bytes(memory / threads)
+        return f"{room} of memory a thread, and a job may take {format_bytes(needed)}"
     return None
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from femubench.core.child.limits import memory_share
 from femubench.core.child.sandbox import Enclosure, enclosure
-from femubench.core.display import counted
+from femubench.core.display import count_noun
 from femubench.core.errors import InputError, require
 from femubench.core.roles import Strategy
 from femubench.core.run.schedule import Workload, compute_jobs
@@ -39,7 +39,7 @@ class LocalProcesses:
     @property
     def spoken(self) -> str:
         """Return the number of workers in words."""
-        return counted(self.workers, "worker")
+        return count_noun(self.workers, "worker")
 
     @property
     def share(self) -> int:

@@ -33,7 +33,7 @@ def results_frame(run: Run) -> pd.DataFrame:
     """
     import pandas as pd
 
-    rows, study = [], StudyAxes.of(run) if StudyAxes.asked(run) is not None else None
+    rows, study = [], StudyAxes.of(run) if StudyAxes.from_run(run) is not None else None
     for result in run.results:
         row = {name: getattr(result, name) for name in (*_JOB, *_COUNTS)}
         for name, block in result.blocks.items():

@@ -17,9 +17,9 @@ from msgspec import Meta
 from femubench.core.errors import Diverged, NotApplicable, StrategyFailure
 from femubench.core.fem.joints import place_words
 from femubench.core.fem.model import Model, differ
-from femubench.core.modal.eigen import counted_evaluations
+from femubench.core.modal.eigen import count_evaluations
 from femubench.core.modal.measurement import Measurement
-from femubench.core.roles import CAPABILITIES, Result, declared
+from femubench.core.roles import CAPABILITIES, Result, list_declared
 from femubench.core.schema.bounds import Seconds, Whole
 from femubench.core.schema.results import Status
 from femubench.core.update.uncertainty import MOST_SAMPLES
@@ -97,7 +97,7 @@ class JobOutcome(Report):
     samples: tuple[Model, ...] = ()
 
 
-def sent(thing: object) -> bytes:
+def pickle_strategy(thing: object) -> bytes:
     """Return a strategy as bytes for a worker.
 
     A class that lives in a script, a notebook or a function has no name by which a worker could
@@ -152,15 +152,15 @@ def missing_capability(needs: frozenset[str], model: Model, measurement: Measure
 
 def execute(job: Job) -> JobOutcome:
     """Run one job in this process and tell how it ended; no exception of a strategy gets out."""
-    return performed(job)[0]
+    return perform_job(job)[0]
 
 
-def performed(job: Job) -> tuple[JobOutcome, Model | None]:
+def perform_job(job: Job) -> tuple[JobOutcome, Model | None]:
     """Return how one job ended in this process, and the model that it started from."""
     try:
         parts = (job.strategy, job.model, job.measurement)
         strategy, model, measurement = map(pickle.loads, parts)
-        reason = missing_capability(frozenset(declared(strategy, "needs")), model, measurement)
+        reason = missing_capability(frozenset(list_declared(strategy, "needs")), model, measurement)
     except Exception as error:
         return JobOutcome("failed", one_line(error), _traceback(error)), None
     if reason is not None:
@@ -168,7 +168,7 @@ def performed(job: Job) -> tuple[JobOutcome, Model | None]:
     before = _digest(model)
     rng = np.random.default_rng(np.random.SeedSequence(job.words))
     start = time.perf_counter()
-    with warnings.catch_warnings(), counted_evaluations() as counter:
+    with warnings.catch_warnings(), count_evaluations() as counter:
         # A result is judged by its figures; what numerical libraries mutter on the way is not.
         warnings.simplefilter("ignore")
         try:

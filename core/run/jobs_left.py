@@ -67,7 +67,7 @@ class JobsLeft:
 
     def _seconds(self, now: float) -> float:
         """Return the seconds until all are done."""
-        besides, sizes = self._besides / self._done, self._sizes.fitted()
+        besides, sizes = self._besides / self._done, self._sizes.fit()
         ahead = [max(sizes(pair) + besides - (now - begin), 0.0) for pair, begin in self._running]
         later = sum(n * (sizes(pair) + besides) for pair, n in Counter(self._waiting).items())
         return max((sum(ahead) + later) / self._workers, max(ahead, default=0.0))
@@ -83,7 +83,7 @@ class _Sizes:
         self._seconds[pair] = self._seconds.get(pair, 0.0) + seconds
         self._count[pair] += 1
 
-    def fitted(self) -> Callable[[Pair], float]:
+    def fit(self) -> Callable[[Pair], float]:
         """Return what gives the seconds of a job: those of such jobs, else case times strategy."""
         known = {pair: total / self._count[pair] for pair, total in self._seconds.items()}
         logs = {pair: log(max(seconds, _LEAST)) for pair, seconds in known.items()}

@@ -13,12 +13,12 @@ from msgspec import Struct
 from femubench.core.case.case import Case
 from femubench.core.errors import FemubenchError, StrategyFailure
 from femubench.core.run.answers import AnswerError, pack_outcome, unpack_outcome
-from femubench.core.run.jobs import Job, JobOutcome, one_line, performed
+from femubench.core.run.jobs import Job, JobOutcome, one_line, perform_job
 from femubench.core.run.model_checks import check_model
 from femubench.core.schema.records import encode
 from femubench.core.schema.results import JobResult, Nominal
 from femubench.core.score.predicted_spread import Spread
-from femubench.core.score.scoring import Reference, given_errors, judge, score_of
+from femubench.core.score.scoring import Reference, find_given_errors, judge, score_of
 
 _JUDGED = ("model", "samples", "discrepancy_std")  # of an outcome, and no part of the result
 
@@ -51,7 +51,7 @@ class Judgement(Struct):
 
 def run_strategy(job: Job) -> bytes:
     """Return the pack_outcome outcome of a job; runs in a worker."""
-    return pack_outcome(*performed(job))
+    return pack_outcome(*perform_job(job))
 
 
 def run_judge(verdict: Dossier, case: Case, reference: Reference) -> bytes:
@@ -61,7 +61,7 @@ def run_judge(verdict: Dossier, case: Case, reference: Reference) -> bytes:
     except AnswerError as error:
         outcome = JobOutcome("failed", str(error), traceback.format_exc())
     job = verdict.strategy, verdict.seed, verdict.nominal
-    result = judged(case, reference, job, outcome)
+    result = judge_outcome(case, reference, job, outcome)
     exhibit = _exhibit(case, outcome, result) if verdict.exhibited else None
     return encode(Judgement(result, exhibit))
 
@@ -82,7 +82,7 @@ def _exhibit(case: Case, outcome: JobOutcome, result: JobResult) -> dict[str, An
     return found
 
 
-def judged(
+def judge_outcome(
     case: Case, reference: Reference, job: tuple[str, int, Nominal], outcome: JobOutcome
 ) -> JobResult:
     """Return the result of a job: its model checked and scored; a model that fails has failed.
@@ -102,7 +102,7 @@ def judged(
     if outcome.model is not None:
         result = _scored(result, case, outcome, reference)
     elif outcome.status == "not-applicable" and nominal == "drawn":
-        given = given_errors(case, reference.rms_percent)
+        given = find_given_errors(case, reference.rms_percent)
         result = replace(result, start_percent=given)
     return replace(result, score=score_of(result, reference.rms_percent))
 

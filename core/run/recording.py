@@ -10,7 +10,7 @@ from typing import Any
 
 from femubench.core.drawing.prediction import keep_drawings
 from femubench.core.errors import InputError
-from femubench.core.garbage import uncollected
+from femubench.core.garbage import pause_collection
 from femubench.core.pace import Advance, Told
 from femubench.core.run.jobs_left import JobsLeft
 from femubench.core.run.record_file import Record
@@ -92,7 +92,7 @@ class Results:
         if self._store is not None and not slot.stale:
             self._store.exhibits.put(slot.key, exhibit)
 
-    @uncollected()
+    @pause_collection()
     def keep(self, known: StoredResults, workers: int) -> list[int]:
         """Take the results that the store has, which lets go of them; return what is missing.
 

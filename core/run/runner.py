@@ -96,7 +96,7 @@ class Plan:
         }
         limits = self._limits(Limits(options.timeout, share, sandbox=executor.sandbox), store)
         with threadpool_limits(1), ExitStack() as stack:
-            references = starts.beside.repeated(self._solve_yardsticks())
+            references = starts.beside.add_repeated(self._solve_yardsticks())
             slots = self.slots
             asked |= {"request": dict(self.request), "plan": plan_digest(slots.keys)}
             about = {**starts.about(cases), **starts.beside.about(references)}

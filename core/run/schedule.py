@@ -18,7 +18,7 @@ from femubench.core.child.workers import Workers
 from femubench.core.errors import InputError
 from femubench.core.run.answers import AnswerError, read_report
 from femubench.core.run.jobs import JobOutcome
-from femubench.core.run.judging import Dossier, Judgement, judged, run_strategy
+from femubench.core.run.judging import Dossier, Judgement, judge_outcome, run_strategy
 from femubench.core.run.slots import Slot, Start, first_seed
 from femubench.core.run.standing_judge import Judges
 from femubench.core.schema.results import JobResult, Status
@@ -56,11 +56,11 @@ class Workload:
         """Tell whether the exhibit of a job is wanted."""
         return self.show is not None and slot.seed == self._first_seed and not slot.varied
 
-    def unjudged(self, index: int, outcome: JobOutcome) -> JobResult:
+    def make_unjudged(self, index: int, outcome: JobOutcome) -> JobResult:
         """Return the result of a job that has no model to be judged."""
         slot = self.slots[index]
         names = slot.strategy, slot.seed, slot.nominal
-        return judged(slot.case, self.references[slot.case.name], names, outcome)
+        return judge_outcome(slot.case, self.references[slot.case.name], names, outcome)
 
 
 def compute_jobs(
@@ -93,8 +93,8 @@ def compute_jobs(
                 yield from bench.start(workers, judges)
             if not (workers.busy or judges.busy):
                 return
-            for task, ending in (*workers.wait(judges.at_work), *judges.ended()):
-                yield from bench.taken(task, ending)
+            for task, ending in (*workers.wait(judges.at_work), *judges.take_ended()):
+                yield from bench.take(task, ending)
 
 
 class _Bench:
@@ -125,7 +125,7 @@ class _Bench:
         slot = self._load.slots[index]
         job = None if answer else slot.job
         if isinstance(job, JobOutcome):
-            yield index, self._load.unjudged(index, job)
+            yield index, self._load.make_unjudged(index, job)
             return
         if answer:
             names = slot.strategy, slot.seed, slot.nominal
@@ -139,7 +139,7 @@ class _Bench:
         else:
             ending = workers.start(task, run_strategy, job, self._load.limits[slot.strategy])
         if ending is not None and not self._again(task):
-            yield index, self._load.unjudged(index, JobOutcome("crashed", ending.reason))
+            yield index, self._load.make_unjudged(index, JobOutcome("crashed", ending.reason))
 
     def _again(self, task: _Task) -> bool:
         """Try a task once more for which there was no process; tell whether it may be tried."""
@@ -150,7 +150,7 @@ class _Bench:
         (self.answers if answer else self.waiting).append(task)
         return True
 
-    def taken(self, task: _Task, ending: Ending) -> Iterator[tuple[int, JobResult]]:
+    def take(self, task: _Task, ending: Ending) -> Iterator[tuple[int, JobResult]]:
         """Yield the result of a task that has ended, unless its job goes on."""
         index, answer = task
         if ending.how == "orphaned" and index not in self._alone:
@@ -164,7 +164,7 @@ class _Bench:
             found = self._judgement(self._load.slots[index], ending)
             yield (
                 index,
-                self._load.unjudged(index, found) if isinstance(found, JobOutcome) else found,
+                self._load.make_unjudged(index, found) if isinstance(found, JobOutcome) else found,
             )
         else:
             if ending.how != "answer":
@@ -178,7 +178,7 @@ class _Bench:
             if outcome.status == "ok":
                 self.answers.append((index, ending.answer))
             else:
-                yield index, self._load.unjudged(index, outcome)
+                yield index, self._load.make_unjudged(index, outcome)
 
     def _judgement(self, slot: Slot, ending: Ending) -> JobResult | JobOutcome:
         if ending.how != "answer":

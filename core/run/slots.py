@@ -14,7 +14,7 @@ from typing import Any, overload
 
 from femubench.core.case.case import Case
 from femubench.core.roles import Strategy
-from femubench.core.run.jobs import Job, JobOutcome, one_line, seed_words, sent
+from femubench.core.run.jobs import Job, JobOutcome, one_line, pickle_strategy, seed_words
 from femubench.core.run.provenance import comes_along, job_key, provenance, strategy_version
 from femubench.core.schema.results import Nominal
 
@@ -125,7 +125,7 @@ class Slots(Sequence[Slot]):
         self.starts = [Start(*start) for start in starts]
         self.strategies, self.seeds = strategies, seeds
         self.meta: Mapping[str, Any] = {}
-        self._codes = [_pickled(strategy, sent) for strategy in strategies]
+        self._codes = [_pickled(strategy, pickle_strategy) for strategy in strategies]
         self._versions = [strategy_version(strategy) for strategy in strategies]
         # Workers have what comes along from the start: it is as it was all the run.
         self._now = [

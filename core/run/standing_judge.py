@@ -190,7 +190,7 @@ class Judges(Generic[Key]):
         how = Confinement(Limits(None), search_path(), own=False, once=False, secret=True)
         return _Judge(GuardedChild.start(how, JOBS))
 
-    def ended(self) -> list[tuple[Key, Ending]]:
+    def take_ended(self) -> list[tuple[Key, Ending]]:
         """Return what has been judged since, or could not be."""
         look = time.monotonic() - self._looked >= _LOOK
         if look:

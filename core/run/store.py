@@ -16,7 +16,7 @@ from typing import Any
 
 from femubench.core.drawing.files import Exhibits
 from femubench.core.errors import InputError
-from femubench.core.garbage import uncollected
+from femubench.core.garbage import pause_collection
 from femubench.core.run.record_file import (
     Record,
     RecordWriter,
@@ -57,7 +57,7 @@ def notes_of(faults: Sequence[InputError], folder: Path) -> list[str]:
     return shown
 
 
-def planned_jobs(meta: Mapping[str, Any]) -> dict[JobName, None]:
+def list_planned_jobs(meta: Mapping[str, Any]) -> dict[JobName, None]:
     """Return the jobs that a run began with, by case, strategy, seed and nominal model.
 
     Arguments:
@@ -78,7 +78,7 @@ def planned_jobs(meta: Mapping[str, Any]) -> dict[JobName, None]:
 
 def note_missing_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> str | None:
     """Return a line that says which jobs of a run have no result; None where all have one."""
-    plan = planned_jobs(meta)
+    plan = list_planned_jobs(meta)
     there = {(r.case, r.strategy, r.seed, r.nominal) for r in results}
     missing = [job for job in plan if job not in there]
     if not missing:
@@ -185,7 +185,7 @@ class Store:
         """Return the ids of all runs, oldest first; none where nothing was stored."""
         return tuple(self._starts())
 
-    @uncollected()
+    @pause_collection()
     def load(self, run_id: str | None = None) -> Run:
         """Return a run with scores and ranks, its results in the order of its jobs.
 
@@ -225,7 +225,7 @@ class Store:
             rate(result, score, rank)
         return Run({**meta, "notes": notes}, tuple(listed), beside)
 
-    @uncollected()
+    @pause_collection()
     def by_key(self) -> dict[str, JobResult]:
         """Return the latest result of every job of any run that has a key and can be read."""
         found: dict[str, JobResult] = {}
@@ -234,7 +234,7 @@ class Store:
                 found[key] = record.result()
         return found
 
-    @uncollected()
+    @pause_collection()
     def latest(self, run_id: str | None = None, *, but: str | None = None) -> dict[str, Record]:
         """Return the record of the latest result of every job that has a key, yet to be decoded.
 
@@ -255,7 +255,7 @@ class Store:
                     found[record.key] = record
         return found
 
-    def begun(self, run_id: str | None = None) -> dict[str, Any]:
+    def read_start(self, run_id: str | None = None) -> dict[str, Any]:
         """Return the meta data with which a run began; arguments and errors as for `load`."""
         wanted = self._find(run_id)
         return {**(self._starts()[wanted] or {}), "run": wanted}

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict, get_args
 
-from femubench.core.display import Shown, counted
+from femubench.core.display import Shown, count_noun
 from femubench.core.schema.bounds import (
     LONGEST_TEXT,
     Figure,
@@ -210,9 +210,9 @@ class Run(Shown):
         """Return what was run and how it ended."""
         count = Counter(result.status for result in self.results)
         size = ", ".join(
-            counted(len({getattr(result, what) for result in self.results}), noun)
+            count_noun(len({getattr(result, what) for result in self.results}), noun)
             for what, noun in (("case", "case"), ("strategy", "strategy"), ("seed", "seed"))
         )
         ended = ", ".join(f"{number} {status}" for status, number in count.items())
-        title = f"{size}, {counted(len(self.results), 'result')} ({ended or 'none'})"
+        title = f"{size}, {count_noun(len(self.results), 'result')} ({ended or 'none'})"
         return [(str(self.meta.get("run", "")), title)]

@@ -16,7 +16,7 @@ _DIGITS = 8
 TAIL = len(_BEFORE) + _DIGITS + len(_AFTER)
 
 
-def sealed(text: bytes) -> bytes:
+def seal(text: bytes) -> bytes:
     """Return a table of JSON, not an empty one, with the checksum as its last entry.
 
     Arguments:

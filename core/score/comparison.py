@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 
 from femubench.core.errors import InputError
 from femubench.core.schema.results import BLOCKS, DONE, NOMINALS, JobResult, Nominal, Run
-from femubench.core.score.counting import block_shares, counted_blocks
+from femubench.core.score.counting import block_shares, choose_blocks
 from femubench.core.score.ranking import OFFSET_PERCENT, geometric_mean, score_of
 from femubench.core.score.repeatability import environment_differences
 from femubench.core.score.statistics import ScoreTable, Significance, evidence_of, structures_of
@@ -178,7 +178,7 @@ class _JobPair:
         reference = self.reference
         if not reference and self.before.status == self.after.status == "ok":
             ratios = self.blocks
-            counted = [ratios[name] for name in counted_blocks(ratios)]
+            counted = [ratios[name] for name in choose_blocks(ratios)]
             return geometric_mean(counted) if counted else None
         if reference:
             shares = self.shares

@@ -14,7 +14,7 @@ WHOLE = ""
 _DIGITS = 9  # of a nominal error; two cases of a structure that share them share the data
 
 
-def counted_blocks(blocks: Iterable[str]) -> tuple[str, ...]:
+def choose_blocks(blocks: Iterable[str]) -> tuple[str, ...]:
     """Return the blocks of a case that count: the unseen ones, all where it holds nothing back.
 
     Examples:
@@ -44,7 +44,7 @@ def block_weights(references: References, structures: Mapping[str, str]) -> Weig
     named = {
         (case, name): (structures.get(case, case), name, f"{errors[name]:.{_DIGITS}g}")
         for case, errors in references.items()
-        for name in counted_blocks(errors)
+        for name in choose_blocks(errors)
         if name in UNSEEN or not some
     }
     often = Counter(named.values())

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femubench.core.garbage import uncollected
+from femubench.core.garbage import pause_collection
 from femubench.core.schema.results import BLOCKS, UNSEEN, JobResult, Run
 from femubench.core.score import predictive
 from femubench.core.score.counting import (
@@ -23,8 +23,8 @@ from femubench.core.score.counting import (
 from femubench.core.score.ranking import (
     OFFSET_PERCENT,
     SCORE_OF_FAILURE,
+    rank_items,
     rank_results,
-    ranked,
     score_in,
 )
 from femubench.core.score.statistics import FEWEST, interval_over_structures, structures_of
@@ -123,7 +123,7 @@ def interval_kind(run: Run) -> str:
     return _Grid.of(run).interval
 
 
-@uncollected()
+@pause_collection()
 def leaderboard(run: Run, floor_percent: float = OFFSET_PERCENT) -> pd.DataFrame:
     """Return one row a strategy, best first: physical, then unphysical, then without any model.
 
@@ -160,7 +160,7 @@ def leaderboard(run: Run, floor_percent: float = OFFSET_PERCENT) -> pd.DataFrame
     for result in scored:
         own[result.strategy].append(result)
     rows = [_row(name, results, table) for name, results in own.items()]
-    listed = [{**row, "rank": rank} for rank, row in ranked(rows, _order)]
+    listed = [{**row, "rank": rank} for rank, row in rank_items(rows, _order)]
     return pd.DataFrame(listed, columns=list(COLUMNS))
 
 
@@ -187,7 +187,7 @@ def ranks_by_floor(run: Run) -> dict[str, tuple[int, ...]]:
     return {name: tuple(int(found[name]) for found in ranks.values()) for name in order}
 
 
-def scored_on(run: Run) -> str:
+def find_basis(run: Run) -> str:
     """Return on what the skill of a run is measured: ``unseen`` data, or the ``given`` modes.
 
     Examples:

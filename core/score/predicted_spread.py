@@ -8,7 +8,7 @@ import numpy as np
 
 from femubench.core.fem.model import Model, neighbours_of
 from femubench.core.modal.eigen import Modes
-from femubench.core.modal.neighbour_modes import followed_frequencies
+from femubench.core.modal.neighbour_modes import follow_frequencies
 from femubench.core.typing import FloatArray, IntArray
 
 MORE = 8  # modes above the highest one that is wanted, which samples may mix with it
@@ -53,7 +53,7 @@ class Spread:
         variance = np.square(self.discrepancy_std * own) + np.square(np.nan_to_num(measured_std))
         if self.samples and paired.any():
             kept = modes.take(np.arange(min(int(index.max()) + 1 + MORE, len(modes))))
-            found = [followed_frequencies(sample, kept)[index[paired]] for sample in self.samples]
+            found = [follow_frequencies(sample, kept)[index[paired]] for sample in self.samples]
             variance[paired] += np.mean(np.square(found - own[paired]), axis=0)
         std = np.sqrt(variance)
         return [float(s) if there else None for s, there in zip(std, paired, strict=True)]

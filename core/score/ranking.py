@@ -8,9 +8,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from femubench.core.garbage import uncollected
+from femubench.core.garbage import pause_collection
 from femubench.core.schema.results import DONE, JobResult, Nominal
-from femubench.core.score.counting import WHOLE, counted_blocks
+from femubench.core.score.counting import WHOLE, choose_blocks
 
 # A block that the nominal model already meets to the last digit must not decide a ranking.
 OFFSET_PERCENT = 0.05
@@ -37,7 +37,7 @@ def score_of(
     fixed = _score_without_errors(result)
     if fixed is not None or not reference:
         return SCORE_OF_FAILURE if fixed is None else fixed
-    known = shares or dict.fromkeys(counted_blocks(reference), 1.0)
+    known = shares or dict.fromkeys(choose_blocks(reference), 1.0)
     return geometric_mean(
         (score_in(result, name, reference) for name in known), weights=known.values()
     )
@@ -85,7 +85,7 @@ def geometric_mean(values: Iterable[float], weights: Iterable[float] | None = No
     return float(np.exp(np.average(np.log(numbers), weights=shares)))
 
 
-def ranked(
+def rank_items(
     items: Iterable[_Item], key: Callable[[_Item], tuple[tuple[float, ...], float, str]]
 ) -> list[tuple[int, _Item]]:
     """Return the items with their ranks, best first; equal ones share a rank: 1, 2, 2, 4.
@@ -113,7 +113,7 @@ def ranked(
     return [(rank, item) for rank, _, item in sorted(found, key=lambda entry: entry[:2])]
 
 
-@uncollected()
+@pause_collection()
 def rank_results(
     results: Iterable[JobResult],
     reference: Mapping[str, Mapping[str, float]] | None = None,
@@ -193,7 +193,7 @@ def _scores_against(
 ) -> list[float]:
     """Return what `score_of` gives for each result, many at a time."""
     scores = [SCORE_OF_FAILURE] * len(results)
-    blocks = {case: counted_blocks(errors) for case, errors in reference.items()}
+    blocks = {case: choose_blocks(errors) for case, errors in reference.items()}
     by_count: dict[int, tuple[list[int], list[list[float]]]] = {}
     for place, result in enumerate(results):
         errors = reference.get(result.case) or {}

@@ -12,7 +12,7 @@ import scipy.linalg as la
 from femubench.core.case.case import Case, Modification
 from femubench.core.fem.model import Model
 from femubench.core.modal.close_modes import align_close_modes
-from femubench.core.modal.correlation import seen_modes
+from femubench.core.modal.correlation import find_seen_modes
 from femubench.core.modal.eigen import (
     DENSE_LIMIT,
     Modes,
@@ -122,7 +122,7 @@ def predict_block(
     return _predict(model, _modes_for(model, (measurement,)), measurement, modification).pairs
 
 
-def modified_modes(
+def pair_modified(
     model: Model,
     change: Modification,
     spread: Spread | None = None,
@@ -203,7 +203,7 @@ def reference_of(case: Case) -> Reference:
     return Reference(blocks, zero_tolerance(modes), rigid_modes_of(case.model), choices)
 
 
-def given_errors(case: Case, reference: Mapping[str, float]) -> dict[str, float]:
+def find_given_errors(case: Case, reference: Mapping[str, float]) -> dict[str, float]:
     """Return the rms error by block of a case's own model; nothing where it is the reference's.
 
     Arguments:
@@ -279,7 +279,7 @@ def _predict(
 ) -> _Predicted:
     elastic = modes.elastic
     readings = np.asarray(model.observe(measurement.sensors) @ elastic.shapes)
-    readings = np.where(seen_modes(readings), readings, 0.0)
+    readings = np.where(find_seen_modes(readings), readings, 0.0)
     frequencies = elastic.natural_frequencies
     # Modes within two standard deviations of each other are one to the test.
     closeness = 2.0 * float(np.median(measurement.frequency_std / measurement.frequencies))

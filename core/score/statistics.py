@@ -18,7 +18,7 @@ from femubench.core.score.counting import (
     References,
     Weights,
     block_weights,
-    counted_blocks,
+    choose_blocks,
 )
 from femubench.core.score.ranking import OFFSET_PERCENT, score_in
 from femubench.core.typing import FloatArray
@@ -186,7 +186,7 @@ def _scores(
     # The unknown nominal error is a factor of both sides of every pair.
     return {
         name: result.blocks[name].rms_percent + floor_percent
-        for name in counted_blocks(result.blocks)
+        for name in choose_blocks(result.blocks)
     }
 
 

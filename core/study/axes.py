@@ -76,7 +76,7 @@ class StudyAxes:
         Raises:
             InputError: when what the run says of them is wrong.
         """
-        found = cls.asked(run) or cls({}, {})
+        found = cls.from_run(run) or cls({}, {})
         cases = [*(run.meta.get("cases") or ()), *(result.case for result in run.results)]
         names = [*run.meta.get("strategies", ()), *(result.strategy for result in run.results)]
         return cls(
@@ -88,7 +88,7 @@ class StudyAxes:
         )
 
     @classmethod
-    def asked(cls, run: Run) -> StudyAxes | None:
+    def from_run(cls, run: Run) -> StudyAxes | None:
         """Return the axes that a study asked for; None for a run of no study.
 
         Raises:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femubench.core.case.case import Case
-from femubench.core.display import counted
+from femubench.core.display import count_noun
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import IntArray
@@ -70,7 +70,7 @@ class VariedCase(Case):
         return np.asarray(np.sort(drawn))
 
 
-def varied(case: Case, noise: float, left_out: int) -> Case:
+def vary_case(case: Case, noise: float, left_out: int) -> Case:
     """Return a case under other conditions; the case itself where they are its own.
 
     Arguments:
@@ -80,7 +80,7 @@ def varied(case: Case, noise: float, left_out: int) -> Case:
     if noise == 1.0 and left_out == 0:
         return case
     words = [f"noise {noise:.12g}"] if noise != 1.0 else []
-    words += [f"{counted(left_out, 'sensor')} left out"] if left_out else []
+    words += [f"{count_noun(left_out, 'sensor')} left out"] if left_out else []
     digest = hashlib.sha256(f"{', '.join(words)}: {case.digest}".encode()).hexdigest()
     own = {**vars(case), "name": f"{case.name} ({', '.join(words)})", "digest": digest}
     # Whose copies they are: of a structure every copy has a share, and not a vote.

@@ -11,9 +11,9 @@ from typing import Annotated, TypeVar
 
 from pydantic import AfterValidator, Field, PlainValidator
 
-from femubench.core.case.faults import BadKey, dotted
+from femubench.core.case.faults import BadKey, join_key_path
 from femubench.core.case.schema import Many, Text, TomlTable, misfit
-from femubench.core.case.toml_text import key_line, located, spec_of
+from femubench.core.case.toml_text import key_line, locate_fault, spec_of
 from femubench.core.errors import InputError
 from femubench.core.files import MIB, read_text
 from femubench.core.schema.results import NOMINALS, Nominal
@@ -152,7 +152,7 @@ class StudyFile:
                 error.what,
                 file=self.file,
                 line=key_line(self.text, path),
-                key=dotted(path),
+                key=join_key_path(path),
                 expected=error.expected,
             ) from None
 
@@ -173,7 +173,7 @@ def read_study(file: str | PathLike[str]) -> StudyFile:
             what = "noise is a factor on what is drawn, and seed 0 draws none"
             raise BadKey(where, what, "seeds = N, or a list of seeds >= 1")
     except BadKey as fault:
-        raise located(fault, text, path) from None
+        raise locate_fault(fault, text, path) from None
     return found
 
 

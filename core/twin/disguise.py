@@ -72,12 +72,12 @@ class Disguise:
             ),
         }
         for name in ("masses", "springs", "supports", "oscillators"):
-            changed[name] = self.placed(getattr(frame, name))
+            changed[name] = self.place_parts(getattr(frame, name))
         for name in ("joint_springs", "rigid_ends", "preloads", "eccentricities", "couplings"):
             changed[name] = tuple(map(self._at_member, getattr(frame, name)))
         return replace(frame, **changed)
 
-    def placed(self, parts: Iterable[_Part]) -> tuple[_Part, ...]:
+    def place_parts(self, parts: Iterable[_Part]) -> tuple[_Part, ...]:
         """Return what is attached at places, with the new names of those."""
         return tuple(replace(part, at=self._place(part.at)) for part in parts)  # type: ignore[type-var,attr-defined]
 
@@ -134,7 +134,7 @@ def _renamed(letter: str, names: Iterable[str], rng: np.random.Generator | None)
     return {name: f"{letter}{number + 1:0{wide}}" for name, number in numbers}
 
 
-def disguised(case: Case, rng: np.random.Generator | None) -> Case:
+def disguise_case(case: Case, rng: np.random.Generator | None) -> Case:
     """Return a case whose joints, nodes, members, sets and sensors have other names and orders.
 
     Arguments:
@@ -158,8 +158,8 @@ def disguised(case: Case, rng: np.random.Generator | None) -> Case:
     changes = tuple(
         replace(
             change,
-            masses=names.placed(change.masses),
-            springs=names.placed(change.springs),
+            masses=names.place_parts(change.masses),
+            springs=names.place_parts(change.springs),
             measurement=_relabelled(change.measurement, labels, shuffled=rng is not None),
         )
         for change in case.modifications

@@ -76,12 +76,12 @@ class ReducedSolid:
         """Return the names of the factors."""
         return tuple(map(str, self.arrays["names"]))
 
-    def drawn(self, rng: np.random.Generator) -> FloatArray:
+    def draw_factors(self, rng: np.random.Generator) -> FloatArray:
         """Return factors within their ranges, log-uniform, (factors,)."""
         low, high = np.log(self.arrays["ranges"]).T
         return np.asarray(np.exp(rng.uniform(low, high)))
 
-    def moved(self, factors: FloatArray, xyz: FloatArray) -> FloatArray:
+    def move_points(self, factors: FloatArray, xyz: FloatArray) -> FloatArray:
         """Return where points of the drawing lie in the stretched one, m.
 
         Arguments:

@@ -55,7 +55,7 @@ class Similarity:
     density: float
 
     @classmethod
-    def drawn(cls, rng: np.random.Generator) -> Similarity:
+    def draw(cls, rng: np.random.Generator) -> Similarity:
         """Return factors, log-uniform, that move the frequencies by a tenth at least."""
         while True:
             found = cls(
@@ -86,7 +86,7 @@ class Similarity:
         """Return the factor of a spring: N/m, or N m/rad for a rotation."""
         return self.modulus * self.length ** (3 if "r" in direction else 1)
 
-    def moved(self, xyz: Vector) -> Vector:
+    def move_points(self, xyz: Vector) -> Vector:
         """Return a point or a vector between points, m."""
         x, y, z = (self.length * value for value in xyz)
         return x, y, z
@@ -188,7 +188,7 @@ def similar_frame(frame: Frame, by: Similarity) -> Frame:
     """Return the frame of the similar structure; what is no length, modulus or density stays."""
     sections = {id(m.section): similar_section(m.section, by.length) for m in frame.members}
     changed: dict[str, Any] = {
-        "joints": [Joint(j.name, by.moved(j.xyz), j.type) for j in frame.joints],
+        "joints": [Joint(j.name, by.move_points(j.xyz), j.type) for j in frame.joints],
         "members": [
             replace(m, section=sections[id(m.section)], material=_material(m.material, by))
             for m in frame.members
@@ -234,7 +234,7 @@ def _material(material: Material, by: Similarity) -> Material:
 
 
 def _point_mass(mass: PointMass, by: Similarity) -> PointMass:
-    return PointMass(mass.at, by.mass * mass.mass, by.moved(mass.offset))
+    return PointMass(mass.at, by.mass * mass.mass, by.move_points(mass.offset))
 
 
 def _ground_spring(spring: GroundSpring, by: Similarity) -> GroundSpring:

@@ -49,7 +49,7 @@ def draw_stretched_case(case: Case, rng: np.random.Generator) -> Case:
         raise NotApplicable(f"no stretched solid of {case.name} is known")
     solid, known = ReducedSolid.read(file), nearness(case)
     for _ in range(_MOST_DRAWS):
-        found = stretched_case(case, solid, solid.drawn(rng), rng)
+        found = stretch_case(case, solid, solid.draw_factors(rng), rng)
         shift = np.log(found.measurement.frequencies / case.measurement.frequencies)
         as_near = all(
             alone <= most and error <= _FARTHER * usual
@@ -85,7 +85,7 @@ def _nearness(model: Model, measured: Measurement) -> tuple[int, float]:
     return int((~paired).sum()), float(error)
 
 
-def stretched_case(
+def stretch_case(
     case: Case, solid: ReducedSolid, factors: FloatArray, rng: np.random.Generator | None
 ) -> Case:
     """Return the case of a stretched structure: model, modes, and changes.
@@ -103,11 +103,11 @@ def stretched_case(
             change,
             masses=_at_places(frame, solid, factors, change.masses),
             springs=_at_places(frame, solid, factors, change.springs),
-            measurement=test.measured(change.measurement, number),
+            measurement=test.measure(change.measurement, number),
         )
         for number, change in enumerate(case.modifications, start=1)
     )
-    corners = solid.moved(factors, frame.corners).tolist()
+    corners = solid.move_points(factors, frame.corners).tolist()
     joints = [
         Joint(joint.name, (x, y, z), joint.type)
         for joint, (x, y, z) in zip(frame.joints, corners, strict=True)
@@ -124,7 +124,7 @@ def stretched_case(
                 springs=_at_places(frame, solid, factors, frame.springs),
             )
         ),
-        measurement=test.measured(case.measurement, 0),
+        measurement=test.measure(case.measurement, 0),
         modifications=changes,
         # What is told of the files is of the structure that it was.
         notes=(),
@@ -158,7 +158,7 @@ def _place(frame: Frame, solid: ReducedSolid, factors: FloatArray, place: Place)
     ends = frame.members[frame.member_index[place.member]].ends
     start, stop = (np.array(frame.joint(name).xyz) for name in ends)
     points = np.array([start, start + place.s * (stop - start), stop])
-    first, here, last = solid.moved(factors, points)
+    first, here, last = solid.move_points(factors, points)
     share = np.linalg.norm(here - first) / np.linalg.norm(last - first)
     return Place(member=place.member, s=float(share))
 
@@ -196,7 +196,7 @@ class _Test:
                 mass *= 1.0 + std / value * rng.standard_normal()
         return cls(solid, factors, gains, mass, rng)
 
-    def measured(self, known: Measurement, change: int) -> Measurement:
+    def measure(self, known: Measurement, change: int) -> Measurement:
         """Return what replaces a measurement of the case.
 
         Arguments:
@@ -221,7 +221,7 @@ class _Test:
         own: dict[str, Any] = {
             "sensors": Sensors(
                 known.sensors.labels,
-                self.solid.moved(self.factors, known.sensors.xyz),
+                self.solid.move_points(self.factors, known.sensors.xyz),
                 known.sensors.directions,
             ),
             "frequencies": frequencies,

@@ -10,7 +10,7 @@ import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.errors import NotApplicable
-from femubench.core.twin.disguise import disguised
+from femubench.core.twin.disguise import disguise_case
 from femubench.core.twin.similarity import Similarity, similar_case
 from femubench.core.twin.stretched_case import draw_stretched_case
 
@@ -26,7 +26,7 @@ TruthFamily = Callable[[Case, np.random.Generator], Case]
 # A structure of its own geometry where its truth is known, and then a similar one.
 FAMILIES: Mapping[str, TruthFamily] = {
     "stretched": draw_stretched_case,
-    "similar": lambda case, rng: similar_case(case, Similarity.drawn(rng)),
+    "similar": lambda case, rng: similar_case(case, Similarity.draw(rng)),
 }
 
 
@@ -108,7 +108,7 @@ def twin_of(
     name = f"{case.name}{MARK}{number}"
     told = f"twin {number} from seed {seed} of {case.name}: {found.digest}"
     renamed = replace(
-        disguised(found, rng if number > 1 else None),
+        disguise_case(found, rng if number > 1 else None),
         name=name,
         title=f"{case.title} (twin {number})",
         digest=hashlib.sha256(told.encode()).hexdigest(),

@@ -19,7 +19,7 @@ from femubench.core.fem.model import Model
 from femubench.core.fem.slopes import Matrix
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.group_prior import STRUCTURE_STD, group_prior_std, support_groups
-from femubench.core.plugin.loader import registered_effects
+from femubench.core.plugin.loader import list_effects
 from femubench.core.roles import Effect
 
 PartSet = Literal["elements", "members", "joints", "sections", "materials", "sets", "groups"]
@@ -60,7 +60,7 @@ def check_changes(words: str, *, parts_alone: bool = False) -> None:
             rule = "alone" if effect == OWN else "without @: only effects have places"
             raise InputError(f"changes: {word!r}", expected=f"{effect!r} {rule}")
         # The code of others is imported where a strategy runs, not where its options are read.
-        if "/" not in effect and all(found.name != effect for found in registered_effects()):
+        if "/" not in effect and all(found.name != effect for found in list_effects()):
             raise InputError(
                 f"changes: there is no {word!r}",
                 expected=f"{OWN}, {', '.join(known)} or effects that `bench plugins list` shows "
@@ -256,7 +256,7 @@ def scale_joint(
     return scale_property(*at, prior_std=prior_std, lower=0.01, upper=100.0)
 
 
-def carried_by(levels: Sequence[Sequence[Change]], count: int) -> list[Change]:
+def select_determined(levels: Sequence[Sequence[Change]], count: int) -> list[Change]:
     """Return the changes of the leading levels that so many data determine.
 
     Only as many parameters as measured frequencies are set free, as in the source; a level is
@@ -310,7 +310,7 @@ def list_changes(model: Model, words: str, *, prior_std: float | None = None) ->
         name, _, place = word.partition("@")
         plugin, _, name = name.rpartition("/")
         try:
-            known = registered_effects(*([plugin] if plugin else []))
+            known = list_effects(*([plugin] if plugin else []))
         except UnknownNameError as error:
             raise NotApplicable(f"changes: {error}") from error
         effect = next((found for found in known if found.name == name), None)

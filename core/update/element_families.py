@@ -181,14 +181,14 @@ class Family(ABC):
         """Return the relative changes that belong to parameters, the inverse of `values`."""
         return np.asarray((values - self.before) / self.scale)
 
-    def spread(self, x: FloatArray) -> FloatArray:
+    def spread_unknowns(self, x: FloatArray) -> FloatArray:
         """Return the unknowns of every part and pattern, zero where there is none."""
         return np.asarray(np.append(x, 0.0)[self.columns])
 
     def relative_cores(self, x: FloatArray) -> FloatArray:
         """Return the relative core of every part, the unit matrix nominally, (n_e, q, q)."""
         assert self.cores is not None
-        change = np.einsum("ea,eaij->eij", self.spread(x), self.cores)
+        change = np.einsum("ea,eaij->eij", self.spread_unknowns(x), self.cores)
         return np.asarray(np.eye(self.cores.shape[-1]) + change)
 
     @property
@@ -206,7 +206,7 @@ class Family(ABC):
         """Return, for each shape, what a unit of every unknown adds, sparse (n, n_unknowns)."""
 
     @abstractmethod
-    def changed(self, model: Model, x: FloatArray) -> Model:
+    def change_model(self, model: Model, x: FloatArray) -> Model:
         """Return the model with the change of stiffness that belongs to x."""
 
 
@@ -241,10 +241,10 @@ class ElementFamily(Family):
     def change(self, x: FloatArray) -> FloatArray:
         """Return the change of all local stiffness matrices, (n_elements, 12, 12)."""
         change = np.zeros((len(self.structure.properties), 12, 12))
-        change[self.elements] = np.einsum("ea,eaij->eij", self.spread(x), self.patterns)
+        change[self.elements] = np.einsum("ea,eaij->eij", self.spread_unknowns(x), self.patterns)
         return change
 
-    def changed(self, model: Model, x: FloatArray) -> Model:
+    def change_model(self, model: Model, x: FloatArray) -> Model:
         """Return the model with other element matrices."""
         change = self.structure.plan.assemble(self.change(x))
         return replace(model, stiffness=model.stiffness + change)
@@ -295,7 +295,7 @@ class GroupFamily(Family):
         turn, move = (float(np.log(size).mean()) for size in sizes)
         return float(np.exp(0.5 * (turn - move)))
 
-    def changed(self, model: Model, x: FloatArray) -> Model:
+    def change_model(self, model: Model, x: FloatArray) -> Model:
         """Return the model with factors 1 + x on its groups."""
         return with_values(self.model, self.factors, 1.0 + x)
 
@@ -331,7 +331,7 @@ def group_family(model: Model) -> GroupFamily:
     )
 
 
-def tied(family: ElementFamily, parts: Mapping[str, tuple[str, ...]]) -> ElementFamily:
+def tie_unknowns(family: ElementFamily, parts: Mapping[str, tuple[str, ...]]) -> ElementFamily:
     """Return the family with one unknown a pattern for all elements of a part; others stay nominal.
 
     Arguments:
@@ -478,7 +478,7 @@ def nobari_family(structure: Structure) -> ElementFamily:
     )
 
 
-def scaled_strain_vectors(structure: Structure, elements: IntArray) -> FloatArray:
+def scale_strain_vectors(structure: Structure, elements: IntArray) -> FloatArray:
     """Return V with k_e0 = V V' on the dofs that the plane lets move, (n_e, 12, q)."""
     p = structure.properties.take(elements)
     vectors = strain_vectors(p.length - p.rigid_1 - p.rigid_2, p.rigid_1, p.rigid_2)
@@ -526,7 +526,7 @@ def generic_family(
         plain_cores[a, i, j] = plain_cores[a, j, i] = 1.0
     turned = np.array([tied and ends[e] == 1 for e in elements])[:, None, None, None]
     cores = np.where(turned, np.outer(flip, flip) * plain_cores, plain_cores)
-    vectors = scaled_strain_vectors(structure, elements)[:, None]
+    vectors = scale_strain_vectors(structure, elements)[:, None]
     patterns = vectors @ cores @ np.swapaxes(vectors, 2, 3)
     allowed = {s: set(free_terms(operations_of(s, plane), active)) for s in (plain, joint)}
     unknowns: dict[tuple[int, int, str | int], tuple[int, str]] = {}

@@ -13,7 +13,7 @@ from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.measurement import Measurement
 from femubench.core.update.change_lists import OWN, check_changes, element_sets
-from femubench.core.update.element_families import ElementFamily, Family, tied
+from femubench.core.update.element_families import ElementFamily, Family, tie_unknowns
 from femubench.core.update.equation_error import update_by_equation_error
 from femubench.core.update.quasi import Expansion, Frequencies
 from femubench.core.update.strategy import Strategy, UpdateResult
@@ -71,7 +71,7 @@ class ElementStrategy(Strategy):
         family = self.family(structure)
         if self.changes == OWN:
             return family
-        return tied(family, element_sets(structure, self.changes))
+        return tie_unknowns(family, element_sets(structure, self.changes))
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator

@@ -287,7 +287,7 @@ def update_by_equation_error(
         solution = solve_least_change(a, b, family, basis)
         change = np.linalg.norm(solution.x - x) / max(float(np.linalg.norm(solution.x)), 1e-300)
         x = solution.x
-        current = family.changed(model, x)
+        current = family.change_model(model, x)
         history.append({"residual": solution.residual / size, "change": float(change)})
     promised = keep_rigid or family.cores is not None
     diagnostics = {

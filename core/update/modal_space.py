@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from femubench.core.change.parametric_model import ParametricModel
 from femubench.core.errors import ModelError, StrategyFailure
 from femubench.core.fem.model import Model
-from femubench.core.modal.correlation import seen_modes
+from femubench.core.modal.correlation import find_seen_modes
 from femubench.core.modal.eigen import (
     DENSE_LIMIT,
     Modes,
@@ -206,7 +206,7 @@ class ModalSpace:
         They count where they have a weight and the sensors see the mode.
         """
         shapes = np.where(self._known, self.measurement.shapes.T, 0.0)
-        counted = seen_modes(self.measurement.shapes) & (self.shape_weight > 0.0)
+        counted = find_seen_modes(self.measurement.shapes) & (self.shape_weight > 0.0)
         length = [np.linalg.norm(s) if c else np.inf for s, c in zip(shapes, counted, strict=True)]
         return np.asarray(shapes / np.array(length)[:, None])
 
@@ -382,7 +382,7 @@ def _largest_answers(
     for last in (False, False, True):
         forces = np.zeros((moved.shape[1], limit))
         for shape, own in zip(moved, weights, strict=True):
-            forces += parts.start_slopes.combined(shape, own)
+            forces += parts.start_slopes.combine(shape, own)
         answers = shifted.solve(forces)
         if not last:
             answers = la.qr(answers, mode="economic")[0]
@@ -391,7 +391,7 @@ def _largest_answers(
     return np.asarray(answers)
 
 
-def bounded_fit(space: ModalSpace, start: FloatArray, largest: float) -> tuple[FloatArray, float]:
+def fit_bounded(space: ModalSpace, start: FloatArray, largest: float) -> tuple[FloatArray, float]:
     """Return the local optimum of the coordinates between their bounds, and the cost there.
 
     Arguments:

@@ -25,7 +25,7 @@ from femubench.core.fem.structure import Structure
 from femubench.core.fit.discrepancy import Discrepancy
 from femubench.core.fit.dual_least_squares import MANY
 from femubench.core.modal.measurement import Measurement
-from femubench.core.modal.neighbour_modes import followed_frequencies
+from femubench.core.modal.neighbour_modes import follow_frequencies
 from femubench.core.typing import BoolArray, FloatArray
 from femubench.core.update.quadratic_fit import QuadraticFit, coefficients_of
 from femubench.core.update.residuals import Targets
@@ -77,7 +77,7 @@ class Target:
         own = np.arange(len(log)) < len(m)
         return np.array(log), np.array(std), own.astype(float)
 
-    def predicted(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def predict(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return those points that give a model, (n, p), and the logarithms of its data, (n, k)."""
         prediction = self.point.prediction
         partner = prediction.partner[prediction.partner >= 0]
@@ -88,7 +88,7 @@ class Target:
         for q in points:
             try:
                 model = self.iteration.model_at(q)
-                row = followed_frequencies(model, modes)[partner]
+                row = follow_frequencies(model, modes)[partner]
             except ModelError:
                 continue
             if self.measurement.total_mass is not None:
@@ -249,7 +249,7 @@ def _fitted(target: Target, root: FloatArray, rng: np.random.Generator) -> tuple
     """
     count = int(np.ceil(_POINTS * coefficients_of(len(root))))
     start = target.point.q + rng.standard_normal((count, len(root))) @ root.T * _WIDER
-    points, values = target.predicted(start)
+    points, values = target.predict(start)
     for _ in range(_ROUNDS):
         fit = QuadraticFit.of(points, values)
         if (fit.error > _USELESS * target.std(np.zeros(1))).any():
@@ -257,7 +257,7 @@ def _fitted(target: Target, root: FloatArray, rng: np.random.Generator) -> tuple
         sampler = _started(target, fit, root, rng)
         drawn = sampler.get_chain(discard=_BLOCK // 2, flat=True)
         drawn = drawn[rng.choice(len(drawn), count, replace=False)]
-        more, exact = target.predicted(drawn[:, :-1])
+        more, exact = target.predict(drawn[:, :-1])
         off = np.sqrt(np.mean(np.square(fit(more) - exact), axis=0))
         rough = not (off <= _OFF * target.std(drawn[:, -1])).all()
         if not rough:
@@ -282,7 +282,7 @@ def most_probable(
         NotApplicable: when a frequency has no standard deviation, or parameters are too many.
         StrategyFailure: when no measured mode has a partner.
     """
-    whole = measurement.widened(discrepancy.median * measurement.frequencies)
+    whole = measurement.widen(discrepancy.median * measurement.frequencies)
     model = Model.of(source) if isinstance(source, Structure) else source
     parametric = ParametricModel(model, tuple(changes))
     if len(parametric) > MANY:
@@ -370,7 +370,7 @@ def _normal_result(
             "surrogate_error": off,
             "paired_modes": float(len(target.measurement)),
         },
-        uncertainty=Uncertainty.drawn(iteration.model_at, point.q, covariance, discrepancy_std=own),
+        uncertainty=Uncertainty.draw(iteration.model_at, point.q, covariance, discrepancy_std=own),
     )
 
 

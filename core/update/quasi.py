@@ -11,7 +11,11 @@ import scipy.sparse as sp
 from femubench.core.errors import NotApplicable, StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import DENSE_LIMIT, Modes, enough_modes, solve_modes
-from femubench.core.modal.expansion import expand_by_dynamics, expand_by_rotation, measured_rows
+from femubench.core.modal.expansion import (
+    expand_by_dynamics,
+    expand_by_rotation,
+    find_measured_rows,
+)
 from femubench.core.modal.generalised_mass import mass_normalised
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import pair_measured
@@ -53,7 +57,7 @@ def partners_of(model: Model, measurement: Measurement) -> tuple[Modes, IntArray
     return modes, pair_measured(measurement, modes, readings).index
 
 
-def paired_modes(model: Model, measurement: Measurement) -> tuple[Modes, IntArray]:
+def pair_modes_of(model: Model, measurement: Measurement) -> tuple[Modes, IntArray]:
     """Return enough modes of a model and the index of every measured mode's partner.
 
     Raises:
@@ -84,8 +88,8 @@ def quasi_measured_modes(model: Model, measurement: Measurement) -> QuasiModes:
         >>> np.allclose(quasi.shapes.T @ model.mass @ quasi.shapes, np.eye(3))
         True
     """
-    rows = measured_rows(measurement.shapes)
-    modes, partners = paired_modes(model, measurement)
+    rows = find_measured_rows(measurement.shapes)
+    modes, partners = pair_modes_of(model, measurement)
     full = modes.shapes[:, partners]
     at_sensors = (model.observe(measurement.sensors) @ full)[rows]
     shapes, _ = expand_by_rotation(measurement.shapes[rows], at_sensors, full)
@@ -143,7 +147,7 @@ class WantedModes:
             raise NotApplicable(
                 f"expansion by forces is for {DENSE_LIMIT} dofs at most, the model has {model.size}"
             )
-        rows = measured_rows(measured.shapes)
+        rows = find_measured_rows(measured.shapes)
         sensors = sp.csr_array(model.observe(measured.sensors))[rows]
         shapes = expand_by_dynamics(model, sensors, measured.shapes[rows], measured.eigenvalues)
         return mass_normalised(model, shapes)

@@ -11,10 +11,10 @@ import numpy as np
 
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
-from femubench.core.fem.model_parameters import updated_mass
+from femubench.core.fem.model_parameters import find_updated_mass
 from femubench.core.fem.slopes import MatrixSlopes
 from femubench.core.modal.correlated_errors import undone
-from femubench.core.modal.correlation import modal_scale_factor, seen_modes
+from femubench.core.modal.correlation import find_seen_modes, modal_scale_factor
 from femubench.core.modal.eigen import Modes, enough_modes, solve_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import pair_measured
@@ -100,7 +100,7 @@ class Targets:
     def shape_weight(self) -> FloatArray:
         """Return 1/sigma of every shape component, 0 where there is none, (n_sensors, m)."""
         shapes, std = self.measurement.shapes, self.measurement.shape_std
-        known = np.isfinite(shapes) & np.isfinite(std) & (std > 0.0) & seen_modes(shapes)
+        known = np.isfinite(shapes) & np.isfinite(std) & (std > 0.0) & find_seen_modes(shapes)
         return np.where(known, 1.0 / np.where(known, std, 1.0), 0.0)
 
 
@@ -217,7 +217,7 @@ def predict(
     partner = pair_measured(data.measurement, modes, observer @ modes.shapes).index
     if previous is not None:
         partner = _followed(partner, model, modes, previous)
-    mass = updated_mass(model) if mass is None else mass
+    mass = find_updated_mass(model) if mass is None else mass
     return Prediction(data, model, modes, partner, observer, mass)
 
 

@@ -48,7 +48,7 @@ class SensitivityStrategy(Strategy):
         """Return the model to start from, and what may change of it."""
         if self.changes == OWN:
             return self.own_changes(model, measurement)
-        return model, self.listed_changes(model, measurement)
+        return model, self.list_changes(model, measurement)
 
     @abstractmethod
     def own_changes(
@@ -56,6 +56,6 @@ class SensitivityStrategy(Strategy):
     ) -> tuple[Model | Structure, list[Change]]:
         """Return the model to start from, and the changes that the source has."""
 
-    def listed_changes(self, model: Model, measurement: Measurement) -> list[Change]:
+    def list_changes(self, model: Model, measurement: Measurement) -> list[Change]:
         """Return the changes that `changes` names, nothing known of them beforehand."""
         return list_changes(model, self.changes)

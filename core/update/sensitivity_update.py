@@ -95,7 +95,7 @@ class Iteration:
         mass = self.parametric.mass(q, model)
         return Iterate(q, predict(self.data, model, previous, mass=mass))
 
-    def linearised(self, point: Iterate) -> Linearised:
+    def linearise(self, point: Iterate) -> Linearised:
         """Return the least-squares problem about a point, of the data that have a partner."""
         parametric, prediction = self.parametric, point.prediction
         known = np.isfinite(prediction.residual)
@@ -151,7 +151,7 @@ class Iteration:
         self.record(0, point, 0.0)
         slow = 0
         for iteration in range(1, self.options.max_iterations + 1):
-            problem = self.linearised(point)
+            problem = self.linearise(point)
             low, high = self.parametric.lower, self.parametric.upper
             step = problem.step(low, high, self.options.max_step, ridge=self.beta)
             following = self.advance(point, step)
@@ -196,16 +196,16 @@ class Iteration:
         """Return the posterior covariance of q, (p, p); None without statistics."""
         if not self.data.statistical:
             return None
-        normal = self.linearised(point).normal
+        normal = self.linearise(point).normal
         try:
             return np.asarray(np.linalg.inv(normal))
         except np.linalg.LinAlgError:
             return np.full(normal.shape, np.inf)
 
-    def known(self, point: Iterate) -> tuple[FloatArray | None, Uncertainty | None]:
+    def estimate_deviations(self, point: Iterate) -> tuple[FloatArray | None, Uncertainty | None]:
         """Return the deviations of q, (p,), and models of the posterior, where there are any."""
         if len(point.q) > MANY:
-            return self.known_of_many(point)
+            return self.estimate_many_deviations(point)
         covariance = self.covariance(point)
         if covariance is None:
             return None, None
@@ -214,16 +214,18 @@ class Iteration:
             return std, None
         try:
             even = 0.5 * (covariance + covariance.T)
-            return std, Uncertainty.drawn(self.model_at, point.q, even)
+            return std, Uncertainty.draw(self.model_at, point.q, even)
         except StrategyFailure:  # rounding made it no covariance; the model is none the worse
             return std, None
 
-    def known_of_many(self, point: Iterate) -> tuple[FloatArray | None, Uncertainty | None]:
+    def estimate_many_deviations(
+        self, point: Iterate
+    ) -> tuple[FloatArray | None, Uncertainty | None]:
         """Return the same without a matrix of the size of the parameters."""
         precision = self.parametric.precision
         if not self.data.statistical or not (precision > 0.0).all():
             return None, None
-        posterior = DualPosterior.of(self.linearised(point).jacobian, precision)
+        posterior = DualPosterior.of(self.linearise(point).jacobian, precision)
         draws = posterior.draws(standard_normal(len(point.q)))
         return posterior.std, Uncertainty.of_draws(self.model_at, point.q + draws)
 
@@ -289,7 +291,7 @@ def sensitivity_update(
     model = Model.of(source) if isinstance(source, Structure) else source
     iteration = Iteration(ParametricModel(model, tuple(changes)), data, options)
     point = iteration.run()
-    std, uncertainty = iteration.known(point)
+    std, uncertainty = iteration.estimate_deviations(point)
     return UpdateResult(
         model=point.prediction.model,
         parameter_count=len(iteration.parametric),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
 from femubench.core import roles
-from femubench.core.display import Shown, counted
+from femubench.core.display import Shown, count_noun
 
 if TYPE_CHECKING:
     import numpy as np
@@ -64,16 +64,16 @@ class UpdateResult(Shown):
 
     def rows(self) -> list[tuple[str, str]]:
         """Return the model, and the parameters before and after."""
-        unknowns = counted(self.parameter_count, "unknown")
+        unknowns = count_noun(self.parameter_count, "unknown")
         found = [
-            ("", f"{unknowns}, {counted(len(self.history), 'iteration')}"),
+            ("", f"{unknowns}, {count_noun(len(self.history), 'iteration')}"),
             ("model", self.model.rows()[0][1]),
         ]
         for p in self.parameters:
             std = "" if p.std is None else f", std {p.std:.2g}"
             found.append((p.name, f"{p.before:.5g} -> {p.after:.5g} {p.unit}".rstrip() + std))
         if self.uncertainty is not None:
-            samples = counted(len(self.uncertainty.samples), "sample")
+            samples = count_noun(len(self.uncertainty.samples), "sample")
             std = f"{100.0 * self.uncertainty.discrepancy_std:.2g} %"
             found.append(("uncertainty", f"{samples}, discrepancy of a frequency {std}"))
         return found + [(name, f"{value:.5g}") for name, value in self.diagnostics.items()]

@@ -33,7 +33,7 @@ class Uncertainty:
     discrepancy_std: float = 0.0
 
     @classmethod
-    def drawn(
+    def draw(
         cls,
         make: Callable[[FloatArray], Model],
         mean: FloatArray,

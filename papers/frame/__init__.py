@@ -13,15 +13,15 @@ from femubench.papers.frame.mass_matrix import mass_cells
 from femubench.papers.frame.misprints import misprint_table
 from femubench.papers.frame.predictions import (
     design_change,
-    held_out,
+    predict_held_out,
     verdict_finding,
     verdicts,
 )
 from femubench.papers.frame.readings import convergence, cutoffs, other_readings
 from femubench.papers.frame.receptances import receptance_figures
 from femubench.papers.frame.spaces import spaces_extra
-from femubench.papers.frame.tables import layout, printed_errors, table_cells
-from femubench.papers.printed import equations, printed
+from femubench.papers.frame.tables import compute_printed_errors, layout, table_cells
+from femubench.papers.printed import equations, read_printed
 from femubench.reproduction import Study, Workbench
 
 
@@ -52,7 +52,7 @@ def study(bench: Workbench) -> Study:
         ),
         extras=(
             *torsion,
-            held_out(bench),
+            predict_held_out(bench),
             design_change(bench),
             verdicts(bench),
             other_readings(bench),
@@ -96,11 +96,11 @@ def premises(bench: Workbench) -> tuple[str, ...]:
 
 def table_findings(bench: Workbench) -> tuple[str, ...]:
     """Return what the re-run of the tables shows."""
-    table = printed(PAPER)["table1"]
-    errors = printed_errors()
+    table = read_printed(PAPER)["table1"]
+    errors = compute_printed_errors()
     wrong = int((np.abs(np.round(errors, 1) - table["error_percent"]) > 1e-9).sum())
     kabe, other = strain_modes(bench, "kabe-rigid"), strain_modes(bench, "kabe-rigid", TRUTH)
-    theirs = printed(PAPER)["table2"]["nonzeros_rigid"]["modes"]
+    theirs = read_printed(PAPER)["table2"]["nonzeros_rigid"]["modes"]
     return (
         f"{wrong} of {len(errors)} errors in table 1 do not follow from the frequencies "
         "beside them.",

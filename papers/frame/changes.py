@@ -29,7 +29,7 @@ def change_figures(bench: Workbench) -> tuple[Figure, ...]:
     )
 
 
-def recovered_change(family: ElementFamily, result: UpdateResult) -> FloatArray:
+def recover_change(family: ElementFamily, result: UpdateResult) -> FloatArray:
     """Return the change of the local element matrices from the parameters, (n_elements, 12, 12).
 
     Arguments:
@@ -95,7 +95,7 @@ def solution_changes(bench: Workbench, words: str) -> FloatArray:
     """
     structure = bench.cases[CASE].model.frame_structure
     family = generic_family(structure, tied=words == "generic-adjusted")
-    return relative_change(structure, recovered_change(family, bench.update(CASE, words)))
+    return relative_change(structure, recover_change(family, bench.update(CASE, words)))
 
 
 def change_sentences(bench: Workbench) -> tuple[str, ...]:

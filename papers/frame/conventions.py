@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from femubench.papers.frame.common import CASE, PAPER, TRUTH, rigid_modes, strain_modes
 from femubench.papers.frame.readings import CUTOFFS, kabe_words
 from femubench.papers.frame.tables import LS_FORCED, rigid_figure
-from femubench.papers.printed import printed
+from femubench.papers.printed import read_printed
 from femubench.reproduction import Choice, Convention, Verdict, Workbench
 
 Key = tuple[str, str, str]
@@ -26,7 +26,7 @@ def _column(
     Arguments:
         first: mode from which on they count, 0 for the rigid-body modes too.
     """
-    theirs = printed(PAPER)[f"table{table}"][key]["rigid"]
+    theirs = read_printed(PAPER)[f"table{table}"][key]["rigid"]
     if not first:
         yield (
             (table, "rigid-body modes", name),

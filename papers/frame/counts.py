@@ -13,12 +13,12 @@ from femubench.papers.frame.common import (
     PAPER,
     TRUTH,
     TWIN_SHAPES,
-    listed,
+    format_frequencies,
     modes_of,
     rigid_modes,
     strain_modes,
 )
-from femubench.papers.printed import printed
+from femubench.papers.printed import read_printed
 from femubench.reproduction import Cell, Ground, Page, Workbench
 from femubench.update import generic_family, physical_family
 
@@ -94,21 +94,24 @@ def count_cells(bench: Workbench) -> tuple[Cell, ...]:
         "nobari_imaginary": int((rigid < -_ZERO).sum()),
         "nobari_zero": int((np.abs(rigid) <= _ZERO).sum()),
     }
-    beams = listed(rigid_modes(bench, "nobari", TRUTH))
+    beams = format_frequencies(rigid_modes(bench, "nobari", TRUTH))
     words = f"{TWIN_SHAPES}; with the beam truth and its shapes {beams} Hz"
     apart = {"nobari_zero": _PUSHED, "nobari_imaginary": Ground("under-convention", words)}
     cells = [
         Page(PAPER, "text", (apart.get(key, _COUNTED),), tolerance=0.0).cell(
             _NAMES[key], "count", float(value), float(ours[key])
         )
-        for key, value in printed(PAPER)["text"].items()
+        for key, value in read_printed(PAPER)["text"].items()
         if key in ours
     ]
     page = Page(PAPER, "text", (_THE_SAME,), "%", tolerance=100.0 * _EQUAL)
     one, other = strain_modes(bench, "nobari-rigid"), strain_modes(bench, "physical")
     off = 100.0 * float(np.abs(one / other - 1.0).max())
     key = "nobari_rigid_difference"
-    return (*cells, page.cell(_NAMES[key], "difference", float(printed(PAPER)["text"][key]), off))
+    return (
+        *cells,
+        page.cell(_NAMES[key], "difference", float(read_printed(PAPER)["text"][key]), off),
+    )
 
 
 def _only(values: IntArray) -> int:

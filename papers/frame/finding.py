@@ -47,18 +47,18 @@ def finding(bench: Workbench) -> tuple[tuple[Extra, ...], tuple[Figure, ...], tu
     }
     found = {name: ladder.frequencies(frame) for name, frame in frames.items()}
     untuned = found | {f"solid model, E {SOLID_YOUNG / 1e9:.0f} GPa, ideal welds": solid}
-    extras = (untuned_table(ladder, untuned), steps_table(ladder, shares))
+    extras = (make_untuned_table(ladder, untuned), steps_table(ladder, shares))
     figures: tuple[Figure, ...] = (chain_bars(ladder), cause_bars(ladder, shares))
     told = (
         torsion_sentence(ladder),
-        untuned_sentence(ladder, untuned),
+        make_untuned_sentence(ladder, untuned),
         shares_sentence(shares),
         joints_sentence(ladder, shares, bench),
     )
     return extras, figures, told + change_sentences(bench) + receptance_sentences(bench)
 
 
-def untuned_table(ladder: Ladder, untuned: dict[str, FloatArray]) -> Extra:
+def make_untuned_table(ladder: Ladder, untuned: dict[str, FloatArray]) -> Extra:
     """Return the table of models without anything tuned, beside the test."""
     modes = tuple(f"mode {i + 1}, Hz (error, %)" for i in range(len(ladder.measured)))
     rows = [("measured", *(f"{f:.1f}" for f in ladder.measured), "", "")]
@@ -174,7 +174,7 @@ def torsion_sentence(ladder: Ladder) -> str:
     )
 
 
-def untuned_sentence(ladder: Ladder, untuned: dict[str, FloatArray]) -> str:
+def make_untuned_sentence(ladder: Ladder, untuned: dict[str, FloatArray]) -> str:
     """Return how near a textbook model comes to the test."""
     bare, loaded = (untuned[k] for k in ("- and Timoshenko beams", "- and the accelerometer"))
     worst = [np.abs(ladder.errors(f)).max() for f in (bare, loaded)]

@@ -10,7 +10,7 @@ from femubench import Measurement, Model
 from femubench.fem import FloatArray
 from femubench.modal import expand_by_dynamics
 from femubench.papers.frame.common import CASE, PAPER
-from femubench.papers.printed import printed
+from femubench.papers.printed import read_printed
 from femubench.reproduction import Cell, Ground, Page, Workbench
 
 _DRAWS = 20
@@ -19,7 +19,7 @@ _TRIAL = 0.01  # of the largest component
 
 def mass_cells(bench: Workbench) -> tuple[tuple[Cell, ...], str]:
     """Return the ten cells off the diagonal, and what their size tells."""
-    table = printed(PAPER)["generalised_mass"]["off_diagonal"]
+    table = read_printed(PAPER)["generalised_mass"]["off_diagonal"]
     case = bench.cases[CASE]
     ours = generalised_mass(case.model, case.measurement)
     theirs = np.array(list(table.values()))

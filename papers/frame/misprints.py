@@ -9,10 +9,10 @@ import scipy.linalg as la
 
 from femubench import Model, solve_modes
 from femubench.fem import FloatArray, Structure
-from femubench.papers.frame.common import CASE, PAPER, listed, strain_modes
+from femubench.papers.frame.common import CASE, PAPER, format_frequencies, strain_modes
 from femubench.papers.frame.spaces import Spaces
-from femubench.papers.frame.tables import printed_errors
-from femubench.papers.printed import printed
+from femubench.papers.frame.tables import compute_printed_errors
+from femubench.papers.printed import read_printed
 from femubench.reproduction import Extra, Workbench
 from femubench.update import Symmetry, generic_family, quasi_measured_modes
 
@@ -84,7 +84,7 @@ def _torsional_mass(bench: Workbench) -> tuple[str, ...]:
         "m0 rg / 420, m0 rg / 840",
         f"{_TORSION_FACTOR:g} times that: m0 rg / 3, m0 rg / 6",
         "a rod's consistent mass; frequencies "
-        f"{listed(strain_modes(bench, 'unchanged'))} Hz with it, {listed(printed_way)} Hz "
+        f"{format_frequencies(strain_modes(bench, 'unchanged'))} Hz with it, {format_frequencies(printed_way)} Hz "
         "as printed",
     )
 
@@ -131,14 +131,14 @@ def _stiffness_parameter(bench: Workbench) -> tuple[str, ...]:
 
 
 def _errors() -> tuple[str, ...]:
-    table = printed(PAPER)["table1"]
+    table = read_printed(PAPER)["table1"]
     fe, measured = np.array(table["fe"]), np.array(table["measured"])
     return (
         "Table 1, error",
-        listed(np.array(table["error_percent"])),
-        listed(printed_errors()),
+        format_frequencies(np.array(table["error_percent"])),
+        format_frequencies(compute_printed_errors()),
         "from the two printed columns; relative to the FE column it would be "
-        f"{listed(100.0 * (1.0 - measured / fe))}",
+        f"{format_frequencies(100.0 * (1.0 - measured / fe))}",
     )
 
 

@@ -22,7 +22,7 @@ RANGE = 700.0  # Hz: "below 700 Hz", where the shown range ends
 _RIGHT, _MUCH = 0.5, 2.0  # percent: exact to the eye; "much better" by this factor
 
 
-def held_out(bench: Workbench) -> Extra:
+def predict_held_out(bench: Workbench) -> Extra:
     """Return modes 4 and 5 as every strategy predicts them, with two sets of shapes."""
     rows = [("measured", *_measured(bench, CASE), "", *_measured(bench, TRUTH), "")]
     rows += [

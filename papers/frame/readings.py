@@ -10,7 +10,7 @@ from femubench.papers.frame.common import (
     CASE,
     TRUTH,
     TWIN_SHAPES,
-    listed,
+    format_frequencies,
     modes_of,
     one,
     rigid_modes,
@@ -43,19 +43,19 @@ def kabe_reason(bench: Workbench) -> str:
     return (
         f"{ranks[0]} of {entries} unknowns are determined above a cutoff of 0.03, {ranks[1]} above "
         f"0.00001; the text gives no cutoff, and it decides: rigid-body modes at "
-        f"{listed(rigid_modes(bench, high))} Hz and modes 4, 5 at {listed(higher)} Hz with the "
-        f"first, first eight modes at {listed(worse)} Hz with the second ({low})"
+        f"{format_frequencies(rigid_modes(bench, high))} Hz and modes 4, 5 at {format_frequencies(higher)} Hz with the "
+        f"first, first eight modes at {format_frequencies(worse)} Hz with the second ({low})"
     )
 
 
-def met_reason(bench: Workbench, words: str, values: Sequence[float]) -> str:
+def explain_met(bench: Workbench, words: str, values: Sequence[float]) -> str:
     """Return why a column whose used modes stay near the nominal ones is no least squares.
 
     Arguments:
         values: the printed column in Hz.
     """
     factor, before, after = uniform_factor(bench, _first(bench))
-    met = listed(strain_modes(bench, words)[:3])
+    met = format_frequencies(strain_modes(bench, words)[:3])
     asked = f"{words}:frequencies=nominal"
     return (
         f"the described equations are met with modes 1-3 at {met} Hz, while the printed ones "
@@ -73,17 +73,17 @@ def farthest(bench: Workbench, words: str, values: Sequence[float]) -> float:
     return float(100.0 * np.abs(strain_modes(bench, words) / np.asarray(values) - 1.0).max())
 
 
-def forced_ground(bench: Workbench, words: str) -> Ground:
+def explain_higher_modes(bench: Workbench, words: str) -> Ground:
     """Return what the higher modes of the least squares solution rest on."""
     used, tied = strain_modes(bench, words)[:3], "generic-adjusted:expansion=force"
     return Ground(
         "searched",
         f"shapes expanded by (15), where the text has (16)-(17) ({words}), one of {TRIED} readings "
         f"of this column that were tried, after about {EXPLORED} with random choices "
-        f"(docs/reproduce.md): it has modes 1-3 at {listed(used)} Hz, but the adjusted "
-        f"solution at {listed(strain_modes(bench, tied)[3:])} Hz; with (16)-(17) modes 4, 5 are "
-        f"{listed(strain_modes(bench, 'generic-ls')[3:])} Hz, from the equations of motion alone "
-        f"{listed(strain_modes(bench, 'generic-ls:orthogonality=false')[3:])} Hz; {TWIN_SHAPES}; "
+        f"(docs/reproduce.md): it has modes 1-3 at {format_frequencies(used)} Hz, but the adjusted "
+        f"solution at {format_frequencies(strain_modes(bench, tied)[3:])} Hz; with (16)-(17) modes 4, 5 are "
+        f"{format_frequencies(strain_modes(bench, 'generic-ls')[3:])} Hz, from the equations of motion alone "
+        f"{format_frequencies(strain_modes(bench, 'generic-ls:orthogonality=false')[3:])} Hz; {TWIN_SHAPES}; "
         f"{beam_shapes(bench, words)}",
         TRIED,
     )
@@ -91,11 +91,11 @@ def forced_ground(bench: Workbench, words: str) -> Ground:
 
 def beam_shapes(bench: Workbench, words: str) -> str:
     """Return modes 4 and 5 with the shapes of the beam truth in place of the twin's."""
-    found = listed(strain_modes(bench, words, TRUTH)[3:])
+    found = format_frequencies(strain_modes(bench, words, TRUTH)[3:])
     return f"with the beam truth and its shapes {found} Hz, so the shapes decide"
 
 
-def adjusted_reason(bench: Workbench) -> str:
+def explain_adjusted(bench: Workbench) -> str:
     """Return why sixteen parameters on expanded shapes do not give the printed column."""
     bend, shear, twist = energy_shares(bench)
     alone = strain_modes(bench, "generic-adjusted:orthogonality=false")
@@ -103,7 +103,7 @@ def adjusted_reason(bench: Workbench) -> str:
         "shapes expanded by (16)-(17) are combinations of the model's own, in which the shear core "
         f"k22 has {shear:.1f} % of the strain energy (bending {bend:.1f}, twist {twist:.1f} %), so "
         "it can hardly be seen; without the orthogonality equations the column is "
-        f"{listed(alone)} Hz; {SEARCH}"
+        f"{format_frequencies(alone)} Hz; {SEARCH}"
     )
 
 
@@ -145,7 +145,9 @@ def other_readings(bench: Workbench) -> Extra:
         for words in (name, *(f"{name}:{option}" for option in OPTIONS)):
             count = int(bench.update(CASE, words).diagnostics["equations"])
             rigid, modes = rigid_modes(bench, words), strain_modes(bench, words)
-            rows.append((words, str(count), listed(rigid), *(one(float(f)) for f in modes)))
+            rows.append(
+                (words, str(count), format_frequencies(rigid), *(one(float(f)) for f in modes))
+            )
     return Extra(
         "Tables 3 and 4 under other readings",
         (
@@ -166,7 +168,9 @@ def cutoffs(bench: Workbench) -> Extra:
     for cutoff in CUTOFFS:
         words = kabe_words(cutoff)
         rank = int(bench.update(CASE, words).diagnostics["rank"])
-        rows.append((words, str(rank), listed(modes_of(bench, words).natural_frequencies[:8])))
+        rows.append(
+            (words, str(rank), format_frequencies(modes_of(bench, words).natural_frequencies[:8]))
+        )
     unknowns = bench.update(CASE, "kabe").parameter_count
     return Extra(
         "Changing non-zeros: the cutoff of small singular values decides",

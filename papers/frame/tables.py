@@ -16,11 +16,11 @@ from femubench.papers.frame.common import (
     RECOVERED,
     TRUTH,
     TWIN_SHAPES,
-    listed,
+    format_frequencies,
     rigid_modes,
     strain_modes,
 )
-from femubench.papers.printed import printed
+from femubench.papers.printed import read_printed
 from femubench.reproduction import Cell, Grid, Ground, Page, PrintedTable, Workbench
 
 _EXACT = 0.1  # percent: of what a method promises to meet, or what follows from the model alone
@@ -45,7 +45,7 @@ _COLUMNS = Ground(
 
 def table_cells(bench: Workbench) -> tuple[Cell, ...]:
     """Return the cells of tables 1 to 4."""
-    data = printed(PAPER)
+    data = read_printed(PAPER)
     return (
         *_table1(bench, data),
         *_table2(bench, data),
@@ -56,7 +56,7 @@ def table_cells(bench: Workbench) -> tuple[Cell, ...]:
 
 def layout() -> tuple[PrintedTable, ...]:
     """Return table 1 with the measured frequencies; the others print their cells alone."""
-    measured = [f"{value:.1f}" for value in printed(PAPER)["table1"]["measured"]]
+    measured = [f"{value:.1f}" for value in read_printed(PAPER)["table1"]["measured"]]
     modes = [f"mode {i}" for i in range(1, 6)]
     rows = tuple(
         (m, ((m, "FE model"), f, (m, "error"))) for m, f in zip(modes, measured, strict=True)
@@ -106,9 +106,9 @@ def rigid_figure(values: Sequence[float], ours: FloatArray) -> float | None:
     return float(ours.min() if any(values) else ours[np.argmax(np.abs(ours))])
 
 
-def printed_errors() -> FloatArray:
+def compute_printed_errors() -> FloatArray:
     """Return the errors in percent that follow from the two printed columns of table 1, (5,)."""
-    table = printed(PAPER)["table1"]
+    table = read_printed(PAPER)["table1"]
     return np.asarray(100.0 * (np.array(table["fe"]) / np.array(table["measured"]) - 1.0))
 
 
@@ -116,7 +116,9 @@ def _table1(bench: Workbench, data: dict[str, Any]) -> list[Cell]:
     table, fe = data["table1"], strain_modes(bench, "unchanged")
     half = 0.05  # Hz, of the last printed digit
     errors = []
-    for i, (p, own) in enumerate(zip(table["error_percent"], printed_errors(), strict=True)):
+    for i, (p, own) in enumerate(
+        zip(table["error_percent"], compute_printed_errors(), strict=True)
+    ):
         model, test = table["fe"][i], table["measured"][i]
         most = 100.0 * ((model + half) / (test - half) - 1.0)
         wrong = Ground(
@@ -159,11 +161,11 @@ def _table3(bench: Workbench, data: dict[str, Any]) -> list[Cell]:
         ("nobari", "Nobari's method", "nobari", shapes),
     ):
         values, ours = data["table3"][key], strain_modes(bench, words)
-        reason = readings.met_reason(bench, words, values["modes"])
+        reason = readings.explain_met(bench, words, values["modes"])
         rigid, other = rigid_modes(bench, words), rigid_modes(bench, words, TRUTH)
         size = (
-            f"one imaginary and one zero frequency as printed, but {listed(rigid)} Hz; "
-            f"{TWIN_SHAPES}; with the beam truth and its shapes {listed(other)} Hz"
+            f"one imaginary and one zero frequency as printed, but {format_frequencies(rigid)} Hz; "
+            f"{TWIN_SHAPES}; with the beam truth and its shapes {format_frequencies(other)} Hz"
         )
         cells.append(_rigid(page("3", _EXACT, free, size), name, values["rigid"], rigid))
         cells += column(page("3", _SHAPED, shapes, reason), name, values["modes"], ours, 1)
@@ -175,7 +177,7 @@ def _table4(bench: Workbench, data: dict[str, Any]) -> list[Cell]:
     forced, tied = strain_modes(bench, LS_FORCED), strain_modes(bench, "generic-adjusted")
     free, met = page("4", _EXACT, _BY_ELEMENTS), page("4", _EXACT, GIVEN)
     name = "LS solution"
-    searched = page("4", _SHAPED, readings.forced_ground(bench, LS_FORCED))
+    searched = page("4", _SHAPED, readings.explain_higher_modes(bench, LS_FORCED))
     cells = [_rigid(free, name, least["rigid"], rigid_modes(bench, "generic-ls"))]
     cells += column(met, name, least["modes"][:3], forced[:3], 1)
     cells += column(searched, name, least["modes"][3:], forced[3:], 4)
@@ -183,5 +185,5 @@ def _table4(bench: Workbench, data: dict[str, Any]) -> list[Cell]:
     cells.append(_rigid(free, name, adjusted["rigid"], rigid_modes(bench, "generic-adjusted")))
     cells += column(met, name, adjusted["modes"][:3], tied[:3], 1)
     shapes = Ground("under-convention", TWIN_SHAPES)
-    higher = page("4", _SHAPED, shapes, readings.adjusted_reason(bench))
+    higher = page("4", _SHAPED, shapes, readings.explain_adjusted(bench))
     return cells + column(higher, name, adjusted["modes"][3:], tied[3:], 4)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from femubench.papers.hframe.beyond import compare, extras, held_out_bars
+from femubench.papers.hframe.beyond import compare, draw_held_out_bars, extras
 from femubench.papers.hframe.conventions import conventions
 from femubench.papers.hframe.findings import findings, premises
 from femubench.papers.hframe.layout import layout
@@ -30,7 +30,7 @@ def study(bench: Workbench) -> Study:
         cells=cells,
         findings=findings(bench, comparison),
         extras=(*extras(bench, comparison), mac_extra(case)),
-        figures=(held_out_bars(bench, comparison),),
+        figures=(draw_held_out_bars(bench, comparison),),
         tables=layout(bench),
         equations=equations("hframe"),
         conventions=lambda: conventions(bench),

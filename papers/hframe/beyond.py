@@ -16,8 +16,8 @@ from femubench.papers.hframe.physical import (
     shape_paired_errors,
 )
 from femubench.papers.hframe.rows import FREE_EI, ROWS, Update, at_printed, parameter_values, run
-from femubench.papers.hframe.updates import USED, follows, misprinted, unit_of
-from femubench.papers.printed import printed
+from femubench.papers.hframe.updates import USED, follows, is_misprinted, unit_of
+from femubench.papers.printed import read_printed
 from femubench.reproduction import Bars, Extra, Workbench
 
 DIAGNOSED = "diagnosed:meet_frequencies=false"
@@ -69,7 +69,7 @@ def extras(bench: Workbench, comparison: ModelComparison) -> tuple[Extra, ...]:
     """Return the tables that the paper does not print."""
     rows = []
     for row in ROWS:
-        theirs = printed("hframe")["table4"][row.key]["updated"]
+        theirs = read_printed("hframe")["table4"][row.key]["updated"]
         ours = frequencies(at_printed(bench, row), USED)
         for mode, (f, found) in enumerate(zip(theirs, ours, strict=True), 1):
             off = _signed(100.0 * (found / f - 1.0), 3)
@@ -112,7 +112,7 @@ def _held_out(bench: Workbench, comparison: ModelComparison) -> Extra:
 def _converged(bench: Workbench) -> Extra:
     rows, ratios = [], ("printed ratio", "our ratio")
     for row in ROWS:
-        theirs = printed("hframe")["table4"][row.key]["parameters"]
+        theirs = read_printed("hframe")["table4"][row.key]["parameters"]
         cells = {name: row.apart.get(name, row.updated).words for name in row.names}
         runs = [("as in the cells", cells)]
         undamped = dict.fromkeys(row.names, row.converged or row.updated.words)
@@ -159,14 +159,14 @@ def _misprints(bench: Workbench) -> Extra:
     measured = bench.cases["hframe"].used_measurement(0).frequencies
     rows = []
     for row in ROWS:
-        theirs = printed("hframe")["table4"][row.key]
+        theirs = read_printed("hframe")["table4"][row.key]
         for column in ("initial", "updated"):
             pairs = zip(theirs[column], measured, theirs[f"{column}_error"], strict=True)
             for mode, (f, f_m, error) in enumerate(pairs, 1):
-                if misprinted(f, f_m, error):
+                if is_misprinted(f, f_m, error):
                     place = f"table {row.table}, mode {mode}, {column} error"
                     rows.append((place, f"{error:+.2f} %", f"{follows(f, f_m):+.2f} %"))
-    text, table = printed("hframe")["section8"], printed("hframe")["table4"]["e_offset"]
+    text, table = read_printed("hframe")["section8"], read_printed("hframe")["table4"]["e_offset"]
     units = f"{text['a_V']:g} mm", f"{table['parameters']['a_V'][0]:g} m"
     rows.append(("section 8 against table 4e, a_V", *units))
     return Extra(
@@ -178,7 +178,7 @@ def _misprints(bench: Workbench) -> Extra:
     )
 
 
-def held_out_bars(bench: Workbench, comparison: ModelComparison) -> Bars:
+def draw_held_out_bars(bench: Workbench, comparison: ModelComparison) -> Bars:
     """Return the errors of six models on seven modes."""
     data = in_plane(bench.cases["hframe"])
     kinds = ["used"] * USED + ["held out"] * (len(data) - USED)

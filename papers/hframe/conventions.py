@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from femubench.papers.hframe.meshes import frequencies
 from femubench.papers.hframe.rows import FREE_EI, SPRINGS, parameter_values, row_of, run
-from femubench.papers.hframe.shapes import expanded_mac, partner
+from femubench.papers.hframe.shapes import compute_expanded_mac, partner
 from femubench.papers.hframe.updates import USED
 from femubench.reproduction import Choice, Convention, Verdict, Workbench
 
@@ -13,7 +13,7 @@ Key = tuple[str, str, str]
 
 def conventions(bench: Workbench) -> tuple[Convention, ...]:
     """Return the conventions on MAC and on the updated columns of table 4."""
-    mac = expanded_mac(bench.cases["hframe"], "translations")
+    mac = compute_expanded_mac(bench.cases["hframe"], "translations")
     pairs: dict[Key, float | None] = {
         ("3", f"measured {number}", f"analytical {partner(number)}"): float(
             values[partner(number) - 1]

@@ -7,9 +7,9 @@ import numpy as np
 from femubench.papers.hframe.beyond import BUILT, PHYSICAL, ModelComparison
 from femubench.papers.hframe.physical import ARM
 from femubench.papers.hframe.rows import FREE_EI, parameter_values, row_of, run
-from femubench.papers.hframe.shapes import OUT_OF_PLANE, expanded_mac, partner
+from femubench.papers.hframe.shapes import OUT_OF_PLANE, compute_expanded_mac, partner
 from femubench.papers.hframe.updates import USED, element_lengths
-from femubench.papers.printed import printed
+from femubench.papers.printed import read_printed
 from femubench.reproduction import Workbench
 
 
@@ -99,7 +99,7 @@ def _frozen(bench: Workbench) -> str:
 
 def _ratio(bench: Workbench) -> str:
     row = row_of("c")
-    theirs = printed("hframe")["table4"][row.key]["parameters"]
+    theirs = read_printed("hframe")["table4"][row.key]["parameters"]
     printed_ratio = (theirs["EI"][1] / theirs["EI"][0]) / (theirs["rhoA"][1] / theirs["rhoA"][0])
     history = run(bench, row.updated.words).history
     factors = [(h["EI all members"], h["rhoA all members"]) for h in history[5:]]
@@ -128,12 +128,12 @@ def _offset(bench: Workbench, comparison: ModelComparison) -> str:
 
 def _rotations(bench: Workbench) -> str:
     case = bench.cases["hframe"]
-    table = np.array(printed("hframe")["table3"]["mac"])
+    table = np.array(read_printed("hframe")["table3"]["mac"])
     modes = np.arange(1, table.shape[1] + 1)
-    apart = np.array([modes != partner(number) for number in expanded_mac(case)])
+    apart = np.array([modes != partner(number) for number in compute_expanded_mac(case)])
     theirs = np.delete(table, OUT_OF_PLANE - 1, axis=0)
     ours, moved = (
-        np.array([*expanded_mac(case, directions).values()])
+        np.array([*compute_expanded_mac(case, directions).values()])
         for directions in ("all", "translations")
     )
     largest = [float(values[apart].max()) for values in (theirs, ours, moved)]

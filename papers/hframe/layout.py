@@ -6,14 +6,14 @@ from femubench.papers.hframe.meshes import MODES
 from femubench.papers.hframe.rows import ROWS, Update, run
 from femubench.papers.hframe.shapes import OUT_OF_PLANE, partner
 from femubench.papers.hframe.updates import USED
-from femubench.papers.printed import printed
+from femubench.papers.printed import read_printed
 from femubench.plot import Axis, Chart, Mark, Series
 from femubench.reproduction import Entry, Grid, PrintedTable, Workbench
 
 
 def layout(bench: Workbench) -> tuple[PrintedTable, ...]:
     """Return the tables; those of which nothing but cells is in print stand by their rows."""
-    table = printed("hframe")["table3"]
+    table = read_printed("hframe")["table3"]
     columns = [f"analytical {mode}" for mode in range(1, MODES + 1)]
     top: tuple[Entry, ...] = tuple(("analytical frequency", column) for column in columns)
     rows = [("analytical frequency", top)]
@@ -53,7 +53,7 @@ def _convergence(bench: Workbench, row: Update) -> Chart:
     """Return every parameter over its initial value, step by step, and the printed ratios."""
     words = row.converged or row.updated.words
     history = run(bench, words).history
-    ratios = printed("hframe")["table4"][row.key]["ratios"]
+    ratios = read_printed("hframe")["table4"][row.key]["ratios"]
     steps = [entry["iteration"] for entry in history]
     series, marks = [], []
     for symbol, name in row.names.items():

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from femubench import Case, Model, solve_modes
 from femubench.fem import FloatArray
-from femubench.papers.printed import printed
+from femubench.papers.printed import read_printed
 from femubench.reproduction import Cell, Ground, Page
 
 MODES = 8
@@ -42,7 +42,7 @@ def bare(case: Case, mesh: Sequence[int]) -> Model:
 
 def mesh_cells(case: Case) -> tuple[Cell, ...]:
     """Return table 2, normalised with mesh A; what agrees rounds to the printed digit."""
-    tables = printed("hframe")
+    tables = read_printed("hframe")
     meshes = tables["test_article"]["mesh"]
     found = {name: frequencies(bare(case, mesh)) for name, mesh in meshes.items()}
     found["C_a"] = frequencies(case.model)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from femubench import Case, Model, UpdateResult
 from femubench.fem import Property
 from femubench.papers.hframe.meshes import RECOVERED
-from femubench.papers.printed import printed
+from femubench.papers.printed import read_printed
 from femubench.reproduction import Ground, Workbench
 
 # The printed springs, arms and rigidities; the case knows the half depth of 20 mm.
@@ -211,7 +211,7 @@ def at_printed(bench: Workbench, row: Update) -> Model:
     """Return the model of the updated column with the parameters that the paper prints."""
     structure = run(bench, row.updated.start).model.frame_structure
     known = {parameter.name: parameter for parameter, _ in structure.changes}
-    theirs = printed("hframe")["table4"][row.key]["parameters"]
+    theirs = read_printed("hframe")["table4"][row.key]["parameters"]
     chosen: list[Property] = []
     values: list[float] = []
     for symbol, name in row.names.items():

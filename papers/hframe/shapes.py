@@ -8,14 +8,14 @@ from femubench import Case, solve_modes
 from femubench.fem import FloatArray
 from femubench.modal import expand_by_serep, mac
 from femubench.papers.hframe.meshes import MODES, RECOVERED, frequencies
-from femubench.papers.printed import printed
+from femubench.papers.printed import read_printed
 from femubench.reproduction import Cell, Extra, Ground, Page
 
 OUT_OF_PLANE = 7
 POINTS = 1.0
 
 
-def expanded_mac(case: Case, directions: str = "all") -> dict[int, FloatArray]:
+def compute_expanded_mac(case: Case, directions: str = "all") -> dict[int, FloatArray]:
     """Return the MAC in percent of every measured in-plane mode with the modes of mesh C_a, (8,).
 
     The measured shapes are expanded to all dofs as combinations of the eight elastic modes.
@@ -38,12 +38,12 @@ def shape_cells(case: Case) -> tuple[Cell, ...]:
 
     Other MAC values are small in any model: that ours are small too would say nothing.
     """
-    table = printed("hframe")["table3"]
+    table = read_printed("hframe")["table3"]
     page = Page("hframe", "3", (RECOVERED,), "Hz", tolerance=0.01, decimals=2)
     columns = [f"analytical {mode}" for mode in range(1, MODES + 1)]
     row = zip(columns, table["analytical"], frequencies(case.model), strict=True)
     cells = [page.cell("analytical frequency", name, theirs, float(f)) for name, theirs, f in row]
-    for number, values in expanded_mac(case).items():
+    for number, values in compute_expanded_mac(case).items():
         k = partner(number) - 1
         theirs, ours = float(table["mac"][number - 1][k]), float(values[k])
         unseen = Page("hframe", "3", (_unseen(theirs, ours),), "%", POINTS, 2)
@@ -66,7 +66,7 @@ def mac_extra(case: Case) -> Extra:
         ("measured mode", *(f"FE {mode}" for mode in range(1, MODES + 1))),
         tuple(
             (str(number), *(f"{value:.2f}" for value in values))
-            for number, values in expanded_mac(case).items()
+            for number, values in compute_expanded_mac(case).items()
         ),
         "Not the paper's data. The test's mode 7 is out of plane: the twin has no in-plane shape.",
     )

@@ -17,7 +17,7 @@ from femubench.papers.hframe.rows import (
     parameter_values,
     run,
 )
-from femubench.papers.printed import printed
+from femubench.papers.printed import read_printed
 from femubench.reproduction import Cell, Ground, Page, Workbench
 from femubench.update import spring_estimates
 
@@ -49,7 +49,7 @@ def update_cells(bench: Workbench) -> tuple[Cell, ...]:
     """Return all cells of table 4, and the initial offsets as section 8 states them."""
     cells: list[Cell] = []
     for row in ROWS:
-        theirs = printed("hframe")["table4"][row.key]
+        theirs = read_printed("hframe")["table4"][row.key]
         cells += _mode_cells(bench, row, theirs, "initial", row.initial, INITIAL)
         cells += _mode_cells(bench, row, theirs, "updated", row.updated, UPDATED)
         cells += _parameter_cells(bench, row, theirs)
@@ -61,7 +61,7 @@ def follows(frequency: float, measured: float) -> float:
     return 100.0 * (frequency / measured - 1.0)
 
 
-def misprinted(frequency: float, measured: float, error: float) -> bool:
+def is_misprinted(frequency: float, measured: float, error: float) -> bool:
     """Return whether a printed error contradicts the printed frequency beside it."""
     return abs(follows(frequency, measured) - error) > 0.5000001 * 10.0**-ERROR_DECIMALS
 
@@ -83,7 +83,7 @@ def _mode_cells(
 
 
 def _parameter_cells(bench: Workbench, row: Update, theirs: dict[str, Any]) -> Iterator[Cell]:
-    at_test = printed("hframe")["table4"][row.key]["updated"]
+    at_test = read_printed("hframe")["table4"][row.key]["updated"]
     here = largest_miss(run(bench, row.updated.words).model, at_test)
     there = largest_miss(at_printed(bench, row), at_test)
     missed = Ground(
@@ -127,7 +127,7 @@ def element_lengths(bench: Workbench) -> tuple[float, dict[str, float]]:
     horizontal = frame.members[frame.member_index["horizontal"]]
     start, stop = frame.corners[frame.member_ends[frame.member_index["horizontal"]]]
     length = float(np.linalg.norm(stop - start)) / horizontal.elements
-    theirs, ours = printed("hframe")["initial_springs"], _springs_by_rule(bench)
+    theirs, ours = read_printed("hframe")["initial_springs"], _springs_by_rule(bench)
     powers = {"k_x": 1.0, "k_z": 3.0, "k_theta": 1.0}
     return length, {
         name: length * (ours[name] / theirs[name]) ** (1.0 / n) for name, n in powers.items()
@@ -141,7 +141,7 @@ def largest_miss(model: Model, theirs: Sequence[float]) -> float:
 
 def _text_cells(bench: Workbench) -> Iterator[Cell]:
     """Return the initial offsets of section 8, printed in mm there and in m in the table."""
-    text = printed("hframe")["section8"]
+    text = read_printed("hframe")["section8"]
     row = ROWS[-1]
     found = parameter_values(bench, row, row.updated.words)
     structure = run(bench, row.updated.start).model.frame_structure

@@ -9,7 +9,7 @@ from typing import Any
 from femubench.reproduction import Equation
 
 
-def printed(paper: str) -> dict[str, Any]:
+def read_printed(paper: str) -> dict[str, Any]:
     """Return the tables of a paper as its TOML file has them."""
     text = files(__package__).joinpath(f"{paper}-tables.toml").read_text(encoding="utf-8")
     return tomllib.loads(text)

@@ -20,10 +20,10 @@ from femubench.effect import (
     Size,
     Term,
     bare_place,
-    directed_places,
-    directed_point,
     elastic_band,
+    find_directed_point,
     free_translations,
+    list_directed_places,
     translation_rows,
     with_extra,
 )
@@ -59,13 +59,13 @@ class AttachedOscillator(FrameEffect):
         # The mesh node nearest to the middle of a member.
         middle = {m.name: m.elements // 2 / m.elements or 0.5 for m in frame.members}
         middles = [f"{name}@{station:g}" for name, station in middle.items()]
-        return directed_places(model, [*frame.joint_index, *middles])
+        return list_directed_places(model, [*frame.joint_index, *middles])
 
     def finer(self, model: Model, place: str) -> Sequence[str]:
         """Return the place with a mass that hangs free, where it can be felt across at all."""
         if place.endswith(FREE):
             return ()
-        at, direction = directed_point(model, place)
+        at, direction = find_directed_point(model, place)
         across = set(free_translations(model, at)) - {direction}
         return (f"{place}{FREE}",) if across else ()
 
@@ -82,13 +82,13 @@ class AttachedOscillator(FrameEffect):
         """Return the frame with the oscillator."""
         if not values[0]:
             return frame
-        at = directed_point(frame, bare_place(place))
+        at = find_directed_point(frame, bare_place(place))
         oscillator = Oscillator(*at, values[0], values[1], crosswise=not place.endswith(FREE))
         return replace(frame, oscillators=(*frame.oscillators, oscillator))
 
     def change(self, model: Model, place: str) -> Change:
         """Return 1 kg on a dof of its own and the spring of 1 N/m that carries it."""
-        at, direction = directed_point(model, bare_place(place))
+        at, direction = find_directed_point(model, bare_place(place))
         crosswise = () if place.endswith(FREE) else free_translations(model, at)
         others = [d for d in crosswise if d != direction]
         own = sp.csr_array(([1.0], [model.size], [0, 1]), shape=(1, model.size + 1))

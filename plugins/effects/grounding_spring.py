@@ -17,9 +17,9 @@ from femubench.effect import (
     Site,
     Size,
     Term,
-    directed_places,
-    directed_point,
     elastic_band,
+    find_directed_point,
+    list_directed_places,
     point_places,
     proportional,
     translation_rows,
@@ -41,7 +41,7 @@ class GroundingSpring(FrameEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the points, or nodes, in each direction that they can move in."""
-        return directed_places(model, point_places(model))
+        return list_directed_places(model, point_places(model))
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the stiffness; at its scale the lowest frequency rises by about a percent."""
@@ -52,18 +52,18 @@ class GroundingSpring(FrameEffect):
         """Return the frame with the spring."""
         if not values[0]:
             return frame
-        at, direction = directed_point(frame, place)
+        at, direction = find_directed_point(frame, place)
         return replace(frame, springs=(*frame.springs, GroundSpring(at, direction, values[0])))
 
     def extend(self, model: Model, place: str, values: Sequence[float]) -> Model:
         """Return the model with the spring in it; matrices will do."""
         if model.structure is None:
-            at, direction = directed_point(model, place)
+            at, direction = find_directed_point(model, place)
             return model.attach([], [GroundSpring(at, direction, values[0])])
         return super().extend(model, place, values)
 
     def change(self, model: Model, place: str) -> Change:
         """Return the stiffness matrix of 1 N/m."""
-        at, direction = directed_point(model, place)
+        at, direction = find_directed_point(model, place)
         row = translation_rows(model, at, [direction])
         return proportional(Term("stiffness", RowOperator(row, np.eye(1))))

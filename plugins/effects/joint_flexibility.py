@@ -16,7 +16,7 @@ from femubench.effect import (
     Size,
     end_stiffness,
     flexible_ends_change,
-    softened_ends,
+    soften_ends,
 )
 from femubench.fem import ACTIVE, FloatArray, Frame, Structure
 from femubench.update import JointGroup, joint_groups
@@ -76,7 +76,7 @@ class JointFlexibility(FrameEffect):
             own = zip(_parts(frame), _scales(frame, group), strict=True)
             along = {d: float(multiple * scale) for part, scale in own for d in part}
             springs |= dict.fromkeys(group.ends, along)
-        return softened_ends(frame, springs)
+        return soften_ends(frame, springs)
 
     def change(self, model: Model, place: str) -> Change:
         """Return the springs condensed into the end elements."""

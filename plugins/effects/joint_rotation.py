@@ -25,7 +25,7 @@ from femubench.effect import (
     free_arm_change,
     joints_of,
     joints_with_members,
-    softened_ends,
+    soften_ends,
     type_places,
 )
 from femubench.fem import ACTIVE, Frame, Structure
@@ -95,7 +95,7 @@ class JointRotation(FrameEffect):
         groups = _parts(frame, place).values()
         arm = values[len(groups)] if len(values) > len(groups) else 1.0
         own = {d: value for names, value in zip(groups, values, strict=False) for d in names}
-        return softened_ends(frame, dict.fromkeys(ends_of(frame, place), own), arm)
+        return soften_ends(frame, dict.fromkeys(ends_of(frame, place), own), arm)
 
     def change(self, model: Model, place: str) -> Change:
         """Return the springs condensed into the end elements."""

@@ -67,7 +67,7 @@ class RotaryInertia(FrameEffect):
         rows = elements_of(whole, place)
         own = whole.properties.take(rows)
         none = np.zeros(len(own))
-        without = own.scaled("rhoIy", none).scaled("rhoIz", none)
+        without = own.scale("rhoIy", none).scale("rhoIz", none)
         blocks = mass_matrices(own) - mass_matrices(without)
         term = Term("mass", ElementOperator(structure, rows, blocks))
         return proportional(term, neutral=structure.frame.rotary_share)

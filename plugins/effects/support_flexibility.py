@@ -17,7 +17,7 @@ from femubench.effect import (
     Size,
     flexible_supports_change,
     members_at,
-    softened_supports,
+    soften_supports,
     support_places,
     supports_of,
 )
@@ -73,7 +73,7 @@ class SupportFlexibility(FrameEffect):
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with springs instead of rigid supports, and softer springs."""
         parts = zip(_parts(frame, place).values(), values, strict=True)
-        return softened_supports(frame, {one: value for held, value in parts for one in held})
+        return soften_supports(frame, {one: value for held, value in parts for one in held})
 
     def change(self, model: Model, place: str) -> Change:
         """Return the motion of the support, condensed."""

@@ -77,7 +77,7 @@ class TorsionConstant(FrameEffect):
         return [found for section in sections for found in self._look(seen, section)]
 
     def _look(self, seen: Seen, section: Section) -> Iterator[LookWarning]:
-        what, estimate = _fault(section), estimated_torsion_constant(section)
+        what, estimate = _fault(section), estimate_torsion_constant(section)
         if what is None or estimate is None:
             return
         own, how = estimate
@@ -99,9 +99,9 @@ class TorsionConstant(FrameEffect):
         structure = model.frame_structure
         rows = elements_of(structure, place, arms=True)
         own = structure.properties.take(rows)
-        plain = own.scaled("coupling", np.zeros(len(own)))
+        plain = own.scale("coupling", np.zeros(len(own)))
         now = stiffness_matrices(plain)
-        twist = stiffness_matrices(plain.scaled("GJ", np.full(len(own), 2.0))) - now
+        twist = stiffness_matrices(plain.scale("GJ", np.full(len(own), 2.0))) - now
         coupled = stiffness_matrices(own) - now
         terms = [Term("stiffness", ElementOperator(structure, rows, b)) for b in (twist, coupled)]
         if not coupled.any():
@@ -138,7 +138,7 @@ def shape_torsion_constant(section: Section) -> float | None:
     return own.J if alike else None
 
 
-def estimated_torsion_constant(section: Section) -> tuple[float, str] | None:
+def estimate_torsion_constant(section: Section) -> tuple[float, str] | None:
     """Return the torsion constant in m4 that a section should have, and in words what it rests on.
 
     Arguments:
@@ -206,7 +206,7 @@ def _fault(section: Section) -> str | None:
             else ("but by its numbers the section is no circle")
         )
         return f"{given} equals the polar moment, {unless}"
-    estimate = estimated_torsion_constant(section) if section.shape else None
+    estimate = estimate_torsion_constant(section) if section.shape else None
     if estimate is not None and not 1.0 / _FAR < section.J / estimate[0] < _FAR:
         return f"{given} is {section.J / estimate[0]:.2g} times that of its shape"
     return None

@@ -180,7 +180,7 @@ def _scaled(
     pairs = [(member.section, section) for member, section in zip(members, new, strict=True)]
     for name, constant in _GROWS.items():
         ratios = [_ratio(getattr(a, constant), getattr(b, constant)) for a, b in pairs]
-        own = own.scaled(name, np.array(ratios)[which])
+        own = own.scale(name, np.array(ratios)[which])
     for axis, name in enumerate(("flex_y", "flex_z")):
         kappas = [
             (a.kappa(m.material.nu)[axis] if a.kappa else 1.0)
@@ -188,7 +188,7 @@ def _scaled(
             for m, (a, b) in zip(members, pairs, strict=True)
         ]
         ratios = [_ratio(b.A, a.A) for a, b in pairs]
-        own = own.scaled(name, (np.array(kappas) * ratios)[which])
+        own = own.scale(name, (np.array(kappas) * ratios)[which])
     return own
 
 

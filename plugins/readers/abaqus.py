@@ -12,10 +12,10 @@ from femubench import InputError, Model
 from femubench.fem import MatrixGeometry, SparseArray, matrix_model
 from femubench.plugins.readers.reading import (
     DIRECTIONS,
+    ProgramReader,
     columns_of,
     directions,
     lower_triangle,
-    no_modes,
     symmetric,
     whole,
 )
@@ -27,7 +27,7 @@ _HELD = 1e30  # on the diagonal of a degree of freedom that a boundary condition
 Labels = list[tuple[int, int]]
 
 
-class AbaqusReader:
+class AbaqusReader(ProgramReader):
     """Reads stiffness and mass of *MATRIX GENERATE, e.g. job_STIF2.mtx beside job_MASS2.mtx.
 
     Coordinates come from the input file: ``dofs = "job.inp"``.
@@ -55,10 +55,6 @@ class AbaqusReader:
         along = directions([dof for _, dof in labels], stiffness)
         names = [node for node, _ in labels]
         return matrix_model(_assembled(second, labels), _assembled(first, labels), names, along)
-
-    def read_modes(self, path: Path) -> NoReturn:
-        """Refuse: matrices hold no modes."""
-        no_modes(path, "a matrix of Abaqus")
 
     def write_pair(
         self, model: Model, stiffness: Path, mass: Path, originals: Sequence[Path]

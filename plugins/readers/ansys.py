@@ -11,14 +11,14 @@ import scipy.sparse as sp
 
 from femubench import InputError
 from femubench.plugins.readers.apart import apart
-from femubench.plugins.readers.reading import directions, needs, no_modes
+from femubench.plugins.readers.reading import ProgramReader, directions, needs
 
 if TYPE_CHECKING:
     from femubench import Model
     from femubench.fem import SparseArray
 
 
-class AnsysReader:
+class AnsysReader(ProgramReader):
     """Reads stiffness and mass of a .full file without what is held; nodes of a .rst file.
 
     Coordinates come from the results of the job: ``dofs = "file.rst"``.
@@ -46,10 +46,6 @@ class AnsysReader:
         needs("ansys", "ansys", path)
         found = apart(rst_file, path, "a .rst file with nodes")
         return dict(zip(map(str, found["node"].tolist()), found["xyz"].tolist(), strict=True))
-
-    def read_modes(self, path: Path) -> NoReturn:
-        """Refuse: results of Ansys are no measured modes."""
-        no_modes(path, "a file of Ansys")
 
     def write_model(self, model: Model, path: Path, original: Path) -> NoReturn:
         """Refuse: nothing but Ansys writes .full files."""

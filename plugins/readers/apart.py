@@ -17,7 +17,7 @@ import scipy.sparse as sp
 
 from femubench import InputError
 from femubench.fem import call_apart
-from femubench.plugins.readers.reading import SPARSE_PARTS, opened, sparse_of
+from femubench.plugins.readers.reading import SPARSE_PARTS, open_broken, sparse_of
 
 _MEMORY, _PER_BYTE = 1500 * 2**20, 64  # bytes with the libraries, and more for each of the file
 _SECONDS = 300
@@ -67,7 +67,7 @@ def read_in_child(words: tuple[str, str, str]) -> bytes:
     arrays: dict[str, Any] = {}
     names: list[str] = []
     try:
-        with opened(Path(file), ""):
+        with open_broken(Path(file), ""):
             for found, value in function(Path(file)).items():
                 key = f"v{len(names)}"
                 if sp.issparse(value):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
@@ -13,11 +12,11 @@ from femubench.fem import MatrixGeometry, SparseArray, matrix_model
 from femubench.plugins.readers import nodes
 from femubench.plugins.readers.reading import (
     DIRECTIONS,
+    ProgramReader,
     columns_of,
     directions,
     lower_triangle,
-    no_modes,
-    opened,
+    open_broken,
     symmetric,
     whole,
 )
@@ -27,7 +26,7 @@ _LABELS = "node.direction for every row, directions 1 to 6"
 _MOST_ROWS = 1_000_000
 
 
-class CalculixReader:
+class CalculixReader(ProgramReader):
     """Reads the job of an input file: job.sti, job.mas and job.dof beside job.inp.
 
     Files job_NAME.sti beside them are groups: the part NAME of the stiffness.
@@ -58,16 +57,12 @@ class CalculixReader:
     def model_files(self, path: Path) -> Sequence[Path]:
         """Return the files of a job besides the one named; raises InputError."""
         job = [path.with_suffix(suffix) for suffix in (".inp", ".sti", ".mas", ".dof")]
-        further = nodes.included(job[0])
+        further = nodes.list_included(job[0])
         return tuple(f for f in (*job, *further, *_groups(path).values()) if f != path)
 
     def read_nodes(self, path: Path) -> Mapping[str, nodes.Point]:
         """Return the nodes of an input file; raises InputError."""
         return nodes.read_nodes(path.with_suffix(".inp"))
-
-    def read_modes(self, path: Path) -> NoReturn:
-        """Refuse: the files of a job hold no measured modes."""
-        no_modes(path, "the files of CalculiX")
 
     def write_model(self, model: Model, path: Path, original: Path) -> None:
         """Write .sti, .mas and .dof of an updated model beside each other, and its groups."""
@@ -94,7 +89,7 @@ def _groups(path: Path) -> dict[str, Path]:
 def _labels(path: Path) -> list[tuple[str, str]]:
     """Return node and direction of every row."""
     found = []
-    with opened(path, _LABELS):
+    with open_broken(path, _LABELS):
         lines = path.read_text(encoding="latin-1").split()
     for number, line in enumerate(lines, start=1):
         node, _, direction = line.partition(".")

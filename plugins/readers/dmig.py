@@ -4,15 +4,27 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
 from femubench import InputError, Model
 from femubench.fem import MatrixGeometry, SparseArray, matrix_model
-from femubench.plugins.readers.reading import DIRECTIONS, directions, needs, no_modes, opened
-from femubench.plugins.readers.variables import MASS, STIFFNESS, chosen, main_matrix, only_matrix
+from femubench.plugins.readers.reading import (
+    DIRECTIONS,
+    ProgramReader,
+    directions,
+    needs,
+    open_broken,
+)
+from femubench.plugins.readers.variables import (
+    MASS,
+    STIFFNESS,
+    choose_name,
+    main_matrix,
+    only_matrix,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,7 +33,7 @@ _KIND = "DMIG cards with square matrices"
 _LARGEST = 6_000  # rows; pyYeti fills the whole matrix
 
 
-class DmigReader:
+class DmigReader(ProgramReader):
     """Reads square matrices with grids and components, e.g. KAAX and MAAX, K10 and M10 of EXTSEOUT.
 
     Coordinates are not in such a file. Cards have 16 columns a number, which hold 10 digits.
@@ -46,10 +58,6 @@ class DmigReader:
         first, second = _frames(stiffness), _frames(mass)
         own = first[main_matrix(_values(first), STIFFNESS, stiffness)]
         return _model(own, second[main_matrix(_values(second), MASS, mass)], stiffness)
-
-    def read_modes(self, path: Path) -> NoReturn:
-        """Refuse: DMIG cards hold no modes."""
-        no_modes(path, "DMIG cards")
 
     def write_model(self, model: Model, path: Path, original: Path) -> None:
         """Write an updated model, all other matrices as they were; raises InputError."""
@@ -79,7 +87,7 @@ class DmigReader:
 def _frames(path: Path) -> dict[str, pd.DataFrame]:
     """Return every matrix by its name in lower case, labelled by grid and component."""
     needs("pyyeti", "nastran", path)
-    with opened(path, _KIND):
+    with open_broken(path, _KIND):
         from pyyeti.nastran import bulk
 
         with path.open(encoding="latin-1") as stream:
@@ -104,7 +112,7 @@ def _chosen(frames: dict[str, pd.DataFrame], known: tuple[str, ...], path: Path)
     """
     numbered = [name for name in frames if re.fullmatch(rf"{known[1]}(aa)?x?\d+", name)]
     own = tuple(numbered) if len(numbered) == 1 else ()
-    return chosen(_values(frames), (*known, *own), path)
+    return choose_name(_values(frames), (*known, *own), path)
 
 
 def _model(stiffness: pd.DataFrame, mass: pd.DataFrame, path: Path) -> Model:

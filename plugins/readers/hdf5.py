@@ -42,10 +42,10 @@ def read_hdf5(path: Path) -> dict[str, Any]:
         InputError: when it is broken, or leads to data outside of it.
     """
     needs("h5py", "hdf5", path)
-    return apart(found_in, path, _KIND)
+    return apart(list_variables, path, _KIND)
 
 
-def found_in(path: Path) -> dict[str, Any]:
+def list_variables(path: Path) -> dict[str, Any]:
     """Return what a file holds by name; a crash is for the caller to stand."""
     import h5py
 

@@ -27,7 +27,7 @@ class MatlabReader(VariablesReader):
         """Return the variables by name; raises InputError."""
         if is_hdf5(path):
             return read_hdf5(path)
-        return apart(found_in, path, _KIND)
+        return apart(list_variables, path, _KIND)
 
     def save(self, path: Path, original: Path, new: Variables) -> None:
         """Write a file of the same version with some variables renewed."""
@@ -45,7 +45,7 @@ def is_hdf5(path: Path) -> bool:
     return start.startswith(_HDF5) or start[_USER_BLOCK:] == _HDF5
 
 
-def found_in(path: Path) -> dict[str, Any]:
+def list_variables(path: Path) -> dict[str, Any]:
     """Return the variables by name; a crash is for the caller to stand."""
     found = _loaded(path)
     for name, value in found.items():

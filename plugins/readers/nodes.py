@@ -47,7 +47,7 @@ def read_nodes(path: Path) -> dict[str, Point]:
     return nodes
 
 
-def included(path: Path) -> tuple[Path, ...]:
+def list_included(path: Path) -> tuple[Path, ...]:
     """Return the files that an input file includes, in order, each once."""
     found = dict.fromkeys(file for file, _, _ in _lines(path))
     return tuple(file for file in found if file != path)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.plugins.readers.reading import SPARSE_PARTS, opened, sparse_of
+from femubench.plugins.readers.reading import SPARSE_PARTS, open_broken, sparse_of
 from femubench.plugins.readers.variables import Variables, VariablesReader
 
 _KIND = "an archive of numpy.savez or scipy.sparse.save_npz"
@@ -25,7 +25,7 @@ class NpzReader(VariablesReader):
 
     def variables(self, path: Path) -> dict[str, Any]:
         """Return the arrays, those of every sparse matrix put together; raises InputError."""
-        with opened(path, _KIND):
+        with open_broken(path, _KIND):
             arrays = _arrays(path)
             if "format" in arrays:
                 with path.open("rb") as stream:

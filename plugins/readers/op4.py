@@ -8,7 +8,7 @@ from typing import Any
 import scipy.sparse as sp
 
 from femubench.fem import SparseArray
-from femubench.plugins.readers.reading import needs, opened
+from femubench.plugins.readers.reading import needs, open_broken
 from femubench.plugins.readers.variables import Variables, VariablesReader
 
 _KIND = "a file of Nastran's OUTPUT4"
@@ -45,7 +45,7 @@ class Op4Reader(VariablesReader):
 def _loaded(path: Path) -> dict[str, tuple[Any, int, int]]:
     """Return matrix, form and type by lower-case name."""
     needs("pyyeti", "nastran", path)
-    with opened(path, _KIND):
+    with open_broken(path, _KIND):
         from pyyeti.nastran import op4
 
         loaded: Any = op4.load(str(path), into="dct", sparse=True)

@@ -8,7 +8,7 @@ from contextlib import contextmanager, redirect_stdout
 from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,6 +16,7 @@ import scipy.sparse as sp
 from femubench import InputError
 
 if TYPE_CHECKING:
+    from femubench import Measurement
     from femubench.fem import SparseArray
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
@@ -23,7 +24,7 @@ SPARSE_PARTS = ("data", "indices", "indptr", "shape")
 
 
 @contextmanager
-def opened(path: Path, what: str) -> Iterator[None]:
+def open_broken(path: Path, what: str) -> Iterator[None]:
     """Turn whatever a library raises at a broken file into one line; let it print nothing.
 
     Arguments:
@@ -43,9 +44,21 @@ def opened(path: Path, what: str) -> Iterator[None]:
         raise InputError(f"cannot be read: {told}", file=path, expected=what) from None
 
 
-def no_modes(path: Path, what: str) -> NoReturn:
-    """Refuse to read modes from a kind of file that has none."""
-    raise InputError(f"no modes are read from {what}", file=path, expected=".csv or .unv")
+class ProgramReader:
+    """Base class of readers of a program's files, which refuses what these do not hold."""
+
+    name: str
+    suffixes: tuple[str, ...]
+
+    def read_matrix(self, path: Path) -> SparseArray:
+        """Refuse, as here, where a file holds no matrix."""
+        what = f"no matrix is read from files of kind {self.name!r}"
+        raise InputError(what, file=path, expected=".op4, .pch or .mtx")
+
+    def read_modes(self, path: Path) -> Measurement:
+        """Refuse, as here, where a file holds no measured modes."""
+        what = f"no modes are read from files of kind {self.name!r}"
+        raise InputError(what, file=path, expected=".csv or .unv")
 
 
 def directions(numbers: Sequence[int], path: Path) -> tuple[str, ...]:
@@ -117,7 +130,7 @@ def columns_of(path: Path, count: int, what: str, delimiter: str | None = None) 
     Raises:
         InputError: for other columns, or what is no finite number.
     """
-    with opened(path, what):
+    with open_broken(path, what):
         table = np.loadtxt(path, delimiter=delimiter, comments="*", ndmin=2, encoding="latin-1")
     if not len(table) or table.shape[1] != count or not np.isfinite(table).all():
         raise InputError(f"{table.shape[1]} columns", file=path, expected=what)

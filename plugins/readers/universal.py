@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from femubench import InputError, Measurement, Sensors
 from femubench.fem import Outline
 from femubench.modal import FrequencyResponses, TimeSignals, real_modes
 from femubench.plugins.readers.axes import BASIC, System
-from femubench.plugins.readers.reading import DIRECTIONS, opened
+from femubench.plugins.readers.reading import DIRECTIONS, ProgramReader, open_broken
 from femubench.plugins.readers.universal_datasets import Dataset, read_datasets
 
 _COORDINATES, _UNITS, _SYSTEMS, _SHAPES = (15, 2411), 164, (18, 2420), (55, 2414)
@@ -48,15 +47,11 @@ class _Mode:
     shape: Mapping[tuple[int, str], complex]
 
 
-class UniversalReader:
+class UniversalReader(ProgramReader):
     """Reads nodes, modes, units and axes, and the lines that draw a structure."""
 
     name: str = "universal file"
     suffixes: tuple[str, ...] = (".uff", ".unv", ".uf")
-
-    def read_matrix(self, path: Path) -> NoReturn:
-        """Refuse: matrices of universal files are not read."""
-        raise InputError("no matrix is read from a universal file", file=path, expected=".mtx")
 
     def read_modes(self, path: Path) -> Measurement:
         """Return sensors ``node:direction`` and modes.
@@ -76,7 +71,7 @@ class UniversalReader:
             InputError: when the file is broken.
         """
         datasets, _ = read_datasets(path, _WANTED, _DRAWN)
-        with opened(path, "whole datasets"):
+        with open_broken(path, "whole datasets"):
             nodes = _nodes(path, datasets)
         pairs = dict.fromkeys(tuple(sorted(pair)) for pair in _lines(datasets, nodes))
         ends = [[nodes[number].xyz for number in pair] for pair in pairs]
@@ -101,7 +96,7 @@ class UniversalReader:
 
 def _sensors_and_modes(path: Path, datasets: Sequence[Dataset], other: set[int]) -> Measurement:
     # A dataset that is cut short may lack any column.
-    with opened(path, "whole datasets"):
+    with open_broken(path, "whole datasets"):
         nodes, factor = _nodes(path, datasets), _length_factor(path, datasets)
         modes = [mode for d in _of(datasets, 55) for mode in _mode_55(path, d, factor)]
         modes = modes or [mode for d in _of(datasets, 2414) for mode in _mode_2414(path, d, factor)]

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench import InputError
-from femubench.plugins.readers.reading import DIRECTIONS, directions, opened, words_of
+from femubench.plugins.readers.reading import DIRECTIONS, directions, open_broken, words_of
 
 if TYPE_CHECKING:
     from femubench import Measurement, Model
@@ -31,7 +31,7 @@ def is_matrix(value: Any) -> bool:  # noqa: ANN401 - a variable may be anything
     return len(shape) == 2 and shape[0] == shape[1] > 0 and number
 
 
-def chosen(variables: Variables, known: tuple[str, ...], path: Path) -> str:
+def choose_name(variables: Variables, known: tuple[str, ...], path: Path) -> str:
     """Return the name of the stiffness or of the mass.
 
     It bears one of the known names, in upper or lower case, or is the only matrix whose name
@@ -69,7 +69,7 @@ def only_matrix(variables: Variables, path: Path) -> str:
 def main_matrix(variables: Variables, known: tuple[str, ...], path: Path) -> str:
     """Return the name of the matrix of a pair: the only one, or that which `chosen` knows."""
     matrices = [name for name, value in variables.items() if is_matrix(value)]
-    return matrices[0] if len(matrices) == 1 else chosen(variables, known, path)
+    return matrices[0] if len(matrices) == 1 else choose_name(variables, known, path)
 
 
 def group_variables(variables: Variables, stiffness: str) -> dict[str, str]:
@@ -94,7 +94,7 @@ def model_of(variables: Variables, path: Path) -> Model:
     # Not on top: a process that reads a file apart does without models.
     from femubench.fem import ModelError, matrix_model
 
-    stiffness, mass = chosen(variables, STIFFNESS, path), chosen(variables, MASS, path)
+    stiffness, mass = choose_name(variables, STIFFNESS, path), choose_name(variables, MASS, path)
     groups = group_variables(variables, stiffness)
     words = {name.lower(): value for name, value in variables.items()}
     nodes, along, xyz = (
@@ -169,13 +169,13 @@ class VariablesReader(ABC):
         from femubench.plugins.readers.modal_variables import read_modal
 
         found = self.variables(path)
-        with opened(path, "frequencies and mode shapes by name"):
+        with open_broken(path, "frequencies and mode shapes by name"):
             return read_modal(found, path, names)
 
     def write_model(self, model: Model, path: Path, original: Path) -> None:
         """Write an updated model, and all else that is in the original; raises InputError."""
         found = self.variables(original)
-        names = (chosen(found, STIFFNESS, original), chosen(found, MASS, original))
+        names = (choose_name(found, STIFFNESS, original), choose_name(found, MASS, original))
         new = {names[0]: model.stiffness, names[1]: model.mass}
         for group, name in group_variables(found, names[0]).items():
             if group in model.groups:

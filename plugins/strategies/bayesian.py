@@ -71,7 +71,7 @@ class Bayesian(SensitivityStrategy):
     def own_changes(self, model: Model, measurement: Measurement) -> tuple[Model, list[Change]]:
         """Return the parameters above with their priors, or those of the groups."""
         if model.groups:
-            return model, self.listed_changes(model, measurement)
+            return model, self.list_changes(model, measurement)
         stiffness = scale_all_stiffness(model, prior_std=self.stiffness_std)
         structure, mass = model.structure, self._mass(model, measurement)
         if structure is None:
@@ -86,7 +86,7 @@ class Bayesian(SensitivityStrategy):
         ]
         return model, [stiffness, *torsion, *mass, *joints]
 
-    def listed_changes(self, model: Model, measurement: Measurement) -> list[Change]:
+    def list_changes(self, model: Model, measurement: Measurement) -> list[Change]:
         """Return the changes that `changes` names and the mass, each with its prior."""
         words = "groups" if self.changes == OWN else self.changes
         listed = list_changes(model, words, prior_std=self.stiffness_std)

@@ -25,8 +25,8 @@ from femubench.diagnosis import (
     Explanation,
     causes_in,
     examine,
-    extended_by,
-    registered_effects,
+    extend_by,
+    list_effects,
 )
 from femubench.effect import textbook_values
 from femubench.modal import rigid_modes_of
@@ -73,7 +73,7 @@ class Diagnosed(Strategy):
     settings: ClassVar[tuple[str, ...]] = ("meet_frequencies=false", "tolerance=0.01")
 
     def __post_init__(self) -> None:
-        known = {effect.name for effect in registered_effects()} if self.without else set()
+        known = {effect.name for effect in list_effects()} if self.without else set()
         for name in filter(None, self.without.split("+")):
             if name not in known:
                 raise InputError(
@@ -114,7 +114,7 @@ class Diagnosed(Strategy):
             return UpdateResult(model, diagnostics={"examined": 0.0})
         effects = [
             effect
-            for effect in registered_effects()
+            for effect in list_effects()
             if effect.name not in self.without.split("+")
             and (self.textbook or not textbook_values(effect, model))
         ]
@@ -139,7 +139,7 @@ def _first_that_stands(model: Model, examination: Examination) -> tuple[Explanat
     for name in examination.posterior.names:
         explanation = examination.posterior.best(name)
         try:
-            extended = extended_by(model, explanation)
+            extended = extend_by(model, explanation)
             lowest = float(solve_modes(extended).eigenvalues[0])
         except FemubenchError:
             continue
@@ -180,8 +180,8 @@ def _uncertainty(
     """
     fit = explanation.fit
     try:
-        found = Uncertainty.drawn(
-            partial(extended_by, model, explanation),
+        found = Uncertainty.draw(
+            partial(extend_by, model, explanation),
             fit.state.x,
             0.5 * (fit.covariance + fit.covariance.T),
             discrepancy_std=examination.scatter,

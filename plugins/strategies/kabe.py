@@ -43,7 +43,7 @@ class _Entries(Strategy):
                 raise InputError(f"the cutoff {cutoff:g} is not positive")
 
     @abstractmethod
-    def kept(self, model: Model) -> FloatArray:
+    def find_kept_motions(self, model: Model) -> FloatArray:
         """Return the motions that must stay free of forces, (n, r)."""
 
     def update(
@@ -58,7 +58,7 @@ class _Entries(Strategy):
             NotApplicable: when the matrix has too many entries.
         """
         cutoffs = self.cutoff, self.least_squares_cutoff
-        return update_entries(model, measurement, self.kept(model), *cutoffs).result
+        return update_entries(model, measurement, self.find_kept_motions(model), *cutoffs).result
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Kabe(_Entries):
     )
     promises: ClassVar[frozenset[str]] = frozenset({"used-modes-or-stated"})
 
-    def kept(self, model: Model) -> FloatArray:
+    def find_kept_motions(self, model: Model) -> FloatArray:
         """Return no motion."""
         return np.zeros((model.size, 0))
 
@@ -92,6 +92,6 @@ class KabeRigid(_Entries):
     )
     promises: ClassVar[frozenset[str]] = frozenset({"used-modes-or-stated", "rigid-body-modes"})
 
-    def kept(self, model: Model) -> FloatArray:
+    def find_kept_motions(self, model: Model) -> FloatArray:
         """Return the free rigid-body motions."""
         return rigid_modes_of(model)

@@ -10,7 +10,7 @@ import numpy as np
 from femubench import Measurement, Model, UpdateResult
 from femubench.update import (
     ParametricStrategy,
-    bounded_fit,
+    fit_bounded,
     modal_space,
     parameterise,
     parametric_result,
@@ -69,10 +69,10 @@ class MultiStart(ParametricStrategy):
             np.zeros(len(parts)),
             *(0.5 * (low + high) + 0.5 * (high - low) * (2.0 * cube - 1.0)),
         ]
-        found = [bounded_fit(space, start, self.largest) for start in starts]
+        found = [fit_bounded(space, start, self.largest) for start in starts]
         best = min(found, key=lambda item: item[1])[0]
         there = modal_space(parts, measurement, shape_weight=weight, at=best, size=self.basis)
-        log, cost = bounded_fit(there, best, self.largest)
+        log, cost = fit_bounded(there, best, self.largest)
         costs = np.array([item[1] for item in found])
         history = tuple({"cost": float(value)} for value in costs)
         near = float(np.mean(costs <= 1.1 * costs.min()))

@@ -14,10 +14,10 @@ from femubench.update import (
     JointGroup,
     SensitivityStrategy,
     available_length,
-    carried_by,
     groups_within,
     half_depth,
     scale_all_stiffness,
+    select_determined,
     set_property,
     with_rigid_ends,
 )
@@ -76,7 +76,7 @@ class Offset(SensitivityStrategy):
             [scale_all_stiffness(structure)],
             own["through"],
         ]
-        return with_rigid_ends(structure, lengths), carried_by(levels, count)
+        return with_rigid_ends(structure, lengths), select_determined(levels, count)
 
     def _initial(self, structure: Structure, group: JointGroup) -> tuple[float, float]:
         """Return the rigid lengths in the stiffness and in the mass matrix in m."""

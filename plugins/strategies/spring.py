@@ -13,11 +13,11 @@ from femubench.update import (
     JointGroup,
     SensitivityStrategy,
     all_elements,
-    carried_by,
     flexible_ends,
     joint_groups,
     scale_all_stiffness,
     scale_property,
+    select_determined,
     set_property,
     spring_estimates,
     with_joint_springs,
@@ -112,7 +112,7 @@ class Spring(SensitivityStrategy):
 
         stiffness = [scale_all_stiffness(structure)] if self.free_stiffness else []
         levels = [level(_BENDING), stiffness, level(_TORSION), level(_TRANSLATION)]
-        return carried_by(levels, count)
+        return select_determined(levels, count)
 
 
 def _flexible(structure: Structure, groups: tuple[JointGroup, ...]) -> dict[str, tuple[str, ...]]:

@@ -12,8 +12,8 @@ from femubench.fem import FloatArray
 from femubench.modal import mass_normalised, rigid_modes_of
 from femubench.update import (
     ParametricStrategy,
-    bounded_fit,
     expand_measured_shapes,
+    fit_bounded,
     modal_space,
     parameterise,
     parametric_result,
@@ -79,7 +79,7 @@ class StrainEnergy(ParametricStrategy):
             count -= 1
             chosen = parts.of([int(j) for j in order[:count]])
         space = modal_space(chosen, measurement, shape_weight=self.shape_weight)
-        log, cost = bounded_fit(space, np.zeros(len(chosen)), _LARGEST)
+        log, cost = fit_bounded(space, np.zeros(len(chosen)), _LARGEST)
         return parametric_result(chosen, log, cost=cost, named=float(len(chosen.changes)))
 
 

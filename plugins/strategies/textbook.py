@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from femubench import Measurement, Model, ParameterEstimate, Strategy, UpdateResult
-from femubench.diagnosis import registered_effects
+from femubench.diagnosis import list_effects
 from femubench.effect import textbook_model, textbook_values
 
 
@@ -34,7 +34,7 @@ class Textbook(Strategy):
         Raises:
             NotApplicable: when the model came as matrices.
         """
-        known = registered_effects()
+        known = list_effects()
         repaired = textbook_model(model, known)
         values = [
             ParameterEstimate(

@@ -8,11 +8,11 @@ import math
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from femubench.reports.cells import plain, shortened
+from femubench.reports.cells import plain, shorten_text
 from femubench.reports.csvs import CsvReporter
 from femubench.reports.jsons import JsonReporter
-from femubench.reports.page.papers import papers_of, started_as_drawn
-from femubench.reports.page.rounding import clean, compact_json, plain_data, rounded
+from femubench.reports.page.papers import list_drawn_frequencies, papers_of
+from femubench.reports.page.rounding import clean, compact_json, plain_data, round_figures
 from femubench.reports.summary import (
     cases_of,
     finding,
@@ -32,12 +32,12 @@ from femubench.results import (
     JobResult,
     Reporter,
     Run,
+    find_basis,
     interval_tail,
     is_test,
     leaderboard,
     predictive,
     rank_results,
-    scored_on,
     structures_of,
     tell_apart,
     unsteady,
@@ -81,9 +81,9 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
     shared = {
         "finding": finding(run, board, tested.tiers),
         "lead": lead(run),
-        "scored_on": "unseen data" if scored_on(run) == "unseen" else "the modes that were given",
+        "scored_on": "unseen data" if find_basis(run) == "unseen" else "the modes that were given",
         "yardstick": run.meta.get("yardstick"),
-        "as_drawn": started_as_drawn(run),
+        "as_drawn": list_drawn_frequencies(run),
         "strategies": _strategies(run),
     }
     downloads, too_large, room = [], [], MOST_DOWNLOADS
@@ -124,7 +124,7 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
         "board": [{str(key): clean(value) for key, value in row.items()} for row in board],
         "statistics": {
             "pairs": [
-                [strategies.index(a), strategies.index(b), rounded(p, 4)]
+                [strategies.index(a), strategies.index(b), round_figures(p, 4)]
                 for a, b, p in tested.pairs
             ],
             "groups": [list(map(strategies.index, group)) for group in tested.groups],
@@ -183,16 +183,16 @@ def _result(result: JobResult, case: int, strategy: int) -> dict[str, Any]:
         "s": strategy,
         "seed": result.seed,
         "status": result.status,
-        "reason": shortened(plain(result.reason), _LONGEST_REASON),
+        "reason": shorten_text(plain(result.reason), _LONGEST_REASON),
         "score": clean(result.score),
         "start": [clean(result.start_percent.get(name)) for name in BLOCKS],
         "rms": [None if block is None else clean(block.rms_percent) for block in blocks],
-        "seconds": rounded(result.seconds, 4),
+        "seconds": round_figures(result.seconds, 4),
         "parameters": result.parameter_count,
         "lost": max(lost, 0) if result.status == "ok" else 0,
         "negative": result.negative_eigenvalues or 0,
         "unphysical": result.unphysical,
-        "mac": [None if block is None else rounded(block.mean_mac, 5) for block in blocks],
+        "mac": [None if block is None else round_figures(block.mean_mac, 5) for block in blocks],
         "forecast": [_forecast(result, name) for name in BLOCKS],
     }
 
@@ -268,20 +268,21 @@ def _detail(result: JobResult) -> dict[str, Any]:
                 "mode": mode.number,
                 "block": name,
                 "modification": mode.modification,
-                "measured_hz": rounded(mode.measured_hz, 7),
-                "predicted_hz": rounded(mode.predicted_hz, 7),
-                "mac": rounded(mode.mac, 5),
+                "measured_hz": round_figures(mode.measured_hz, 7),
+                "predicted_hz": round_figures(mode.predicted_hz, 7),
+                "mac": round_figures(mode.mac, 5),
             }
             for name, block in result.blocks.items()
             for mode in block.modes
         ],
         "history": [
-            {name: rounded(value, 5) for name, value in step.items()} for step in result.history
+            {name: round_figures(value, 5) for name, value in step.items()}
+            for step in result.history
         ],
         "parameters": [
             {
                 "name": plain(item.get("name", "")),
-                **{name: rounded(item.get(name), 6) for name in ("before", "after", "std")},
+                **{name: round_figures(item.get(name), 6) for name in ("before", "after", "std")},
                 "unit": plain(item.get("unit") or ""),
             }
             for item in result.parameters

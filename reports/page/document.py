@@ -35,10 +35,10 @@ def document(data: Mapping[str, Any], *, title: str) -> str:
         run=data["run"],
         style=Markup("\n".join(asset(name) for name in STYLES)),
         script=Markup("\n".join(asset(name) for name in SCRIPTS)),
-        data=Markup(embedded_json(data)),
+        data=Markup(embed_json(data)),
     )
 
 
-def embedded_json(data: Any) -> str:  # noqa: ANN401 - JSON data of any form
+def embed_json(data: Any) -> str:  # noqa: ANN401 - JSON data of any form
     """Return JSON that can end neither a script element nor a line of it."""
     return compact_json(data).translate(_ESCAPES)

@@ -33,7 +33,7 @@ def papers_of(run: Run) -> dict[str, dict[str, dict[int, float]]]:
     return found
 
 
-def started_as_drawn(run: Run) -> dict[str, dict[str, dict[int, float | None]]]:
+def list_drawn_frequencies(run: Run) -> dict[str, dict[str, dict[int, float | None]]]:
     """Return our own frequencies in Hz from the models as drawn, as the papers have them.
 
     By case, strategy and mode; of the first seed, where a run starts from both nominal models.

@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NoReturn
 
-from femubench import InputError, Model
+from femubench import Model
 from femubench.plugins.readers.bulk_data.cards import Deck
 from femubench.plugins.readers.bulk_data.structure import BulkFrame, grids_of
 from femubench.plugins.readers.bulk_data.writing import write_cards
+from femubench.plugins.readers.reading import ProgramReader
 
 
-class BulkDataReader:
+class BulkDataReader(ProgramReader):
     """Reads and writes frames of CBAR and CBEAM, and trusses of CROD, in Nastran bulk data."""
 
     name: str = "Nastran bulk data"
     suffixes: tuple[str, ...] = (".bdf", ".dat", ".nas")
-
-    def read_matrix(self, path: Path) -> NoReturn:
-        """Refuse: bulk data hold elements."""
-        raise InputError("bulk data hold no matrix", file=path, expected=".op4, .pch or .mtx")
-
-    def read_modes(self, path: Path) -> NoReturn:
-        """Refuse: bulk data hold no results."""
-        raise InputError("bulk data hold no modes", file=path, expected=".csv or .unv")
 
     def read_model(self, path: Path) -> Model:
         """Return the model of the frame that a file describes, in the units of the file.

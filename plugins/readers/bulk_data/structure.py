@@ -82,7 +82,7 @@ class GridPoint:
         return str(int(self.card.text(1)))
 
 
-def numbered(deck: Deck, *names: str) -> dict[int, Card]:
+def number_cards(deck: Deck, *names: str) -> dict[int, Card]:
     """Return cards of some kinds by their number, in the order of the file.
 
     Raises:
@@ -106,7 +106,7 @@ def grids_of(deck: Deck) -> dict[int, GridPoint]:
     usual = next((card for card in deck.cards if card.name == "GRDSET"), None)
     shown = 0 if usual is None else usual.id(6, "CD", 0)
     systems, found = systems_of(deck), {}
-    for number, card in numbered(deck, "GRID").items():
+    for number, card in number_cards(deck, "GRID").items():
         xyz = systems.place(card)
         if card.text(6) == "-1":
             raise card.error("a point of a fluid", "a grid of a structure", "CD")
@@ -119,7 +119,7 @@ def systems_of(deck: Deck) -> Systems:
     """Return the coordinate systems of a file; raises InputError."""
     usual = next((card for card in deck.cards if card.name == "GRDSET"), None)
     first = 0 if usual is None else usual.id(2, "CP", 0)
-    return Systems(deck.cards, numbered(deck, "GRID"), first)
+    return Systems(deck.cards, number_cards(deck, "GRID"), first)
 
 
 @dataclass
@@ -188,8 +188,8 @@ class BulkFrame:
         self.listed = 0  # grids in lists so far
         pairs = [(card, i) for card in self._cards("PELAS") for i in (1, 5) if card.text(i)]
         self.stiffnesses = {card.id(i, "PID"): card.real(i + 1, "K") for card, i in pairs}
-        materials = numbered(deck, "MAT1")
-        properties = numbered(deck, *PROPERTIES).items()
+        materials = number_cards(deck, "MAT1")
+        properties = number_cards(deck, *PROPERTIES).items()
         self.bars = {number: bar_of(card, materials) for number, card in properties}
         self.parts = Parts()
         self.bar_of: dict[str, Bar] = {}  # by member
@@ -197,7 +197,7 @@ class BulkFrame:
 
     def frame(self) -> Frame:
         """Return the frame, in the units of the file."""
-        elements = numbered(self.deck, *ELEMENTS)
+        elements = number_cards(self.deck, *ELEMENTS)
         actions: dict[str, Callable[[Card], None]] = {
             **dict.fromkeys(_BARS, self._bar),
             **dict.fromkeys(("CELAS1", "CELAS2"), self._spring),
