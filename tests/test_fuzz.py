@@ -174,10 +174,7 @@ def results_format(folder: Path, share: float, format: str) -> None:
 
     def report() -> None:
         nonlocal count
-        if format == "run":
-            run = read_run(file)
-        else:
-            run = run_of_lines(file)
+        run = read_run(file) if format == "run" else run_of_lines(file)
         count += 1
         for reporter in REPORTERS:
             if reporter.name == "html" and count % _PAGE_SHARE != 1:

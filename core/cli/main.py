@@ -30,7 +30,7 @@ VERBS = {
     "study": "Run strategies under conditions that vary: noise, sensors, options.",
     "report": "Write a report on a stored run.",
     "compare": "Compare run B with run A; exit with 1 if B is worse.",
-    "store": "Check, repair or export stored runs.",
+    "store": "Check or repair stored runs.",
     "submit": "Check, run and compare a strategy for a leaderboard.",
     "publish": "Merge result files into a static site in DIR.",
     "update": "Write the updated model of CASE in the format that it came in.",
