@@ -87,5 +87,6 @@ def read_in_child(words: tuple[str, str, str]) -> bytes:
         return _REFUSED + " ".join(error.what.split()).encode()
     stream = io.BytesIO(_FOUND)
     stream.seek(0, io.SEEK_END)
-    np.savez(stream, **arrays, **{_NAMES: np.array(names, dtype=str)})
+    arrays[_NAMES] = np.array(names, dtype=str)
+    np.savez(stream, **arrays)
     return stream.getvalue()
