@@ -353,7 +353,8 @@ TRUSTED = {
     "core/run/schedule.py": "writes cases for the processes that judge",
     "core/run/slots.py": "writes jobs for its own workers",
     "core/run/cluster.py": "sends cases to workers of the same user, who send results as Dask does",
-    "core/run/standing_judge.py": "reads cases and the requests that the parent has written",
+    "core/run/standing_judge.py": "reads cases that the parent has written",
+    "core/child/confinement.py": "a child reads the requests that its parent has written",
     "core/conformance": "asks whether a strategy can be pickled, which is a rule of the contract",
 }
 # Arrays of one publication, from the folder that the user names for it; no case can ask for it.
