@@ -146,7 +146,7 @@ def run_task(task: SweepCase, diagnose: Diagnose) -> Record:
 
 
 def _fits(diagnosis: Diagnosis, truth: Truth) -> Record:
-    """Return how the truth fits beside what was found; nothing where nothing is to be found."""
+    """Return how the truth fits next to what was found; nothing where nothing is to be found."""
     if diagnosis.examination is None or not truth.causes:
         return {}
     frame = structure_named(truth.structure).frame

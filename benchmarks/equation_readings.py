@@ -95,8 +95,8 @@ class Reading:
         """Return the choices that are not the defaults, the family aside."""
         base = Reading()
         names = [f.name for f in fields(self) if f.name != "family"]
-        told = [n for n in names if getattr(self, n) != getattr(base, n)]
-        return ", ".join(f"{n} {getattr(self, n)}" for n in told) or "as built in"
+        stated = [n for n in names if getattr(self, n) != getattr(base, n)]
+        return ", ".join(f"{n} {getattr(self, n)}" for n in stated) or "as built in"
 
 
 def modes_of(nominal: Setting, stiffness: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -111,10 +111,10 @@ def best_rows(results: Sequence[Found], family: str, count: int = 4) -> list[dic
     for best in sorted(
         (f for f in results if f.reading.family == family), key=lambda f: f.deviation
     ):
-        told = tuple(np.round(best.modes))
-        if told in seen or len(rows) == count:
+        stated = tuple(np.round(best.modes))
+        if stated in seen or len(rows) == count:
             continue
-        seen.add(told)
+        seen.add(stated)
         others = table.loc[best.reading.words]
         rows.append(
             {

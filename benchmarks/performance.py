@@ -1,4 +1,4 @@
-"""How the cost of things grows with their size, beside what one would else use.
+"""How the cost of things grows with their size, next to what one would else use.
 
     make bench-report                             # everything, into docs/development/performance.md
     python benchmarks/performance.py --only lattice --within 60

@@ -1,4 +1,4 @@
-"""What a run costs beside its eigenvalue solutions, and what a job costs that does nothing.
+"""What a run costs next to its eigenvalue solutions, and what a job costs that does nothing.
 
     python benchmarks/run_cost.py [CASE ...] [-s STRATEGY ...] [--sandbox off]
 

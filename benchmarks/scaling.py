@@ -3,7 +3,7 @@
     python benchmarks/scaling.py NAME SIZE
 
 prints one line of JSON: seconds of processor and the memory that was added, of the thing itself
-and of the anchor beside it. `python benchmarks/performance.py` calls it for every size.
+and of the anchor next to it. `python benchmarks/performance.py` calls it for every size.
 """
 
 from __future__ import annotations
@@ -201,7 +201,7 @@ def _masses(model: Model, count: int, *, inside: bool) -> list[Change]:
 
 
 def _changed(count: int, *, inside: bool) -> Row:
-    """Return twelve modes after each of many changes, 27 702 dofs, beside one solution."""
+    """Return twelve modes after each of many changes, 27 702 dofs, next to one solution."""
     model = Model.of(lattice(9))
     solution = least(lambda: solve_modes(model, MODES))
     row = timed(modes_of_changes, model, _masses(model, count, inside=inside), MODES)
@@ -246,7 +246,7 @@ def _stored(count: int, what: str) -> Row:
 
 
 def _diagnosed(joints: int) -> Row:
-    """Return a diagnosis of a lattice with a softer member, beside one solution for its modes."""
+    """Return a diagnosis of a lattice with a softer member, next to one solution for its modes."""
     case = case_of(uneven_lattice((joints - 1,) * 3, 3), "xyz", 16)
     solution = least(lambda: solve_modes(case.model, DIAGNOSED_MODES))
     row = timed(diagnose, case)

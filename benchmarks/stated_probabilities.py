@@ -60,7 +60,7 @@ def statements(
     """Return what an answer states of every cause that it names, alone or in a group.
 
     Arguments:
-        answer: with a verdict; best guesses beside ``unknown`` and ``not-confirmed`` are none.
+        answer: with a verdict; best guesses next to ``unknown`` and ``not-confirmed`` are none.
         is_named: whether an effect is among what is hidden.
         is_placed: whether an effect at a place is.
         counts: which causes are judged.

@@ -3,7 +3,7 @@
     python benchmarks/store.py [--results 100000] [--store DIR]
 
 The results are made up from those of one job, 25 cases x 20 strategies x seeds. Seconds are of the
-processor, the least of three fresh processes, beside those of an anchor in the same process: ten
+processor, the least of three fresh processes, next to those of an anchor in the same process: ten
 solutions of a dense symmetric eigenvalue problem of 600 unknowns. DIR is kept and used again.
 """
 

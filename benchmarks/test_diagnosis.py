@@ -1,4 +1,4 @@
-"""Naming what a model lacks, beside a dense solution anew for every hypothesis."""
+"""Naming what a model lacks, next to a dense solution anew for every hypothesis."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Many gradients, many design changes and a matrix update of one large model, in eigen-solutions.
 
-Every figure is processor time beside that of one solution for 12 modes of the same model in the
+Every figure is processor time next to that of one solution for 12 modes of the same model in the
 same process; `figures` gives them all.
 """
 

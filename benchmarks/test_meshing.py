@@ -1,4 +1,4 @@
-"""Meshing a large frame, beside a plain loop over its members."""
+"""Meshing a large frame, next to a plain loop over its members."""
 
 from __future__ import annotations
 

@@ -141,10 +141,10 @@ def diagnosed(task: Task, key: tuple[str, str]) -> Record:
         target = Path(scratch, "case")
         pose(task.folder, target, task.reference, suite=task.suite)
         try:
-            with warnings.catch_warnings(record=True) as told, limited(task.seconds):
+            with warnings.catch_warnings(record=True) as as_stated, limited(task.seconds):
                 warnings.simplefilter("default")
                 diagnosis = diagnose(read_case(target))
-            record["warnings"] = sorted({str(warning.message)[:80] for warning in told})
+            record["warnings"] = sorted({str(warning.message)[:80] for warning in as_stated})
             record |= record_of(Answer.of(diagnosis))
             record["chi2"] = list(diagnosis.chi2)
             record["adequacy_p"] = diagnosis.adequacy_p
@@ -160,7 +160,7 @@ def diagnosed(task: Task, key: tuple[str, str]) -> Record:
 
 
 def _fits(diagnosis: Diagnosis, truth: KnownCase) -> Record:
-    """Return how the true causes fit beside what was found; nothing where there are none."""
+    """Return how the true causes fit next to what was found; nothing where there are none."""
     if diagnosis.examination is None or truth.kind not in ("defect", "pair"):
         return {}
     # A true size is one parameter's; where an effect has more, the others are not known.
@@ -244,7 +244,7 @@ class Scored:
         truth: of the case.
         said: one of `OUTCOMES`.
         sure: whether the verdict states a probability of at least `SURE`.
-        beside: what was said of the structure beside faults of data and input.
+        next to: what was said of the structure next to faults of data and input.
         stated: probabilities of names and places.
         deviations: of sizes that were found, from the true ones, in stated deviations.
         fits: whether the answer fits worse than the truth, and whether by a fault of the search;
@@ -255,7 +255,7 @@ class Scored:
     truth: KnownCase
     said: str
     sure: bool
-    beside: str = ""
+    companions: str = ""
     stated: tuple[Statement, ...] = ()
     deviations: tuple[float, ...] = ()
     fits: tuple[bool, bool] | None = None
@@ -432,9 +432,11 @@ def structure_rows(cases: Sequence[Scored]) -> list[dict[str, str]]:
     """Return the verdict on the structure where the fault was named, and where it was not."""
     rows = []
     usual = ("none", "a cause", "unknown", "not confirmed")
-    words = ranked((*usual, *(case.beside for case in cases)), usual)
+    words = ranked((*usual, *(case.companions for case in cases)), usual)
     for head, chosen in (("named", True), ("not named", False)):
-        own = [case.beside for case in cases if (case.said in ("right", "with others")) is chosen]
+        own = [
+            case.companions for case in cases if (case.said in ("right", "with others")) is chosen
+        ]
         rows.append({"fault": head, "cases": str(len(own))} | {w: str(own.count(w)) for w in words})
     return rows if cases else []
 

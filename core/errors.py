@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
-_LONGEST = 600  # characters of one part of a message, which may quote what a stranger wrote
+_LONGEST = 600  # characters of one part of a message, which may quote what a third party wrote
 
 
 def _clipped(text: str) -> str:
@@ -15,7 +15,7 @@ def _clipped(text: str) -> str:
 def harmless(text: str) -> str:
     """Return text on one line, with escapes for what a terminal would obey or could not show.
 
-    Names of files and keys come from strangers; they must not move a cursor or hide a line.
+    Names of files and keys come from third parties; they must not move a cursor or hide a line.
     """
     line = " ".join(text.split())
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)

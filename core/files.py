@@ -1,4 +1,4 @@
-"""Read files of strangers with limits, and write files in one step."""
+"""Read files of third parties with limits, and write files in one step."""
 
 from __future__ import annotations
 
@@ -148,12 +148,12 @@ def write_atomically(path: Path, content: str | bytes) -> None:
     if isinstance(content, str):
         content = (content.rstrip("\n") + "\n").encode()
     try:
-        _write_beside(path, content)
+        _write_next_to(path, content)
     except OSError as error:
         raise OutputError(path, error) from error
 
 
-def _write_beside(path: Path, content: bytes) -> None:
+def _write_next_to(path: Path, content: bytes) -> None:
     """Write a file under another name, then give it its own."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     part = Path(name)

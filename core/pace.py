@@ -26,7 +26,7 @@ class Advance:
     current: float = 0.0
 
 
-Told = Callable[[Advance], None]
+OnAdvance = Callable[[Advance], None]
 
 
 class Pace:

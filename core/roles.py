@@ -1,4 +1,4 @@
-"""The roles that are played here, as protocols: whoever has the members plays the role.
+"""The roles that are played here, as protocols: anyone who has the members plays the role.
 
 Nothing has to be inherited. Parameters of methods are contravariant: a method that wants the data
 class `femubench.Model` would not do where one is asked for that takes any object with a model's
@@ -225,8 +225,8 @@ class Scenario:
         except FemubenchError:
             raise
         except Exception as error:
-            told = " ".join(f"{type(error).__name__}: {error}".split())
-            what = f"the folder of {case!r} cannot be made: {told}"
+            stated = " ".join(f"{type(error).__name__}: {error}".split())
+            what = f"the folder of {case!r} cannot be made: {stated}"
             raise PluginError(f"scenario {self.name!r}: {what}") from error
 
 
@@ -290,7 +290,7 @@ class Reporter(Protocol):
     (``render_diagnosis(data)``, ``diagnosis_lines(data)``), a comparison
     (``render_comparison(data)``), papers (``render_studies(studies, drawings)``), identified modes
     (``render_modes(found, source)``), a list (``render_list(title, lines)``), a leaderboard
-    (``render_site(index)``), and what has to be known of a run besides (``notes(run)``).
+    (``render_site(index)``), and what has to be known of a run in addition to (``notes(run)``).
 
     Attributes:
         name: the word after ``bench report --format``.
@@ -402,7 +402,7 @@ class Effect(Protocol):
     An effect may offer more than is asked here:
 
     - ``summary``, ``caution``: what the model lacks, as a clause (``"a bolt is loose"``), and a
-      sentence for whoever finds the effect named.
+      sentence for anyone who finds the effect named.
     - ``change(model, place) -> Change``: what it does to mass and stiffness as fixed matrices with
       varying factors. Without it the diagnosis reads the change off `extend` at a few values.
     """
@@ -429,7 +429,7 @@ class Effect(Protocol):
 class Fault(Protocol):
     """Something that is wrong with the data, or with what was typed in; no cause of physics.
 
-    A diagnosis weighs every suspect beside the physical causes, on the same data.
+    A diagnosis weighs every suspect next to the physical causes, on the same data.
     """
 
     @property

@@ -145,7 +145,7 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Row:
-    """Small figures beside each other."""
+    """Small figures next to each other."""
 
     drawings: Sequence[Drawing]
 
@@ -159,12 +159,12 @@ class Passage:
 
     Arguments:
         level: 2 for a chapter, 3 for a part of one.
-        area: where HTML has it: ``first`` under the heading, ``beside`` it, or in its turn.
+        area: where HTML has it: ``first`` under the heading, ``companions`` it, or in its turn.
         look: what HTML styles it by.
     """
 
     title: str
     blocks: Sequence[Block]
     level: int = 2
-    area: Literal["", "first", "beside"] = ""
+    area: Literal["", "first", "companions"] = ""
     look: str = ""

@@ -103,9 +103,9 @@ def _sections(data: Mapping[str, Any], *, screen: bool = False) -> Iterator[Pass
     yield from _listed("Ended otherwise", map(_change, data["changes"]), screen)
     yield from _listed("Beyond a threshold", map(_excess, data["excesses"]), screen)
     evidence = data["evidence"]
-    told = [] if screen else _drawn(evidence)
+    stated = [] if screen else _drawn(evidence)
     proof = Table(_PROOF, [*map(_proof, evidence)])
-    yield Passage("Is it more than chance?", [*told, proof, _EVIDENCE])
+    yield Passage("Is it more than chance?", [*stated, proof, _EVIDENCE])
     legend = f"{_LEGEND} {_TELLING}" if screen else _LEGEND
     cells = []
     for row in data["rows"]:

@@ -68,8 +68,8 @@ def diagnosis_html(data: Data) -> str:
 def summary_lines(data: Data) -> list[str]:
     """Return the verdict and its causes, a line each, for a comment or a list."""
     cards = [_card(number, cause) for number, cause in enumerate(data["causes"], 1)]
-    told = (": ".join(entry) for entry in Cards(cards).entries)
-    return [line for line in map(plain, (data["sentence"], *told)) if line]
+    stated = (": ".join(entry) for entry in Cards(cards).entries)
+    return [line for line in map(plain, (data["sentence"], *stated)) if line]
 
 
 def _heading(data: Data) -> str:
@@ -94,10 +94,10 @@ def _sections(data: Data, *, page: bool = False) -> list[Passage]:
     found = (
         Passage("", [said, Items(_tiles(data), look="tiles")], area="first"),
         Passage(words.CAUSES.get(verdict, ""), [*_cards(data), *textbook], area="first"),
-        Passage("", [_map(data)] if page else [], area="beside"),
-        Passage(words.FAULTS, _cards(data, faults=True), area="beside"),
+        Passage("", [_map(data)] if page else [], area="companions"),
+        Passage(words.FAULTS, _cards(data, faults=True), area="companions"),
         Passage("The stated scatter does not fit what is left", [Items(warned)] * bool(warned),
-                area="beside", look="notes"),
+                area="companions", look="notes"),
         Passage(next_title, [*([reason] if reason else []), *_advice(data)]),
         Passage(gain_title, _gain(data)),
         Passage("How well it fits", list(_fit(data, page=page))),
@@ -117,8 +117,8 @@ def _tiles(data: Data) -> list[tuple[str, ...]]:
     sure = nothing if none or nothing is None else 1.0 - nothing
     found = "Nothing is missing" if none else "Something is missing"
     tiles: list[tuple[str, ...]] = [(found, chance(sure), "probability, before any name is given")]
-    told = [(key, name) for key, name in words.GAINS.items() if data["gain"][key]]
-    for key, name in told[:1] if not none else ():
+    stated = [(key, name) for key, name in words.GAINS.items() if data["gain"][key]]
+    for key, name in stated[:1] if not none else ():
         kind, pairs = next(iter(_errors(data).items()))
         before, after = map(words.percent, pairs[key])
         said = f"{kind} frequency error, before → after"

@@ -54,11 +54,11 @@ def feeds_of(index: Mapping[str, Any]) -> dict[str, str]:
 
 def _news_text(item: Mapping[str, Any]) -> str:
     """Return version and skill of who is in the news."""
-    told = f"Version {plain(item['version'])}, femubench {plain(item['femubench'])}: "
+    stated = f"Version {plain(item['version'])}, femubench {plain(item['femubench'])}: "
     if item["skill"] is None:
-        return f"{told}no result on today's files of the cases."
+        return f"{stated}no result on today's files of the cases."
     sure = "" if item["low"] is None else f" (95 %: {interval(item['low'], item['high'])})"
-    return f"{told}skill {format_fixed(item['skill'], 3, 7)}{sure} on today's cases."
+    return f"{stated}skill {format_fixed(item['skill'], 3, 7)}{sure} on today's cases."
 
 
 def _name(*parts: str) -> str:

@@ -50,7 +50,7 @@ class JsonLinesReporter:
     def render(self, run: Run) -> str:
         """Return a table of strict JSON on each line."""
         plain = run_to_json(run)
-        results = [*plain["results"], *plain.get("beside", ())]
+        results = [*plain["results"], *plain.get("companions", ())]
         of_run = {"run": plain["meta"].get("run")}
         lines = [{"record": "run", **of_run, "meta": plain["meta"]}]
         lines += [{"record": "result", **of_run, "result": result} for result in results]

@@ -102,8 +102,8 @@ def _answer(board: Data) -> Iterator[str]:
     if unphysical:
         yield f"Below them for unphysical models: {unphysical}."
     cases, structures = len(board["cases"]), board["structures"]
-    told = f"{cases} case{'s' * (cases != 1)} of {structures} structure{'s' * (structures != 1)}"
-    yield f"On {told} that more than half of the strategies were run on."
+    stated = f"{cases} case{'s' * (cases != 1)} of {structures} structure{'s' * (structures != 1)}"
+    yield f"On {stated} that more than half of the strategies were run on."
 
 
 def _skill_words(row: Data) -> str:
@@ -135,8 +135,8 @@ def _flags(row: Data) -> list[str]:
         "contradicted": row.get("conflict"),
     }
     counts = {"contradicted": row.get("conflicts"), "failed": row.get("failures")}
-    told = [f"{count} {word}" for word, count in counts.items() if count]
-    return [*(word for word, is_so in plainly.items() if is_so), *told, *row.get("marks", ())]
+    stated = [f"{count} {word}" for word, count in counts.items() if count]
+    return [*(word for word, is_so in plainly.items() if is_so), *stated, *row.get("marks", ())]
 
 
 def _machines(machines: Sequence[Data], *, most: int = 3) -> str:

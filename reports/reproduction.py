@@ -45,7 +45,7 @@ _VERDICTS: dict[Verdict, tuple[str, str, str, str, str]] = {
     "input": ("=", "input", "input", "input", "a count, a definition or a figure that the paper "
         "was given: its agreement shows nothing but care in copying"),
     "cannot-be-checked": ("·", "unseen", "cannot be checked", "cannot be checked",
-        "needs mode shapes that are not in print: ours stands beside it for comparison alone"),
+        "needs mode shapes that are not in print: ours stands next to it for comparison alone"),
     "misprint": ("!", "misprint", "misprint", "misprinted",
         "other printed figures of the same paper contradict it"),
     "does-not-follow": ("✗", "no", "does not follow", "do not follow",
@@ -160,7 +160,7 @@ def cells_in_words(cells: Sequence[Cell], words: Words) -> Iterator[Block]:
             cell.column,
             *([cell.unit] if several else []),
             digits[cell.unit].format(cell.printed, cell.unit),
-            digits[cell.unit].ours(cell.ours, cell.unit, beside=cell.printed),
+            digits[cell.unit].ours(cell.ours, cell.unit, adjacent=cell.printed),
             off(cell.deviation_percent, cell.unit),
             f"{words[cell.verdict]} {marks.get(cell.note, '')}".rstrip(),
         ]

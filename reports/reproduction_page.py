@@ -45,7 +45,7 @@ Key = tuple[str, str, str]  # table, row and column of a cell
 
 
 def reproduction_html(studies: Sequence[Study], drawings: Mapping[str, str]) -> str:
-    """Return studies as one HTML document that needs nothing besides itself.
+    """Return studies as one HTML document that needs nothing in addition to itself.
 
     Arguments:
         drawings: SVG of every figure by its name.
@@ -124,7 +124,7 @@ class _Paper:
 
     @cached_property
     def options(self) -> list[_Option]:
-        """Return what can be chosen besides what was judged."""
+        """Return what can be chosen in addition to what was judged."""
         return [option for *_, options in self.conventions for option in options[1:]]
 
     def _read(self, convention: Convention, name: str) -> Iterator[_Option]:

@@ -65,7 +65,7 @@ _MORE_FIGURES = {
     "evaluations": Column("eval.", 5),
 }
 # No reason for a second table by themselves.
-_BESIDE = {_MORE_FIGURES[name].title for name in ("crps_percent", "evaluations")}
+_NEXT_TO = {_MORE_FIGURES[name].title for name in ("crps_percent", "evaluations")}
 _LEGEND = {
     "high, mod., given": "rms frequency error in percent over the higher modes and those after a "
     "design change, which no strategy is given, and over the modes that it was given; a mode "
@@ -98,8 +98,8 @@ class TerminalReporter:
         if StudyAxes.from_run(run) is not None:
             return to_terminal(study.sections_of(run))
         failed = failures(troubles(run.results))
-        told = [*failed, *_notes(run)]
-        return to_terminal([*_board(run), *(Passage("", [block]) for block in told)])
+        stated = [*failed, *_notes(run)]
+        return to_terminal([*_board(run), *(Passage("", [block]) for block in stated)])
 
     def notes(self, run: Run) -> list[str]:
         """Return what a reader has to know of a run, where a format has no room for it."""
@@ -222,7 +222,7 @@ def _board(run: Run, title: str = "") -> Iterator[Passage]:
         for k, head in enumerate(heads)
         if k < _ALWAYS or {head.text(line[k]) for line in cells} - {NOTHING, ""}
     ]
-    if not title and not {heads[k].title for k in known[_ALWAYS:]} - _BESIDE:
+    if not title and not {heads[k].title for k in known[_ALWAYS:]} - _NEXT_TO:
         known = known[:_ALWAYS]
     table = Table([heads[k] for k in known], [[line[k] for k in known] for line in cells], names=1)
     yield Passage(title, [table])
@@ -238,7 +238,7 @@ def _board(run: Run, title: str = "") -> Iterator[Passage]:
 
 
 def _twins(run: Run) -> Iterator[Block]:
-    """Yield the skills on twins beside those on their cases, and who may know these."""
+    """Yield the skills on twins next to those on their cases, and who may know these."""
     found = sorted(twin_skills(run).items(), key=lambda entry: -entry[1].original_skill)
     if found:
         heads = (Column(head, 8, digits=3) for head in ("on twins", "on cases", "p"))
@@ -248,7 +248,7 @@ def _twins(run: Run) -> Iterator[Block]:
         ]
         said = f"{MEANING} Here: skill on {describe_twins(run)}."
         yield Table([Column("strategy", 30, left=True), *heads], rows, said)
-    yield from (f"?: {told}" for told in suspicions(run))
+    yield from (f"?: {stated}" for stated in suspicions(run))
 
 
 def _notes(run: Run) -> Iterator[str]:
@@ -324,10 +324,10 @@ def _case(
         known = (_predicted(modes[key]) if key in modes else NOTHING for key in columns)
         rows.append([result.strategy + mark, *known, _mac(modes.values()), result.score])
         for said, by_strategy in others:
-            if told := by_strategy.get(result.strategy):
+            if stated := by_strategy.get(result.strategy):
                 cells = (
-                    _predicted(structs.replace(mode, predicted_hz=told[number]))
-                    if number in told
+                    _predicted(structs.replace(mode, predicted_hz=stated[number]))
+                    if number in stated
                     else NOTHING
                     for (_, number), mode in columns.items()
                 )
@@ -378,6 +378,6 @@ def _changes(run: Run) -> Iterator[Passage]:
             for name in strategies_of(run)
             if name in present
         ]
-        told = [(str(number), ": ".join(change)) for number, change in enumerate(changes, 1)]
-        heads = [Column("strategy", 16, left=True), *(Column(n, 7, digits=2) for n, _ in told)]
-        yield Passage(f"Design changes of {scenario}", [said, Items(told), Table(heads, rows)])
+        stated = [(str(number), ": ".join(change)) for number, change in enumerate(changes, 1)]
+        heads = [Column("strategy", 16, left=True), *(Column(n, 7, digits=2) for n, _ in stated)]
+        yield Passage(f"Design changes of {scenario}", [said, Items(stated), Table(heads, rows)])

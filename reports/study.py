@@ -27,7 +27,7 @@ _PICTURE = (
 
 
 def study_html(run: Run) -> str:
-    """Return a study as one HTML document that needs nothing besides itself."""
+    """Return a study as one HTML document that needs nothing in addition to itself."""
     from femubench.reports.html import to_html
 
     title = title_of(run)
@@ -119,8 +119,8 @@ def _cells(cells: Sequence[dict[Any, Any]]) -> Iterator[Block]:
 
 def _options(row: dict[Any, Any], names: Sequence[str]) -> str:
     """Return the options of a cell's strategy."""
-    told = {name.partition(".")[2]: row[name] for name in names if row[name] is not None}
-    said = (f"{name} {StudyAxes.text_of(v)}" for name, v in told.items() if v == v)
+    stated = {name.partition(".")[2]: row[name] for name in names if row[name] is not None}
+    said = (f"{name} {StudyAxes.text_of(v)}" for name, v in stated.items() if v == v)
     return ", ".join(said) or NOTHING
 
 

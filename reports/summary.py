@@ -1,4 +1,4 @@
-"""What the reports say about a run besides the leaderboard: failures, design changes, header."""
+"""What the reports say about a run in addition to the leaderboard: failures, design changes, header."""
 
 from __future__ import annotations
 
@@ -127,18 +127,20 @@ def lead(run: Run) -> str:
     """Return what the skill of a run says, and from where its strategies started."""
     unseen = find_basis(run) == "unseen"
     what = "unseen data" if unseen else "the modes that were given"
-    told = [
+    stated = [
         f"Skill is the part of the {_yardstick(run)} model's error on {what} that a strategy takes "
         "away: 1 is all of it, 0 none, less than 0 is worse."
     ]
     if len(run.nominals) > 1:
-        told.append("Ranks are from the textbook models; beside it the start from the drawn ones.")
+        stated.append(
+            "Ranks are from the textbook models; next to it the start from the drawn ones."
+        )
     elif run.meta.get("yardstick") == "textbook":
         start = "as drawn" if run.nominals[0] == "drawn" else "of the textbooks"
-        told.append(f"All start from the models {start}.")
+        stated.append(f"All start from the models {start}.")
     if not unseen:
-        told.append("No case holds data back, so that nothing here shows what was learnt.")
-    return " ".join(told)
+        stated.append("No case holds data back, so that nothing here shows what was learnt.")
+    return " ".join(stated)
 
 
 def finding(
@@ -162,7 +164,7 @@ def finding(
         sure = f", 95 % interval {ends} over {count} {kind}"
     first = [plain(row["strategy"]) for row in board if row["rank"] == best["rank"]]
     leads = "leads: it takes" if len(first) == 1 else "share the first rank: each takes"
-    told = [
+    stated = [
         f"{join_names(first)} {leads} away {100.0 * skill:.0f} % of the {models}' error on "
         f"{data} (skill {skill:.3f}{sure})."
         if skill >= _SHOWN
@@ -171,37 +173,39 @@ def finding(
         *_how_sure(name, tiers, len(board)),
     ]
     if skill >= _SHOWN and best["skill_low"] <= 0.0:
-        told.append(f"Its interval holds 0: an improvement on the {models} is not shown.")
+        stated.append(f"Its interval holds 0: an improvement on the {models} is not shown.")
     idle = [row["skill_drawn"] for row in board if row["strategy"] == run.meta.get("baseline")]
     if idle and math.isfinite(idle[0]):
-        told.append(
+        stated.append(
             f"Without data the {models} stand at 0 and the models as drawn at {idle[0]:.3f}; "
             f"started from the latter {name} reaches {best['skill_drawn']:.3f}."
         )
     if math.isfinite(best["skill_tests"]):
-        told.append(f"On tests alone, no computed truths, its skill is {best['skill_tests']:.3f}.")
-    return [sentence.replace(" -", " \u2212") for sentence in told]
+        stated.append(
+            f"On tests alone, no computed truths, its skill is {best['skill_tests']:.3f}."
+        )
+    return [sentence.replace(" -", " \u2212") for sentence in stated]
 
 
 def _how_sure(name: str, tiers: Sequence[Sequence[str]], count: int) -> Iterator[str]:
     """Return how many of the strategies are not shown to differ from the best."""
-    beside = [plain(other) for other in (tiers or ((),))[0] if plain(other) != name]
+    companions = [plain(other) for other in (tiers or ((),))[0] if plain(other) != name]
     if count > 1 and not tiers:
         yield "Whether the others differ from it is not tested."
-    elif count > 1 and not beside:
+    elif count > 1 and not companions:
         yield "It is alone in tier 1: all others are shown to be worse."
-    elif len(beside) == count - 1 > 0:
+    elif len(companions) == count - 1 > 0:
         yield "No other strategy is shown to differ from it: all are in tier 1."
-    elif beside:
-        below = f"{count - 1 - len(beside)} of {count} are below"
-        yield f"Beside it in tier 1, not shown to differ from it: {first_of(beside, 4)}; {below}."
+    elif companions:
+        below = f"{count - 1 - len(companions)} of {count} are below"
+        yield f"Next to it in tier 1, not shown to differ from it: {first_of(companions, 4)}; {below}."
 
 
 def notes_of(run: Run) -> list[str]:
     """Return what a reader has to know before anything else: what was left out, what is missing."""
-    told = run.meta.get("notes")
-    notes = [plain(note) for note in told] if isinstance(told, (list, tuple)) else []
-    if missing := note_missing_jobs(run.meta, (*run.results, *run.beside)):
+    stated = run.meta.get("notes")
+    notes = [plain(note) for note in stated] if isinstance(stated, (list, tuple)) else []
+    if missing := note_missing_jobs(run.meta, (*run.results, *run.companions)):
         notes.append(plain(missing))  # the store may have said so
     return list(dict.fromkeys(notes))
 

@@ -31,6 +31,6 @@ def templates() -> Environment:
 
 
 def asset(name: str) -> str:
-    """Return the text of a file beside the templates of pages."""
+    """Return the text of a file next to the templates of pages."""
     path = files("femubench.reports").joinpath("page", "assets", name)
     return path.read_text(encoding="utf-8")

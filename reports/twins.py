@@ -28,16 +28,18 @@ def twins_by_strategy(run: Run) -> dict[str, dict[str, Any]]:
 
 def describe_twins(run: Run) -> str:
     """Return how many twins there were, and from which seed."""
-    told = run.meta.get("twins") or {}
-    twins = told.get("of") or {}
-    stretched = sum("stretched" in kinds for kinds in (told.get("kinds") or {}).values())
+    stated = run.meta.get("twins") or {}
+    twins = stated.get("of") or {}
+    stretched = sum("stretched" in kinds for kinds in (stated.get("kinds") or {}).values())
     some = f" ({stretched} stretched)" * bool(stretched)
-    return f"{len(twins)} twins{some} of {len(set(twins.values()))} cases, seed {told.get('seed')}"
+    return (
+        f"{len(twins)} twins{some} of {len(set(twins.values()))} cases, seed {stated.get('seed')}"
+    )
 
 
 def suspicions(run: Run) -> list[str]:
     """Return a sentence for every strategy that may know the cases, or that gave two answers."""
-    told = [
+    stated = [
         f"{plain(name)} knows the cases? skill {found.original_skill:.3f} on them, "
         f"{found.skill:.3f} on their twins"
         + f" (more than twice the error on the twins of {first_of(found.known, 3)})"
@@ -45,7 +47,7 @@ def suspicions(run: Run) -> list[str]:
         for name, found in twin_skills(run).items()
         if found.suspicious
     ]
-    return told + [
+    return stated + [
         f"{plain(name)} gave two answers to one job: {plain(what)}"
         for name, what in unsteady(run).items()
     ]

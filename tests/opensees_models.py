@@ -88,7 +88,7 @@ def plate() -> None:
                 0, 5, 0, 0, 0.1, 6, 0.3, 0, 0.1, 7, 0.3, 0.2, 0.1, 8, 0, 0.2, 0.1)  # fmt: skip
 
 
-def told(build: Callable[[], None], count: int) -> dict[str, Any]:
+def stated(build: Callable[[], None], count: int) -> dict[str, Any]:
     ops.wipe()
     build()
     before = [ops.nodeDisp(tag) for tag in ops.getNodeTags()]
@@ -133,10 +133,10 @@ def wet() -> None:
 
 if __name__ == "__main__":
     found: dict[str, Any] = {
-        "bent": told(bent, 6),
-        "loaded": told(loaded, 4),
-        "floor": told(floor, 3),
-        "plate": told(plate, 12),
+        "bent": stated(bent, 6),
+        "loaded": stated(loaded, 4),
+        "floor": stated(floor, 3),
+        "plate": stated(plate, 12),
         "refused": [refused(build) for build in (lambda: None, still, wet)],
     }
     ops.wipe()

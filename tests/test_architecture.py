@@ -239,8 +239,8 @@ def test_a_room_over_its_budget_is_named(
     whole = {"package": 13, "core": 3, "core/fem": 10, "tests": 3, **budgets}
     assert line_budget.main(made_tree(tmp_path), whole) == code
     printed = capsys.readouterr().out.splitlines()
-    told = [line for line in printed if " lines, " in line]
-    assert [line[: len(start)] for line, start in zip(told, says, strict=True)] == says
+    stated = [line for line in printed if " lines, " in line]
+    assert [line[: len(start)] for line, start in zip(stated, says, strict=True)] == says
 
 
 def test_a_room_without_a_budget_has_none(tmp_path: Path) -> None:

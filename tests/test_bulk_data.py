@@ -172,7 +172,7 @@ def test_offsets_are_rigid_arms(model: Callable[..., Model]) -> None:
     linked += "GRID,8,,0.,0.,0.\nGRID,9,,.8,0.,0.\nSPC1,1,123456,8\n"
     linked += "RBE2,5,8,123456,1\nRBE2,6,9,123456,2\n"
     np.testing.assert_allclose(hertz(found), hertz(model(linked)), rtol=1e-10)
-    # Pulled along x beside its axis, the bar bends: u = F L / EA + F e^2 L / EI.
+    # Pulled along x next to its axis, the bar bends: u = F L / EA + F e^2 L / EI.
     wanted = L / (E * A) + 0.1**2 * L / (E * I2)
     assert flexibility(found, "2", "x") == pytest.approx(wanted, rel=1e-9)
 
@@ -360,12 +360,12 @@ def test_a_space_frame_agrees_with_opensees(
     lines += ["MAT1,1,7.+10,,.3,2700.", "SPC1,1,123456,1,3", "CONM2,99,5,,.3"]
     found = model("\n".join(lines))
     frame = found.frame_structure.frame
-    told = description(frame, 12)
+    stated = description(frame, 12)
     # As numbers of the cards, not of the frame that was read.
-    for element, k in zip(told["elements"], range(1, 7), strict=True):
+    for element, k in zip(stated["elements"], range(1, 7), strict=True):
         i1, i2 = ((3e-9, 9e-9), (5e-10, 2e-9))[k % 2]
         element |= {"Iz": i1, "Iy": i2}
-    np.testing.assert_allclose(hertz(found)[:12], peer(told), rtol=1e-7)
+    np.testing.assert_allclose(hertz(found)[:12], peer(stated), rtol=1e-7)
 
 
 def garteur() -> Model:

@@ -61,7 +61,7 @@ def test_names_and_places_are_stated_apart() -> None:
         ("name", 0.1, True),
         ("place", 0.1, True),
     ]
-    # A best guess is no statement; a fault that is named beside it is.
+    # A best guess is no statement; a fault that is named next to it is.
     assert of(answer("unknown", mass, fault)) == [("name", 0.7, False), ("place", 0.7, False)]
     assert of(answer("not-confirmed", mass)) == of(answer("none")) == []
 

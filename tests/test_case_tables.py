@@ -63,7 +63,7 @@ def test_a_table_is_part_of_the_digest(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("joints", "members", "told"),
+    ("joints", "members", "stated"),
     [
         (JOINTS.replace("0.4,", "nan,"), MEMBERS, "joints.csv:4: x: 'nan' is not allowed"),
         (JOINTS.splitlines()[0] + "\n", MEMBERS, "joints.csv: no rows"),
@@ -79,11 +79,11 @@ def test_a_table_is_part_of_the_digest(tmp_path: Path) -> None:
     ],
 )
 def test_a_fault_is_told_with_file_line_and_column(
-    tmp_path: Path, joints: str, members: str, told: str
+    tmp_path: Path, joints: str, members: str, stated: str
 ) -> None:
     with pytest.raises(InputError) as error:
         read_case(tabled(tmp_path / "case", joints, members))
-    assert told in str(error.value)
+    assert stated in str(error.value)
     assert "\n" not in str(error.value)
 
 

@@ -565,7 +565,7 @@ def test_the_command_writes_and_scores(tmp_path: Path) -> None:
 
 @pytest.fixture
 def outside(tmp_path: Path) -> Path:
-    """Write a folder of one truth, on a built-in structure, and one on a structure beside it."""
+    """Write a folder of one truth, on a built-in structure, and one on a structure next to it."""
     room = tmp_path / "truths"
     frame = read_cases("frame-solid", load_plugins())[0].folder
     loose = TrueCause("a loose joint", "joint-rotation", "J1", ("joint-offset@J1",), 4e3, "N m/rad")
@@ -575,8 +575,8 @@ def outside(tmp_path: Path) -> Path:
     ):
         (room / name).mkdir(parents=True)
         kind = "defect" if causes else "clean"
-        told = KnownCase(name, structure, kind, 1, causes, 50.0, 40.0)
-        (room / name / "truth.toml").write_text(truth_text(told), encoding="utf-8")
+        stated = KnownCase(name, structure, kind, 1, causes, 50.0, 40.0)
+        (room / name / "truth.toml").write_text(truth_text(stated), encoding="utf-8")
         shutil.copyfile(frame / "modes.csv", room / name / "modes.csv")
     shutil.copytree(frame, room / "structures" / "ours")
     shutil.copyfile(frame / "modes.csv", room / "a" / "healthy.csv")
@@ -634,7 +634,7 @@ def test_the_command_poses_truths_from_outside(outside: Path, tmp_path: Path) ->
     assert "hidden: a loose joint: joint-rotation at J1" in done.output
     assert "wrong: none; hidden is a loose joint" in done.output
     for words, expected in (
-        ([*new, "--kind", "A"], "--kind says nothing beside --truths"),
+        ([*new, "--kind", "A"], "--kind says nothing next to --truths"),
         (["challenge", "new", "--seed", "1", "--reference"], "--reference goes with --truths"),
         ([*new[:-1], str(tmp_path / "none")], "no folder with truth.toml"),
     ):

@@ -1,4 +1,4 @@
-"""Charts as plain data: their numbers are drawn, and what lies far off is told at the edge."""
+"""Charts as plain data: their numbers are drawn, and what lies far off is stated at the edge."""
 
 from __future__ import annotations
 

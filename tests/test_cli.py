@@ -401,7 +401,7 @@ class TestGoingOn:
     def test_wrong_words(self, invoke: Invoke, tmp_path: Path) -> None:
         case = put_case(tmp_path / "case")
         for words, expected in (
-            (("run", case, "--locked", "2026"), "cases cannot be given beside it"),
+            (("run", case, "--locked", "2026"), "cases cannot be given next to it"),
             (("run", "--locked", "2026"), "no results"),
             (("run", "--locked", "2026", "--overwrite", "missing"), "overwrite cannot be given"),
             (("run", case, "--seed", 2**63), "not in the range"),
@@ -549,12 +549,12 @@ class TestRun:
             assert process.stderr is not None
             time.sleep(0.5)
             process.send_signal(signal.SIGINT)
-            told = [process.stderr.readline(), process.stderr.readline()]
+            stated = [process.stderr.readline(), process.stderr.readline()]
             process.send_signal(signal.SIGINT)
             # ends only when the workers, who hold the pipes too, are gone
             _, error = process.communicate(timeout=60.0)
         assert process.returncode == 130
-        assert [*told, *error.splitlines(keepends=True)] == [
+        assert [*stated, *error.splitlines(keepends=True)] == [
             "\n",
             "bench: finishing the jobs that are running; Ctrl-C once more stops them\n",
             "bench: interrupted\n",
@@ -677,17 +677,17 @@ def test_no_sizes(text: str) -> None:
 
 
 def test_progress_only_where_someone_watches(monkeypatch: pytest.MonkeyPatch) -> None:
-    with progress.progress() as told:
-        assert told is None
+    with progress.progress() as stated:
+        assert stated is None
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    with progress.progress(quiet=True) as told:
-        assert told is None
+    with progress.progress(quiet=True) as stated:
+        assert stated is None
     with progress.waiting("looking"), progress.waiting("not", quiet=True):
         pass
-    with progress.progress("[red]case") as told:
-        assert told is not None
-        told(Advance(0, 0))
-        told(Advance(1, 2, "[red]strategy", 3.0, 1.0))
+    with progress.progress("[red]case") as stated:
+        assert stated is not None
+        stated(Advance(0, 0))
+        stated(Advance(1, 2, "[red]strategy", 3.0, 1.0))
 
 
 def test_files_are_replaced_in_one_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -248,9 +248,9 @@ def test_what_ended_otherwise_comes_first(data: Data, tmp_path: Path) -> None:
     text = called_with(tmp_path, data, broken)
     assert text.exit_code == 1
     assert text.output.index("Ended otherwise") < text.output.index("strategy  ")
-    mended = compared(broken, data)
-    assert {c["kind"] for c in mended["changes"]} == {"gained"}
-    assert not mended["worse"]
+    repaired = compared(broken, data)
+    assert {c["kind"] for c in repaired["changes"]} == {"gained"}
+    assert not repaired["worse"]
     # A failure whose reference is not known is one nevertheless.
     bare = [{**run, "meta": {**run["meta"], "reference": {}}} for run in (data, broken)]
     assert row(compared(*bare), "softer")["failures"] == 2.0

@@ -154,15 +154,17 @@ def test_a_strategy_is_checked_in_the_sandbox(tmp_path: Path) -> None:
     file.write_text("123.4")
     checks = {check.name: check for check in checks_of("strategy")}
     assert kit.judge_check(checks["returns"], Bench(toys.Nosy(str(file)))).status == "pass"
-    # What it does find is told.
+    # What it does find is stated.
     shown = kit.judge_check(checks["returns"], Bench(toys.Nosy(toys.__file__)))
     assert "Strategies that break one rule each" in shown.message
 
 
-@pytest.mark.parametrize("told", [b"", b"null", b"{}", b'["splendid", ""]', b"[" * 9999, b"\xff"])
-def test_a_verdict_that_is_none_is_a_failure(told: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("stated", [b"", b"null", b"{}", b'["splendid", ""]', b"[" * 9999, b"\xff"])
+def test_a_verdict_that_is_none_is_a_failure(
+    stated: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def run_here(tasks: Mapping[Any, object], limits: object, count: int) -> dict[Any, Ending]:
-        return {key: Ending("answer", told) for key in tasks}
+        return {key: Ending("answer", stated) for key in tasks}
 
     monkeypatch.setattr(kit, "run_apart", run_here)
     found = Bench(toys.Spring()).apart(print)

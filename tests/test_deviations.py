@@ -82,8 +82,8 @@ def test_note_is_shown_by_run_and_diagnose(tmp_path: Path) -> None:
     assert "next to no deviation" in " ".join(run.output.split())
     page = (tmp_path / "page.md").read_text()
     assert "next to no deviation" in " ".join(page.split())
-    told = CliRunner().invoke(
+    stated = CliRunner().invoke(
         bench, ["diagnose", str(folder), "--effects", "density", "--no-pairs", "--no-faults"]
     )
-    assert told.exit_code == 0, told.output
-    assert "next to no deviation" in " ".join(told.output.split())
+    assert stated.exit_code == 0, stated.output
+    assert "next to no deviation" in " ".join(stated.output.split())

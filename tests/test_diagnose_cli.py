@@ -31,7 +31,7 @@ from femubench.core.score.scoring import frequency_error, score_model
 from femubench.reports.diagnosis import diagnosis_markdown, diagnosis_text
 
 Invoke = Callable[..., Result]
-Told = tuple[str, Result, dict[str, Any], Path]
+OnAdvance = tuple[str, Result, dict[str, Any], Path]
 
 EFFECTS = """
 from femubench import hookimpl
@@ -55,7 +55,7 @@ def femubench_effects():
 
 
 class Search:
-    """Stands for the search: notes how it was called, gives what it is told to."""
+    """Stands for the search: notes how it was called, gives what it is stated to."""
 
     def __init__(self) -> None:
         self.found: Diagnosis | Exception = toys.made()
@@ -126,14 +126,14 @@ class TestAsking:
         assert invoke("case").exit_code == 0
         ((case, effects, pairs),) = search.calls
         assert (case.folder, case.tolerance, pairs) == (Path("case"), TOLERANCE, True)
-        assert effects == list(load_plugins(strangers=False).effects)
+        assert effects == list(load_plugins(third_parties=False).effects)
 
     def test_effects_of_a_plugin_that_is_named_come_too(
         self, invoke: Invoke, search: Search
     ) -> None:
         assert invoke("case", "--plugin", "femubench_diagnose_tests").exit_code == 0
         ((_, effects, _),) = search.calls
-        assert effects == [*load_plugins(strangers=False).effects, "test-rust", "test-moss"]
+        assert effects == [*load_plugins(third_parties=False).effects, "test-rust", "test-moss"]
         words = ("--effects", "density", "--plugin", "femubench_diagnose_tests")
         assert invoke("case", *words).exit_code == 0
         assert search.calls[1][1] == ["density", "test-rust", "test-moss"]
@@ -307,7 +307,7 @@ class TestExtending:
 
 
 @pytest.fixture(scope="module", params=["frame", "hframe"])
-def told(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Told:
+def stated(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> OnAdvance:
     folder = tmp_path_factory.mktemp(request.param)
     words = [request.param, "--json", folder / "found.json", "--output", folder / "out"]
     result = CliRunner().invoke(bench, ["diagnose", *map(str, words)])
@@ -320,8 +320,8 @@ class TestBuiltInCases:
     """The real search on measured structures, from the command line to the extended case."""
 
     @pytest.mark.slow(10)
-    def test_screen_and_json_agree(self, told: Told) -> None:
-        name, result, data, _ = told
+    def test_screen_and_json_agree(self, stated: OnAdvance) -> None:
+        name, result, data, _ = stated
         assert data["case"] == name
         assert diagnosis_from_json(data) == data
         assert result.stdout == f"{diagnosis_text(data)}\n"
@@ -329,9 +329,9 @@ class TestBuiltInCases:
         assert max(map(len, lines)) <= 80
         assert "".join(data["sentence"].split()) in "".join(result.stdout.split())
 
-    def test_finds_what_these_models_are_known_to_lack(self, told: Told) -> None:
+    def test_finds_what_these_models_are_known_to_lack(self, stated: OnAdvance) -> None:
         """Both nominal models are Euler-Bernoulli beams; the ladder's has J = Jp for a tube."""
-        name, _, data, _ = told
+        name, _, data, _ = stated
         found = {cause["effect"] for cause in data["causes"]}
         assert "shear-deformation" in found
         assert data["nothing"] < 0.01
@@ -342,9 +342,9 @@ class TestBuiltInCases:
         assert ("torsion-constant" in looked) == (name == "frame")
         assert ("torsion-constant" in found) == (name == "frame")
 
-    def test_residuals_are_those_of_the_nominal_model(self, told: Told) -> None:
+    def test_residuals_are_those_of_the_nominal_model(self, stated: OnAdvance) -> None:
         """By hand: the frequencies of the model as drawn, mode by mode in their order."""
-        name, _, data, _ = told
+        name, _, data, _ = stated
         (case,) = read_cases([name], load_plugins())
         modes = solve_modes(case.model)
         predicted = modes.natural_frequencies[~modes.rigid]
@@ -355,9 +355,9 @@ class TestBuiltInCases:
             assert row["measured"] == measured.frequencies[k]
             assert row["before"] == pytest.approx(sigma, abs=0.5)
 
-    def test_extended_case_is_what_was_found(self, told: Told) -> None:
+    def test_extended_case_is_what_was_found(self, stated: OnAdvance) -> None:
         """The folder read again predicts the held-out modes as the diagnosis says."""
-        _, result, data, out = told
+        _, result, data, out = stated
         if data["verdict"] in ("none", "unknown"):
             assert not out.exists()
             assert data["written"] is None

@@ -133,7 +133,7 @@ def test_meeting_the_frequencies_moves_nothing_else(
 
 
 def test_a_mass_beside_the_axis_comes_with_its_arm() -> None:
-    """It is weighed as an added mass, and told by its own name."""
+    """It is weighed as an added mass, and stated by its own name."""
     specimen, place = structure_named("ladder"), "rung-right@0.25"
     effect = load_plugins().effects["mass-offset"]
     values = [0.03 * specimen.model.total_mass, 1.5 * 0.0254]

@@ -21,7 +21,7 @@ from femubench.core.fit.modal_fit import Fit, Problem, fit, state_at
 from femubench.core.inference.grid_search import Screened, _in_cells, screen
 
 NOTHING = np.zeros(0)
-# Of chi-square, beside a share of what is explained.
+# Of chi-square, next to a share of what is explained.
 SINGLE, DOUBLE, SHARE = 1.0, 16.0, 0.05
 
 
@@ -165,7 +165,7 @@ def test_causes_that_are_there_make_room(clean: Problem) -> None:
     slope = state_at(clean, (part,), np.zeros(1)).jacobian
     (plain,) = screen(clean, start, (twin,))
     (eased,) = screen(clean, start, (twin,), slope)
-    # Beside E the temperature explains nothing more, and costs as much less as E may give way.
+    # Next to E the temperature explains nothing more, and costs as much less as E may give way.
     before, after = (
         np.square(s.residuals).sum(axis=1) - np.square(s.residuals).sum(axis=1).min()
         for s in (plain, eased)

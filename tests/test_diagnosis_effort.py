@@ -49,16 +49,16 @@ def test_a_spent_budget_leaves_single_causes_and_says_so() -> None:
 
 
 def test_a_budget_that_is_not_spent_changes_nothing_and_pieces_done_never_fall() -> None:
-    told: list[Advance] = []
-    whole, limited = diagnosed(None), diagnose(pair().case, effort=Effort(1e6, told.append))
+    as_stated: list[Advance] = []
+    whole, limited = diagnosed(None), diagnose(pair().case, effort=Effort(1e6, as_stated.append))
     assert (limited.sentence, limited.notes) == (whole.sentence, whole.notes)
-    done = [advance.done for advance in told]
+    done = [advance.done for advance in as_stated]
     assert done == sorted(done)
-    assert all(advance.done <= advance.total for advance in told)
-    assert done[-1] == told[-1].total > 10
-    assert told[-1].left == 0.0
-    assert told[0].left is None
-    known = [advance.left is not None for advance in told]
+    assert all(advance.done <= advance.total for advance in as_stated)
+    assert done[-1] == as_stated[-1].total > 10
+    assert as_stated[-1].left == 0.0
+    assert as_stated[0].left is None
+    known = [advance.left is not None for advance in as_stated]
     assert known == sorted(known)  # once there is a time, it stays
 
 

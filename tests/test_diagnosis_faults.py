@@ -192,7 +192,7 @@ def test_a_wrong_sign_stands_out_of_what_a_drawing_gets_wrong(name: str, sensor:
 
 
 def test_a_frequency_that_is_off_like_the_others_is_not_called_wrong() -> None:
-    """Four percent beside errors of twenty is nothing; beside none it is."""
+    """Four percent next to errors of twenty is nothing; next to none it is."""
     case = solid("h-tube")
     off = edited(partial(multiply, "frequencies", [1.0, 1.0, 0.96]), case)
     assert faults_of(diagnosed(off)) == []
@@ -315,7 +315,7 @@ def test_without_faults_the_examination_is_the_plain_one() -> None:
     case = clean("ladder", 1)
     used, terms = case.used_measurement(), Terms(tuple(FEW), 0.005, pairs=False)
     found = inquire(case.model, used, (), terms)
-    assert found.mended == ()
+    assert found.repaired == ()
     plain = examine(case.model, used, FEW, tolerance=0.005, pairs=False)
     assert found.examination.posterior.names == plain.posterior.names
 

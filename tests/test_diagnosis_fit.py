@@ -237,7 +237,7 @@ def test_rebased_coordinates_are_those_of_the_model_with_the_cause_in_it(
 def test_exact_data_give_the_size_back(
     structure: str, name: str, place: str, values: Sequence[float]
 ) -> None:
-    """To 15 % of its own standard deviation beside the pull of the prior, where a fit settles."""
+    """To 15 % of its own standard deviation next to the pull of the prior, where a fit settles."""
     frame = structure_named(structure).frame
     model, (effect,) = Model.of(frame), effects_named(name)
     test = measured(effect.extend(model, place, values), frame)

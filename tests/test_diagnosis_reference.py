@@ -1,4 +1,4 @@
-"""What differs from the structure as it was: diagnosis beside a reference."""
+"""What differs from the structure as it was: diagnosis next to a reference."""
 
 from __future__ import annotations
 

@@ -197,11 +197,11 @@ class TestTerminal:
         cause = replace(
             toys.SOFT, place_probability=0.25, places=places, mirrors=("type:L", "J1", "J9")
         )
-        told = (
+        stated = (
             "probability 94.2 %; at this place 25.0 %; one of 4 mirror places; "
             "else at type:L 25.0 %, J1 25.0 %, J9 25.0 %; the joints rotate"
         )
-        assert told in words(toys.made(causes=(cause,)))
+        assert stated in words(toys.made(causes=(cause,)))
 
     def test_data_and_prior_are_told_apart(self) -> None:
         rows = Evidence("nothing", 42.13, -7.25), Evidence("density at all", -0.05, 6.9)
@@ -229,9 +229,9 @@ class TestTerminal:
         assert "joint-rotation" not in words(toys.made("none"))
 
     def test_cross_validation_is_said(self) -> None:
-        told = "used modes, each left out in turn"
+        stated = "used modes, each left out in turn"
         cross = Gain((4.0, 0.5), cross_validated_percent=(5.0, 1.5))
-        assert told not in words(toys.made())
+        assert stated not in words(toys.made())
         rms = replace(cross, cross_validated_percent=(6.0, 2.5))
         assert "used modes, each 6 % 2.5 % 5 % 1.5 %" in words(toys.made(gain=cross, gain_rms=rms))
         assert "held-out" not in words(toys.made(gain=cross))

@@ -377,7 +377,7 @@ def test_known_eccentricity_is_gone_on_from(models: dict[str, Model]) -> None:
 
 @pytest.mark.slow(5)
 @pytest.mark.parametrize(
-    ("name", "place", "widths", "told"),
+    ("name", "place", "widths", "stated"),
     [
         ("ladder", "rung-right@0.25", 1.5, "mass-offset"),
         ("ladder", "rung-left@0.5", -0.5, "mass-offset"),
@@ -387,7 +387,7 @@ def test_known_eccentricity_is_gone_on_from(models: dict[str, Model]) -> None:
     ],
 )
 def test_a_mass_beside_the_axis_is_told_where_it_shows(
-    name: str, place: str, widths: float, told: str
+    name: str, place: str, widths: float, stated: str
 ) -> None:
     specimen, effect = structure_named(name), MassOffset()
     mass = 0.03 * specimen.model.total_mass
@@ -397,7 +397,7 @@ def test_a_mass_beside_the_axis_is_told_where_it_shows(
     test = measured(truth, specimen.frame, count=8, shapes=6, rng=rng)
     seen = examine(specimen.model, test, tuple(catalogue().values()), tolerance=0.002)
     (cause,) = list_causes(seen, seen.best)
-    assert (cause.effect, cause.place) == (told, place)
+    assert (cause.effect, cause.place) == (stated, place)
     assert cause.probability == pytest.approx(seen.posterior.inclusion("added-mass"))
     values = [p.value for p in cause.parameters]
     np.testing.assert_allclose(values, [mass, offset][: len(values)], rtol=0.15)

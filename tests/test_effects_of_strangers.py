@@ -31,9 +31,9 @@ OURS = ("youngs-modulus", "density", "torsion-constant")
 
 @pytest.fixture(scope="module", autouse=True)
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Install the package of the stranger, as pip would."""
+    """Install the package of the third party, as pip would."""
     folder = tmp_path_factory.mktemp("site")
-    install_metadata(folder, "strangers", {"strangers": "stranger_effects"})
+    install_metadata(folder, "third_parties", {"third_parties": "stranger_effects"})
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
         draw.registered_effects.cache_clear()
@@ -42,7 +42,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 def known(*names: str) -> list[Effect]:
-    return [effect for effect in list_effects("strangers") if effect.name in names]
+    return [effect for effect in list_effects("third_parties") if effect.name in names]
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +147,7 @@ def test_its_own_look_is_taken(blind: BlindCase, found: Diagnosis) -> None:
 
 
 def test_the_advice_reads_it_and_asks_for_a_second_level() -> None:
-    """Another cause with the same matrices stands beside it: only a reading tells them apart."""
+    """Another cause with the same matrices stands next to it: only a reading tells them apart."""
     case = draw_case(3, "A", effect=Skin.name).case
     both = diagnose(case, known(Skin.name, Plain.name))
     assert both.verdict == "ambiguous"
@@ -180,8 +180,8 @@ class TaskOfSkin(SweepCase):
 def test_without_being_named_it_is_neither_drawn_nor_looked_for() -> None:
     assert not {Skin.name, Bare.name, Plain.name} & {e.name for e in list_effects()}
     assert not {Skin.name, Bare.name, Plain.name} & set(draw.registered_effects())
-    with pytest.raises(InputError, match="no plugin 'stranger'; did you mean 'strangers'"):
-        list_effects("stranger")
+    with pytest.raises(InputError, match="no plugin 'third party'; did you mean 'third parties'"):
+        list_effects("third party")
 
 
 def test_the_sweep_judges_what_is_said_of_it() -> None:

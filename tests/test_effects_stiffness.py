@@ -128,8 +128,8 @@ def test_textbook_values(ladder: FrameBuilder, models: dict[str, Model]) -> None
     assert torsion.textbook is not None
     assert torsion.textbook == pytest.approx(-0.2579, abs=1e-4)
     own = ladder(polar=False)
-    mended = TorsionConstant().extend(models["ladder"], "all", [torsion.textbook])
-    section = mended.frame_structure.frame.members[0].section
+    repaired = TorsionConstant().extend(models["ladder"], "all", [torsion.textbook])
+    section = repaired.frame_structure.frame.members[0].section
     np.testing.assert_allclose(section.J, own.members[0].section.J, rtol=1e-12)
     assert TorsionConstant().parameters(Model.of(own), "all")[0].textbook is None
     for effect in (ShearDeformation(), RotaryInertia()):

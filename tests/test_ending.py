@@ -96,8 +96,8 @@ def test_the_board_so_far_and_the_command_that_goes_on(
     assert result.exit_code == code
     assert "strategy" in result.stdout
     assert f"2 of {JOBS} jobs are there" in result.stdout
-    *_, told, last = result.stderr.splitlines()
-    assert told == reason
+    *_, stated, last = result.stderr.splitlines()
+    assert stated == reason
     done, _, command = last.partition("; to go on: ")
     assert done == f"bench: 2 of {JOBS} jobs are done"
     assert ("Traceback" in result.stderr) is (cause == "broken")
@@ -217,10 +217,10 @@ def can_mount() -> bool:
 @pytest.mark.slow(5)
 @pytest.mark.skipif(not can_mount(), reason="no user namespaces to mount a small disk in")
 @pytest.mark.parametrize(
-    ("kib", "code", "told"),
+    ("kib", "code", "stated"),
     [(110, UNFINISHED, "a record cannot be written"), (200, 1, "html: cannot be written")],
 )
-def test_a_disk_that_is_full(kib: int, code: int, told: str, tmp_path: Path) -> None:
+def test_a_disk_that_is_full(kib: int, code: int, stated: str, tmp_path: Path) -> None:
     """A real one: too small for the results, or for the report."""
     (tmp_path / "disk").mkdir()
     script = f'mount -t tmpfs -o size={kib}k none disk && exec "$0" "$@"'
@@ -235,7 +235,7 @@ def test_a_disk_that_is_full(kib: int, code: int, told: str, tmp_path: Path) -> 
     assert done.returncode == code
     first, *rest = done.stderr.splitlines()
     assert first.startswith("bench: disk/")
-    assert told in first
+    assert stated in first
     assert "No space left on device" in first
     assert "strategy" in done.stdout
     if code == UNFINISHED:

@@ -52,10 +52,10 @@ def examples_of(thing: object, name: str, names: dict[str, Any]) -> doctest.DocT
 
 def run(test: doctest.DocTest) -> None:
     """Run the examples of one docstring; what they assign stays in the names of the test."""
-    told = io.StringIO()
+    stated = io.StringIO()
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
-    failed, _ = runner.run(test, out=told.write, clear_globs=False)
-    assert failed == 0, told.getvalue()
+    failed, _ = runner.run(test, out=stated.write, clear_globs=False)
+    assert failed == 0, stated.getvalue()
 
 
 @pytest.fixture(scope="module")

@@ -49,8 +49,8 @@ def updated(case: Case, strategy: str) -> UpdateResult:
 
 def shown(case: Case, strategy: str) -> dict[str, Any]:
     result = updated(case, strategy)
-    told = [_parameter(item, result.model) for item in result.parameters]
-    found = exhibit_of(case, result.model, told)
+    stated = [_parameter(item, result.model) for item in result.parameters]
+    found = exhibit_of(case, result.model, stated)
     assert found is not None
     return found
 

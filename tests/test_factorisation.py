@@ -67,7 +67,7 @@ def lattice(sides: tuple[int, int, int], elements: int = 2) -> Frame:
 
 
 def equal_beams(count: int) -> Frame:
-    """Return beams beside each other that nothing connects: every eigenvalue is repeated."""
+    """Return beams next to each other that nothing connects: every eigenvalue is repeated."""
     joints, members = [], []
     for i in range(count):
         joints += [Joint(f"A{i}", (0.0, float(i), 0.0)), Joint(f"B{i}", (0.5, float(i), 0.0))]
@@ -315,8 +315,8 @@ def test_reference_blas_is_told_by_its_file(
     monkeypatch.setattr(factorisation, "_loaded_libraries", lambda: ["/usr/lib/libc.so.6", path])
     cholmod_obstacle.cache_clear()
     try:
-        told = factorisation.solver_note()
-        assert bool(told) == slow
+        stated = factorisation.solver_note()
+        assert bool(stated) == slow
         assert (path in factorisation.solver_name()) == slow
     finally:
         cholmod_obstacle.cache_clear()

@@ -26,7 +26,7 @@ CASES = Path(__file__).parent / "cases"
 
 
 class Tether:
-    """A stranger's effect: a torsional spring to ground, or one between two joints."""
+    """A third party's effect: a torsional spring to ground, or one between two joints."""
 
     name: ClassVar[str] = "tether"
 

@@ -248,7 +248,7 @@ def test_frames_with_every_list_filled_get_through(frame: Frame) -> None:
 
 
 class _Build:
-    """A pickle that sets an attribute of a class, and one that imports a stranger's module."""
+    """A pickle that sets an attribute of a class, and one that imports a third party's module."""
 
     attribute = b"\x80\x04cfemubench.core.fem.model\nModel\nN}X\x07\x00\x00\x00plantedK\x01s\x86b."
     module = b"\x80\x04cnumpy_evil\ncsc_array\n."
@@ -446,7 +446,7 @@ def test_the_answer_that_is_forged_would_be_good() -> None:
 
 
 def test_parts_of_an_entry_that_cancel_hide_nothing() -> None:
-    """Beside entries of 1e22 every lack of symmetry is small."""
+    """Next to entries of 1e22 every lack of symmetry is small."""
     triplet = sp.coo_array(NOMINAL.stiffness)
     column, row = triplet.col, triplet.row
     data = np.where(row > column, 0.5, 1.0) * triplet.data

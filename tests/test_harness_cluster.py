@@ -64,7 +64,7 @@ def pids_of(executor: DaskWorkers) -> list[int]:
 def check_kills(executor: DaskWorkers, jobs: int, folder: Path) -> None:
     """Run jobs, kill a worker twice meanwhile, and compare with a run on this machine."""
     cases = [toys.tiny_case(), toys.tiny_case("other", 80.0e9)]
-    runs, file = {}, folder / "told"
+    runs, file = {}, folder / "stated"
     victims: list[int] = []
 
     def kill(result: JobResult, done: int, total: int) -> None:
@@ -76,7 +76,7 @@ def check_kills(executor: DaskWorkers, jobs: int, folder: Path) -> None:
     for name, place, progress in (("cluster", executor, kill), ("serial", here, None)):
         runs[name] = run_jobs(
             cases,
-            [toys.Told(str(file))],
+            [toys.OnAdvance(str(file))],
             seeds=range(jobs // 2),
             store=Store(folder / name),
             executor=place,
@@ -156,10 +156,10 @@ def test_a_worker_that_is_not_like_this_machine_is_told_in_one_line(
 
     with monkeypatch.context() as patch:
         patch.setattr(cluster, "all_versions", older)
-        with pytest.raises(InputError) as told:
+        with pytest.raises(InputError) as stated:
             two.admit(strategies, None)
     text = r"worker tcp://\S+: numpy \S+ there and 1.0 here, harness_toys \S+ there and 0\+abc here"
-    assert re.match(text, str(told.value))
+    assert re.match(text, str(stated.value))
     # One that joins after the others were looked at.
     late, demand = DaskWorkers(two._client, "", waits=False), two._demand
     monkeypatch.setattr(late, "admit", lambda *_: setattr(late, "_demand", demand))
@@ -168,7 +168,7 @@ def test_a_worker_that_is_not_like_this_machine_is_told_in_one_line(
 
 
 def listening(process: psutil.Process) -> set[str]:
-    """Return the addresses on which a process and those below it wait for strangers."""
+    """Return the addresses on which a process and those below it wait for third parties."""
     found = set()
     for one in (process, *process.children(recursive=True)):
         listed = [c for c in one.net_connections("inet") if c.status == psutil.CONN_LISTEN]
@@ -207,7 +207,7 @@ def test_an_interrupted_run_keeps_what_is_done_and_leaves_nothing_behind(tmp_pat
     )
     with quiet as process, ExitStack() as ended:
         below: list[psutil.Process] = []
-        told: list[str] = [""]
+        stated: list[str] = [""]
         ended.callback(process.kill)  # leaving the block waits for it
         until = time.monotonic() + 120.0
         while process.poll() is None and time.monotonic() < until:
@@ -216,13 +216,13 @@ def test_an_interrupted_run_keeps_what_is_done_and_leaves_nothing_behind(tmp_pat
                 # As a terminal does it; the second is for the job that never ends.
                 assert process.stderr is not None
                 os.killpg(process.pid, signal.SIGINT)
-                told = [process.stderr.readline(), process.stderr.readline()]
+                stated = [process.stderr.readline(), process.stderr.readline()]
                 os.killpg(process.pid, signal.SIGINT)
                 break
             time.sleep(0.2)
         _, text = process.communicate(timeout=60.0)
     assert process.returncode == -signal.SIGINT
-    assert told[-1].startswith("bench: finishing the jobs that are running")
+    assert stated[-1].startswith("bench: finishing the jobs that are running")
     assert text.strip().splitlines()[-1] == "KeyboardInterrupt"
     assert "distributed" not in re.sub(r'File "[^"]*"', "", text)
     assert below
@@ -328,7 +328,7 @@ def test_jobs_of_a_stand_in_for_slurm(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "stated"),
     [
         ({"scheduler": "host"}, r"'host' is no address \(expected tcp://HOST:PORT\)"),
         ({"scheduler": "tcp://127.0.0.1:9"}, "no scheduler of Dask answers at tcp://127.0.0.1:9"),
@@ -341,11 +341,11 @@ def test_jobs_of_a_stand_in_for_slurm(tmp_path: Path, monkeypatch: pytest.Monkey
     ],
 )
 def test_words_that_mean_no_cluster(
-    words: dict[str, Any], told: str, monkeypatch: pytest.MonkeyPatch
+    words: dict[str, Any], stated: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(cluster, "_ANSWER", 0.5)
     monkeypatch.setenv("PATH", "")
-    with pytest.raises(InputError, match=told) as error, open_executor(Where(**words)):
+    with pytest.raises(InputError, match=stated) as error, open_executor(Where(**words)):
         pass
     assert "\n" not in str(error.value)
 
@@ -354,8 +354,8 @@ def test_without_the_extra_one_line_tells_how_to_install_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(errors, "find_spec", lambda name: None)
-    told = r"--cluster needs distributed \(expected pip install 'femubench\[cluster\]'\)"
-    with pytest.raises(InputError, match=told), open_executor(Where(cluster="local:2")):
+    stated = r"--cluster needs distributed \(expected pip install 'femubench\[cluster\]'\)"
+    with pytest.raises(InputError, match=stated), open_executor(Where(cluster="local:2")):
         pass
 
 

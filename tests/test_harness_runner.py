@@ -142,15 +142,15 @@ def test_progress_counts_every_job_once(everything: dict[str, Any]) -> None:
 def test_a_run_that_goes_on_tells_of_what_is_to_be_done_alone(
     everything: dict[str, Any], tmp_path: Path
 ) -> None:
-    store, told = Store(tmp_path), list[Advance]()
+    store, stated = Store(tmp_path), list[Advance]()
     options: dict[str, Any] = {"jobs": 1, "store": store, "overwrite": "missing"}
     run_jobs([everything["case"]], [toys.Unchanged()], **options)
     both = [toys.Unchanged(), toys.Softer()]
     plan = Plan([everything["case"]], both, RunOptions(overwrite="missing"))
-    run = plan.run(LocalProcesses(1), Receivers(store, advance=told.append))
+    run = plan.run(LocalProcesses(1), Receivers(store, advance=stated.append))
     assert len(run.results) == 2
-    assert [(advance.done, advance.total) for advance in told] == [(0, 1), (1, 1)]
-    assert [advance.left for advance in told] == [None, 0.0]
+    assert [(advance.done, advance.total) for advance in stated] == [(0, 1), (1, 1)]
+    assert [advance.left for advance in stated] == [None, 0.0]
 
 
 def test_the_store_has_what_the_run_returned(everything: dict[str, Any]) -> None:

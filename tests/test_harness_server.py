@@ -36,8 +36,8 @@ def test_workers_start_with_what_comes_along_and_with_nothing_of_strangers() -> 
         modules = set(answer(pool))
     assert set(own_plugins()) <= modules
     assert {"scipy.linalg", "femubench.core.score.scoring"} <= modules
-    strangers = {toys.__name__, "pytest", "matplotlib", "pandas", "femubench.core.run.runner"}
-    assert not strangers & modules
+    third_parties = {toys.__name__, "pytest", "matplotlib", "pandas", "femubench.core.run.runner"}
+    assert not third_parties & modules
 
 
 def test_a_server_of_an_older_source_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:

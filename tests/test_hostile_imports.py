@@ -201,7 +201,7 @@ def test_the_list_shows_what_each_did_to_itself_alone(hostile: Path, tmp_path: P
 @pytest.mark.slow(20)
 def test_a_run_of_others_is_as_without_them(hostile: Path, tmp_path: Path) -> None:
     found = []
-    for name, site in (("plain", None), ("beside", hostile)):
+    for name, site in (("plain", None), ("companions", hostile)):
         file = tmp_path / f"{name}.json"
         words = ("run", "frame", "-s", "unchanged", "-s", "baruch", "--quiet", "--json", str(file))
         code, _, said, modules = bench(
@@ -289,7 +289,7 @@ class Effect:
     def extend(self, model, place, values): return model
 
 class Reader:
-    name = "stranger reader"
+    name = "third party reader"
     suffixes = (".strange",)
     def read_matrix(self, path): raise InputError("no matrix", file=path)
     def read_modes(self, path): raise InputError("no modes", file=path)
@@ -440,7 +440,7 @@ def test_faults_of_folders_and_reports_are_told(fine: Path, tmp_path: Path) -> N
 def test_an_effect_and_a_reader_are_imported_by_who_uses_them(fine: Path) -> None:
     plugins = load_plugins()
     assert "stranger-effect" in plugins.effects
-    reader: Any = next(r for r in plugins.readers.values() if r.name == "stranger reader")
+    reader: Any = next(r for r in plugins.readers.values() if r.name == "third party reader")
     assert hasattr(reader, "read_nodes")
     assert not hasattr(reader, "read_model")
     assert MODULE not in sys.modules
@@ -456,7 +456,7 @@ HOOKED = ("strategies", "scenarios", "effects", "faults", "readers", "reporters"
 FORGED: Mapping[str, tuple[object, str]] = {
     "no object": ([1], "its answer is no JSON object"),
     "no offers": ({"broken": [], "loaded": True}, "its description is none: 'offers'"),
-    "numbers": ({"broken": 3, "offers": {}}, "its description is none: faults was told as int"),
+    "numbers": ({"broken": 3, "offers": {}}, "its description is none: faults was given as int"),
     "no fault": ({"fault": 3}, "its answer is no fault"),
     "half a fault": ({"fault": ["ValueError"]}, "its answer is no fault"),
 }
@@ -466,8 +466,8 @@ FORGED: Mapping[str, tuple[object, str]] = {
 def test_a_forged_description_is_one_line(
     name: str, fine: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told, says = FORGED[name]
-    forged = apart._read(Ending("answer", json.dumps(told).encode()))
+    stated, says = FORGED[name]
+    forged = apart._read(Ending("answer", json.dumps(stated).encode()))
     monkeypatch.setattr(apart, "ask", lambda questions: [forged for _ in questions])
     loader._known.clear()
     (fault,) = [one for one in load_plugins().broken if one.plugin == "fine"]
@@ -478,13 +478,13 @@ def test_a_forged_description_is_one_line(
 @pytest.mark.parametrize(
     ("key", "value", "says"),
     [
-        ("name", 3, "name was told as int, not str"),
+        ("name", 3, "name was given as int, not str"),
         ("name", "two words", "is not one word"),
         ("citation", "", "citation is missing"),
         ("needs", ["everything"], "needs 'everything' is unknown"),
         ("options", {"x": [1]}, "option 'x' is no plain value"),
-        ("options", None, "options was told as NoneType, not dict"),
-        ("doc", 1, "the docstring was told as int, not str"),
+        ("options", None, "options was given as NoneType, not dict"),
+        ("doc", 1, "the docstring was given as int, not str"),
     ],
 )
 def test_what_a_description_says_is_checked(
@@ -580,7 +580,7 @@ def test_a_description_is_made_in_a_sandbox(
     held_out = home / "modes.csv"
     held_out.write_text("mode,frequency\n4,123.4\n")
     monkeypatch.setenv("HOME", str(home))
-    monkeypatch.setenv("SECRET", "told")
+    monkeypatch.setenv("SECRET", "stated")
     monkeypatch.syspath_prepend(site)
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
@@ -588,14 +588,14 @@ def test_a_description_is_made_in_a_sandbox(
         origin = ["curious", "curious_hostile", "curious 1.0"]
         question = {"do": loader.DESCRIBE, "origin": origin}
         (inside,) = apart.ask([{**question, "walled": True}], 20.0)
-        (told,) = inside["offers"]["strategies"]
-        assert told["citation"] == BARRED
+        (stated,) = inside["offers"]["strategies"]
+        assert stated["citation"] == BARRED
         assert sorted(path.name for path in home.iterdir()) == ["modes.csv"]
         # The same plugin, asked for what may need files, could.
         (outside,) = apart.ask([question], 20.0)
-        (told,) = outside["offers"]["strategies"]
-        assert "123.4" in told["citation"]
-        assert told["citation"].endswith("|connected|None")
+        (stated,) = outside["offers"]["strategies"]
+        assert "123.4" in stated["citation"]
+        assert stated["citation"].endswith("|connected|None")
     assert daemons() == []
     assert load_plugins().strategies["curious"].citation == BARRED
 
@@ -636,8 +636,8 @@ def test_entry_points_that_are_none_cost_their_plugin_alone(tmp_path: Path) -> N
 def test_a_plugin_with_many_faults_tells_of_the_first(
     fine: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told = {"loaded": True, "broken": [], "offers": dict.fromkeys(HOOKED, [3] * 10_000)}
-    monkeypatch.setattr(apart, "ask", lambda questions: [told for _ in questions])
+    stated = {"loaded": True, "broken": [], "offers": dict.fromkeys(HOOKED, [3] * 10_000)}
+    monkeypatch.setattr(apart, "ask", lambda questions: [stated for _ in questions])
     loader._known.clear()
     faults = [one for one in load_plugins().broken if one.plugin == "fine"]
     loader._known.clear()

@@ -32,7 +32,7 @@ def chain(folder: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def universal(folder: Path, length: float = 1e3, count: int = 6, **nodes: np.ndarray) -> Path:
-    """Write a test of the chain, in mm unless told, its axis along the test's y, 3 mm beside it."""
+    """Write a test of the chain, in mm unless stated, its axis along the test's y, 3 mm next to it."""
     hertz, shapes = chain(folder)
     zero, x = np.zeros(SPANS), 0.2 * np.arange(1.0, SPANS + 1.0)
     place = {"x": zero + 0.003 * length, "y": length * x, "z": zero} | nodes
@@ -70,12 +70,12 @@ def test_folder_runs_and_says_what_was_done(tmp_path: Path) -> None:
     universal(tmp_path)
     done = init(tmp_path, "--frame", "y,-x,z")
     assert done.exit_code == 0, done.output
-    told = " ".join(done.output.split())
-    assert "coordinates were taken in mm" in told
-    assert "along x, y, z and has a mass of" in told
-    assert "8 of the 8 sensors of test.uff were moved" in told
-    assert told.count("1.000") == 6  # MAC
-    assert told.count("held out") == 2
+    stated = " ".join(done.output.split())
+    assert "coordinates were taken in mm" in stated
+    assert "along x, y, z and has a mass of" in stated
+    assert "8 of the 8 sensors of test.uff were moved" in stated
+    assert stated.count("1.000") == 6  # MAC
+    assert stated.count("held out") == 2
     folder = tmp_path / "case"
     assert {path.name for path in folder.iterdir()} == {
         *("K.mtx", "M.mtx", "dofs.csv", "test.uff", "case.toml", "matches.csv", "matches.png"),

@@ -1,4 +1,4 @@
-"""femubench as strangers get it: clone, wheel, sdist, install by link, clone without links.
+"""femubench as third parties get it: clone, wheel, sdist, install by link, clone without links.
 
 Environments are virtual ones with links to the installed dependencies, so that nothing is fetched.
 """

@@ -70,10 +70,10 @@ def test_a_polar_moment_for_a_torsion_constant_is_found(ladder: FrameBuilder) ->
     warning = of_effect(look(model, measured(model)), "torsion-constant")
     assert warning.where == "all"
     tube = rectangular_tube(0.0254, 0.0254, 0.00238)
-    mended = frequencies(with_section(frame, tube), 5) / frequencies(frame, 5) - 1.0
+    repaired = frequencies(with_section(frame, tube), 5) / frequencies(frame, 5) - 1.0
     assert [mode for mode, _ in warning.changes] == [1, 2, 3, 4, 5]
-    np.testing.assert_allclose([p for _, p in warning.changes], 100.0 * mended, rtol=1e-9)
-    assert min(mended) < -0.1  # 0.113 at the first mode
+    np.testing.assert_allclose([p for _, p in warning.changes], 100.0 * repaired, rtol=1e-9)
+    assert min(repaired) < -0.1  # 0.113 at the first mode
 
 
 def test_one_wrong_section_among_others_is_named_by_its_members(ladder: FrameBuilder) -> None:

@@ -50,8 +50,8 @@ def read(tmp_path: Path, reader: Reader, keys: str = "") -> Case:
 
 
 def test_sensors_beside_the_structure_are_moved_and_said(tmp_path: Path) -> None:
-    beside = PLACES + np.array([0.0, 0.004, 0.0])
-    case = read(tmp_path, Reader(beside))
+    companions = PLACES + np.array([0.0, 0.004, 0.0])
+    case = read(tmp_path, Reader(companions))
     np.testing.assert_allclose(case.measurement.sensors.xyz, PLACES, atol=1e-12)
     assert [(m.sensor, m.place) for m in case.matches] == [
         ("a", "B"), ("b", "left@0.5"), ("c", "girder@0.5"), ("d", "right@0.5"),
@@ -67,12 +67,12 @@ def test_sensors_beside_the_structure_are_moved_and_said(tmp_path: Path) -> None
 
 
 def test_tolerance_is_a_share_of_the_structure(tmp_path: Path) -> None:
-    beside = PLACES + np.array([0.0, 0.03, 0.0])
+    companions = PLACES + np.array([0.0, 0.03, 0.0])
     with pytest.raises(
         InputError, match=r"'a' at .* 0.03 m off the structure, nearest B .*0.0192 m"
     ):
-        read(tmp_path, Reader(beside))
-    assert len(read(tmp_path, Reader(beside), "tolerance = 0.02").matches) == 4
+        read(tmp_path, Reader(companions))
+    assert len(read(tmp_path, Reader(companions), "tolerance = 0.02").matches) == 4
     with pytest.raises(InputError, match="off the structure"):
         read(tmp_path, Reader(PLACES + np.array([0.0, 0.001, 0.0])), "tolerance = 0.0")
 

@@ -113,7 +113,7 @@ def test_names_that_are_not_there(tmp_path: Path) -> None:
 def test_the_test_of_a_real_bridge() -> None:
     path = Path(__file__).parents[2] / "shared" / "data" / "bridge" / "ExpModeInfo_FEM.mat"
     if not path.exists():
-        pytest.skip("the footbridge is not beside the repository")
+        pytest.skip("the footbridge is not next to the repository")
     found = MatlabReader().read_modes(path)
     np.testing.assert_allclose(found.frequencies, [4.063, 4.550, 6.823, 8.653, 11.498], atol=1e-3)
     np.testing.assert_allclose(found.frequency_std, [0.03, 0.02, 0.04, 0.07, 0.23], atol=6e-3)

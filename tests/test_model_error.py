@@ -1,4 +1,4 @@
-"""What a beam model gets wrong: sensitivities of its classes, scales, prediction beside it."""
+"""What a beam model gets wrong: sensitivities of its classes, scales, prediction next to it."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def slopes(problem: Problem) -> dict[str, FloatArray]:
 
 
 def raw(frame: Frame) -> FloatArray:
-    """Return the residuals of the test beside another frame."""
+    """Return the residuals of the test next to another frame."""
     model = Model.of(frame)
     return state_at(problem_of(model, TEST, ()), (), NOTHING).raw
 
@@ -139,7 +139,7 @@ def test_a_known_reference_conditions_what_is_to_come() -> None:
 def drawn(
     problem: Problem, slopes: dict[str, FloatArray], rng: np.random.Generator, size: float
 ) -> tuple[State, FloatArray]:
-    """Return the nominal model beside data with model error in some classes, and that error."""
+    """Return the nominal model next to data with model error in some classes, and that error."""
     error = np.zeros(len(problem.data))
     for name in ("element stiffness", "flexibility of joint types", "mass of joints"):
         columns = slopes[name]

@@ -401,19 +401,19 @@ def fresh_plates(folder: Path) -> Path:
 
 @pytest.mark.slow(20)
 def test_five_commands_lead_from_a_job_to_a_ranking(tmp_path: Path) -> None:
-    told = run_documented(fresh_plates(tmp_path), last=" -s unchanged -s berman --nominal drawn")
+    stated = run_documented(fresh_plates(tmp_path), last=" -s unchanged -s berman --nominal drawn")
     case = femubench.read_case(tmp_path / "plates" / "case", readers=READERS)
     assert list(case.model.groups) == ["left", "right"]
     assert len(case.measurement.sensors) == 90
     assert np.ptp(case.model.dofs.xyz, axis=0) == pytest.approx([0.4, 0.06, 0.013])
-    ranked = re.findall(r"^ *(\d+) +(\S+)", told, re.MULTILINE)
+    ranked = re.findall(r"^ *(\d+) +(\S+)", stated, re.MULTILINE)
     assert ranked[:2] == [("1", "berman"), ("2", "unchanged")]
 
 
 @pytest.mark.nightly
 def test_five_commands_rank_all_strategies(tmp_path: Path) -> None:
-    told = run_documented(fresh_plates(tmp_path))
-    assert "diagnosed" in told.splitlines()[2]
+    stated = run_documented(fresh_plates(tmp_path))
+    assert "diagnosed" in stated.splitlines()[2]
 
 
 _CASE = """\

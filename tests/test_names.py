@@ -15,7 +15,7 @@ SUFFIXES = (".py", ".js", ".html", ".jinja")
 ALLOWED = {
     # kind of model, a method, axes of a test
     "frame": r"kind\b|'frame' or 'matrices'|`parameters` and `frame`|axes",
-    "density": r"rhoA|\"E\"",  # a quantity of elements, beside the others
+    "density": r"rhoA|\"E\"",  # a quantity of elements, next to the others
     # likewise, and a symbol in drawings
     "spring": r"quantity|properties|lookup|weights|name|property|rigid|: \(\)|counted|marker|stiff"
     r"|symbol|\"mass\"|\"N/m\"",
@@ -24,7 +24,7 @@ ALLOWED = {
     # the model with handbook values, and where a value of a cause comes from
     "textbook": r"[nN]ominal|handbook|record|: \[|_CAUSE_COLUMNS|source =|start|yardstick|both"
     r"|item\.get",
-    "physical": r"\"unphysical\"",  # a label beside its contrary
+    "physical": r"\"unphysical\"",  # a label next to its contrary
 }
 
 
@@ -48,7 +48,7 @@ def found_in(text: str, names: set[str]) -> Iterator[tuple[int, str]]:
 def test_core_and_reports_know_no_plugin_by_name() -> None:
     names = names_of(load_plugins())
     assert len(names) > 40
-    # What `bench plugins new` writes is a stranger's, who may name what to compare with.
+    # What `bench plugins new` writes is a third party's, who may name what to compare with.
     written = ROOT / "core" / "library" / "templates"
     files = [p for room in ("core", "reports") for p in (ROOT / room).rglob("*")]
     files = [path for path in files if path.parent != written and path.parent.name != "vendor"]

@@ -15,13 +15,13 @@ from test_peer import opensees_environment
 import femubench
 from femubench import fem
 
-Told = tuple[dict[str, Any], Path]
+OnAdvance = tuple[dict[str, Any], Path]
 
 
 @pytest.fixture(scope="module")
-def told(tmp_path_factory: pytest.TempPathFactory) -> Told:
+def stated(tmp_path_factory: pytest.TempPathFactory) -> OnAdvance:
     """Return what `opensees_models.py` says, and the folder with the matrices of one model."""
-    output = tmp_path_factory.mktemp("models") / "told.json"
+    output = tmp_path_factory.mktemp("models") / "stated.json"
     script = Path(__file__).with_name("opensees_models.py")
     subprocess.run(
         [sys.executable, str(script), str(output)],
@@ -33,16 +33,16 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> Told:
 
 
 @pytest.mark.parametrize("name", ["bent", "loaded", "floor", "plate"])
-def test_frequencies_are_those_of_opensees(told: Told, name: str) -> None:
-    model = told[0][name]
+def test_frequencies_are_those_of_opensees(stated: OnAdvance, name: str) -> None:
+    model = stated[0][name]
     count = len(model["own"])
     assert count >= 3
     np.testing.assert_allclose(model["read"][:count], model["own"], rtol=1e-9)
     assert model["moved"] == 0.0
 
 
-def test_rows_are_those_that_no_constraint_takes(told: Told) -> None:
-    labels = {name: model["labels"] for name, model in told[0].items() if name != "refused"}
+def test_rows_are_those_that_no_constraint_takes(stated: OnAdvance) -> None:
+    labels = {name: model["labels"] for name, model in stated[0].items() if name != "refused"}
     six = ("x", "y", "z", "rx", "ry", "rz")
     assert labels["bent"] == [f"{n}:{d}" for n in (2, 3) for d in six] + [f"5:{d}" for d in six[1:]]
     assert labels["loaded"][-4:] == ["4:rz", "5:x", "5:y", "5:rz"]
@@ -51,15 +51,15 @@ def test_rows_are_those_that_no_constraint_takes(told: Told) -> None:
     assert len(labels["plate"]) == 4 * 3 * 2 * 3
 
 
-def test_what_is_no_model_of_displacements_is_refused(told: Told) -> None:
-    nothing, still, wet = told[0]["refused"]
+def test_what_is_no_model_of_displacements_is_refused(stated: OnAdvance) -> None:
+    nothing, still, wet = stated[0]["refused"]
     assert nothing == "OpenSees has no model in memory"
     assert still == "nothing can move in the model of OpenSees"
     assert wet.startswith("node 2 has 4 degrees of freedom in 2 dimensions")
 
 
-def test_it_is_kept_as_the_files_of_a_case(told: Told, tmp_path: Path) -> None:
-    known, folder = told
+def test_it_is_kept_as_the_files_of_a_case(stated: OnAdvance, tmp_path: Path) -> None:
+    known, folder = stated
     (folder / "case.toml").write_text(
         '[case]\nname = "bent"\n[model]\nkind = "matrices"\nmass = "mass.mtx"\n'
         'stiffness = "stiffness.mtx"\ndofs = "dofs.csv"\n[measurement]\nmodes = "modes.csv"\n'

@@ -180,8 +180,8 @@ def test_stand_in_resonates_where_the_test_does(bench: Workbench) -> None:
 def test_resonances_and_antiresonances_are_where_the_curve_says(bench: Workbench) -> None:
     point = bundles(bench)[0].test
     for found, sign in ((point.resonances[:5], -1.0), (point.antiresonances[:5], 1.0)):
-        beside = np.stack([found * (1.0 - DAMPING), found, found * (1.0 + DAMPING)])
-        level = sign * np.array([point.level(row) for row in beside])
+        companions = np.stack([found * (1.0 - DAMPING), found, found * (1.0 + DAMPING)])
+        level = sign * np.array([point.level(row) for row in companions])
         assert (level[1] < level[0]).all()
         assert (level[1] < level[2]).all()
 

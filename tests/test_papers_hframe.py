@@ -323,7 +323,7 @@ def test_docs_count_the_cells_of_both_papers(done: Study) -> None:
     headline = rendering(studies, "terminal").partition("\n\n")[0]
     verdicts = [cell["verdict"] for cell in json.loads(rendering(studies, "json"))]
     assert headline.startswith(f"{verdicts.count('independent')} of {len(verdicts)} printed cells")
-    told = {int(number) for number in re.findall(r"\d+", headline)}
-    assert told == {len(verdicts), *map(verdicts.count, VERDICTS)}
+    as_stated = {int(number) for number in re.findall(r"\d+", headline)}
+    assert as_stated == {len(verdicts), *map(verdicts.count, VERDICTS)}
     for page in ("README.md", "docs/reproduce.md"):
         assert headline in text_of(page)

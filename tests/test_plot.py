@@ -263,8 +263,8 @@ class TestResiduals:
         assert (band.get_x(), band.get_width()) == (-2.0, 4.0)  # type: ignore[attr-defined]
         low, high = ax.get_xlim()
         assert low < -2.0 < 400.0 < high
-        beside = [t.get_text() for t in ax.child_axes[0].get_yticklabels()]
-        assert beside == ["-1.9 → +0.0", "+2.1 → +400.0", "– → –"]
+        companions = [t.get_text() for t in ax.child_axes[0].get_yticklabels()]
+        assert companions == ["-1.9 → +0.0", "+2.1 → +400.0", "– → –"]
 
     def test_shapes_are_root_mean_squares(self) -> None:
         (dot,) = plot.residual_dots(diagnosis_toys.made(), "shape")

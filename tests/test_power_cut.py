@@ -68,7 +68,7 @@ class Disk:
         """
         left.mkdir()
         for file in self.folder.iterdir():
-            if file.name.endswith("-shm"):  # whoever opens the log first makes it anew
+            if file.name.endswith("-shm"):  # anyone who opens the log first makes it anew
                 continue
             if file.name not in self.names and draw.random() < 0.5:
                 continue

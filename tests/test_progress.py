@@ -39,13 +39,13 @@ def result(case: str, strategy: str, seconds: float, seed: int = 0) -> JobResult
 
 
 def ran(
-    left: JobsLeft, clock: Clock, jobs: Sequence[JobResult], workers: int, besides: float = 0.0
+    left: JobsLeft, clock: Clock, jobs: Sequence[JobResult], workers: int, overhead: float = 0.0
 ) -> Iterator[tuple[float, Advance]]:
     """Yield the true time left after each job, and what is said; jobs begin in their order."""
     free, ends = [0.0] * workers, []
     for job in jobs:
         first = free.index(min(free))
-        free[first] += job.seconds + besides
+        free[first] += job.seconds + overhead
         ends.append((free[first], job))
     begin = clock.now
     for end, job in sorted(ends, key=lambda pair: pair[0]):
@@ -57,17 +57,17 @@ def pairs(jobs: Iterable[JobResult]) -> Iterator[tuple[str, str]]:
     return ((job.case, job.strategy) for job in jobs)
 
 
-@pytest.mark.parametrize("besides", [0.0, 3.0])
+@pytest.mark.parametrize("as well", [0.0, 3.0])
 @pytest.mark.parametrize("workers", [1, 2, 4])
-def test_steady_jobs(clock: Clock, workers: int, besides: float) -> None:
+def test_steady_jobs(clock: Clock, workers: int, overhead: float) -> None:
     """Right from the first round of all workers on."""
     jobs = [result(f"case{k}", "a", 5.0) for k in range(40)]
     left = JobsLeft(pairs(jobs), (), workers, clock)
-    said = list(ran(left, clock, jobs, workers, besides))
+    said = list(ran(left, clock, jobs, workers, overhead))
     assert [advance.done for _, advance in said] == list(range(1, 41))
     assert {advance.total for _, advance in said} == {40}
     for true, advance in said[workers - 1 :]:
-        assert advance.left == pytest.approx(true, abs=5.0 + besides if workers > 1 else 1e-6)
+        assert advance.left == pytest.approx(true, abs=5.0 + overhead if workers > 1 else 1e-6)
     assert said[-1][1].left == 0.0
 
 
@@ -114,7 +114,7 @@ def test_a_run_that_goes_on_counts_what_is_to_be_done(clock: Clock) -> None:
 
 def test_jobs_that_take_no_time_of_their_own(clock: Clock) -> None:
     jobs = [result("a", "unchanged", 0.0, seed) for seed in range(10)]
-    for true, advance in ran(JobsLeft(pairs(jobs), (), 1, clock), clock, jobs, 1, besides=2.0):
+    for true, advance in ran(JobsLeft(pairs(jobs), (), 1, clock), clock, jobs, 1, overhead=2.0):
         assert advance.left == pytest.approx(true)
 
 
@@ -247,17 +247,17 @@ def test_one_line_that_takes_itself_away(clock: Clock, monkeypatch: pytest.Monke
     )
     file = io.StringIO()
     console = Console(file=file, force_terminal=True, width=80)
-    with show_progress("[red]frame", console, clock) as told:
+    with show_progress("[red]frame", console, clock) as stated:
         clock.now += 65.0
-        told(Advance(3, 12, "single causes", 130.0, 5.0))
+        stated(Advance(3, 12, "single causes", 130.0, 5.0))
         (line,) = (line for line in screen(file.getvalue()) if line.strip())
         assert line.startswith("[red]frame: single causes ")
         assert re.search(r" 3/12 +0:01:05 0:02:10 left *$", line)
         assert len(line) <= 80
-        told(Advance(4, 12, "a name that is so long that it would never go into a line of these"))
+        stated(Advance(4, 12, "a name that is so long that it would never go into a line of these"))
         (line,) = (line for line in screen(file.getvalue()) if line.strip())
         assert re.search(r" 4/12 +0:01:05 -:--:-- left *$", line)
-        told(Advance(12, 12, "end", 0.0))
+        stated(Advance(12, 12, "end", 0.0))
     assert not "".join(screen(file.getvalue())).strip()
     console.print("after")
     assert [line for line in screen(file.getvalue()) if line.strip()] == ["after"]

@@ -1,4 +1,4 @@
-"""The promise that a model has given modes, as closely as its own rounding lets it be told."""
+"""The promise that a model has given modes, as closely as its own rounding lets it be stated."""
 
 from __future__ import annotations
 

@@ -561,18 +561,18 @@ def test_equal_leaders_are_no_news_of_each_other(data: Data, site: Site) -> None
 
 
 def test_pages_of_strategies_say_where_they_come_from(data: Data, site: Site) -> None:
-    told = {
+    stated = {
         "homepage": "https://example.org/?a=1&b=<2>".replace("<2>", "2"),
         "summary": "One & all", "author": "Ada <ada@example.org>", "doi": "10.1000/xyz",
     }  # fmt: skip
     made = json.loads(json.dumps(data))
-    made["meta"]["about"] = {"softer": told}
+    made["meta"]["about"] = {"softer": stated}
     made["meta"]["citations"] = {"softer": "Ada (1843), note G"}
     assert site.add(made).exit_code == 0
     item = site.strategy("softer")
-    assert item["about"] == told
+    assert item["about"] == stated
     page = Links((site.folder / item["page"]).read_text())
-    assert told["homepage"] in page.links
+    assert stated["homepage"] in page.links
     assert "https://doi.org/10.1000/xyz" in page.links
     for text in ("One & all", "Ada <ada@example.org>", "Ada (1843), note G"):
         assert text in page.text

@@ -28,7 +28,7 @@ def honest() -> Data:
     run = rank(["suite/bracket", "frame"], ["unchanged", "global"], twins=2, jobs=2)
     data: Data = json.loads(str(report(run, style="json")))
     data["meta"]["sandbox"] = "namespaces"
-    for result in (*data["results"], *data["beside"]):
+    for result in (*data["results"], *data["companions"]):
         result["provenance"]["sandbox"] = "namespaces"
     return data
 
@@ -87,7 +87,7 @@ def _other_nominal(data: Data) -> None:
 
 
 def _without(data: Data, **fields: str) -> None:
-    for key in ("results", "beside"):
+    for key in ("results", "companions"):
         kept = [r for r in data[key] if any(r[k] != v for k, v in fields.items())]
         data[key] = kept
 
@@ -126,7 +126,7 @@ def _unknown(data: Data) -> None:
 
 
 def _one_mode_of_a_twin(data: Data) -> None:
-    result = next(r for r in data["beside"] if r["case"] == "suite/bracket~1")
+    result = next(r for r in data["companions"] if r["case"] == "suite/bracket~1")
     result["higher"]["modes"][0]["measured_hz"] *= 1.01
 
 
@@ -147,7 +147,7 @@ def _spared(data: Data, **errors: float) -> None:
 def _new_plan(data: Data) -> None:
     """Leave a strategy out, and make the plan fit: what is left is a run of its own."""
     _without_strategy(data)
-    keys = [r["key"] for r in (*data["results"], *data["beside"])]
+    keys = [r["key"] for r in (*data["results"], *data["companions"])]
     data["meta"]["plan"] = plan_digest(keys)
 
 
@@ -155,10 +155,10 @@ EDITS: dict[str, tuple[Edit, str]] = {
     "no sandbox": (lambda d: d["meta"].pop("sandbox"), "meta.sandbox: the strategies ran without"),
     "a sandbox of another name": (lambda d: d["meta"].update(sandbox="none"), "meta.sandbox"),
     "one job without": (
-        lambda d: d["beside"][0]["provenance"].update(sandbox="none"),
+        lambda d: d["companions"][0]["provenance"].update(sandbox="none"),
         "meta.sandbox",
     ),
-    "no twins": (lambda d: (d["meta"].pop("twins"), d.pop("beside")), "meta.twins: it has no 2 tw"),
+    "no twins": (lambda d: (d["meta"].pop("twins"), d.pop("companions")), "meta.twins: it has no 2 tw"),
     "no twins in meta": (lambda d: d["meta"].pop("twins"), "meta.twins: it has no 2 tw"),
     "results on twins": (lambda d: _without(d, case="suite/bracket~2"), "results: 2 jobs are"),
     "one twin": (lambda d: d["meta"]["twins"].update(number=1), "meta.twins: it has no 2 tw"),
@@ -200,7 +200,7 @@ EDITS: dict[str, tuple[Edit, str]] = {
         "start_percent: not the errors of the drawn model",
     ),
     "yardstick": (lambda d: d["meta"].update(yardstick="drawn"), "meta.yardstick"),
-    "a job twice": (lambda d: d["beside"].append(d["beside"][0]), "results: 0 jobs are missing"),
+    "a job twice": (lambda d: d["companions"].append(d["companions"][0]), "results: 0 jobs are missing"),
 }  # fmt: skip
 
 
@@ -231,7 +231,7 @@ def test_who_was_not_applicable_is_taken_with_the_errors_of_the_drawn_model(
 
 
 def test_a_smaller_run_is_a_run(honest: Data, tmp_path: Path) -> None:
-    # Whoever makes a new plan of what is left says what a run of these alone would say.
+    # Anyone who makes a new plan of what is left says what a run of these alone would say.
     assert publish(tmp_path, edited(honest, _new_plan)).exit_code == 0
 
 

@@ -101,9 +101,9 @@ def test_sampling_has_the_density_of_the_covariance() -> None:
     std = STD / HERTZ
     own: Any = SimpleNamespace(measurement=measured(), data=(np.log(HERTZ), std, np.ones(3)))
     apart = np.array([[0.01, 0.02, -0.01], [0.0, 0.005, 0.02]])
-    besides = 0.01**2
-    found = Target._misfit(own, apart, np.tile(std**2 + besides, (2, 1)))
-    covariance = std[:, None] * CORRELATION * std + besides * np.eye(3)
+    overhead = 0.01**2
+    found = Target._misfit(own, apart, np.tile(std**2 + overhead, (2, 1)))
+    covariance = std[:, None] * CORRELATION * std + overhead * np.eye(3)
     expected = -2.0 * multivariate_normal(cov=covariance).logpdf(apart) - 3 * np.log(2 * np.pi)
     np.testing.assert_allclose(found, expected)
 

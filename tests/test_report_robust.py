@@ -65,7 +65,7 @@ def file_in(folder: Path) -> Path:
     return Store(folder).file_of(RUN_ID)
 
 
-def told(report: Report, folder: Path) -> list[str]:
+def stated(report: Report, folder: Path) -> list[str]:
     """Return the notes of the page."""
     result = report("-f", "html")
     assert result.exit_code == 0, result.output
@@ -76,7 +76,7 @@ def told(report: Report, folder: Path) -> list[str]:
 class TestDamage:
     def test_a_run_that_is_still_going(self, report: Report, folder: Path) -> None:
         edit(file_in(folder), "DELETE FROM records WHERE number > 11")
-        note = told(report, folder)[-1]
+        note = stated(report, folder)[-1]
         assert note.startswith(f"{GOING}; not run: ")
         assert note.endswith(f" and {len(RUN.results) - 15} more")
 
@@ -96,7 +96,7 @@ class TestDamage:
 
     def test_a_changed_record(self, report: Report, folder: Path) -> None:
         change_data(file_in(folder), '"ok"', '"oj"', "number = 5")
-        notes = told(report, folder)
+        notes = stated(report, folder)
         assert any(":5: damaged" in note and "left out" in note for note in notes)
         said = f"1 of {len(RUN.results)} jobs are missing and score as failures: "
         assert any(note.startswith(said) for note in notes)
@@ -106,11 +106,11 @@ class TestDamage:
         records = [*read_records(file, [])]
         records[4].data = re.sub(rb'("rms_percent":)[0-9.]+', rb'\1"much"', records[4].data)
         write_file(file, records)
-        assert any("rms_percent" in note and "left out" in note for note in told(report, folder))
+        assert any("rms_percent" in note and "left out" in note for note in stated(report, folder))
 
     def test_a_first_record_that_is_lost_leaves_the_run(self, report: Report, folder: Path) -> None:
         change_data(file_in(folder), "{", "[", "number = 1")
-        (note,) = told(report, folder)
+        (note,) = stated(report, folder)
         assert "damaged: record 1 is not as it was written" in note
         page = data_in((folder / f"{RUN_ID}.html").read_text(encoding="utf-8"))
         assert len(page["results"]) == len(RUN.results)
@@ -121,13 +121,13 @@ class TestDamage:
     ) -> None:
         change_data(file_in(folder), "{", "[", "number = 1")
         edit(file_in(folder), "DELETE FROM copies")
-        assert len([note for note in told(report, folder) if ":1: damaged" in note]) == 1
+        assert len([note for note in stated(report, folder) if ":1: damaged" in note]) == 1
         page = data_in((folder / f"{RUN_ID}.html").read_text(encoding="utf-8"))
         assert len(page["results"]) == len(RUN.results)
 
     def test_many_damaged_records_are_a_few_lines(self, report: Report, folder: Path) -> None:
         edit(file_in(folder), "UPDATE records SET checksum = 0 WHERE number BETWEEN 4 AND 20")
-        notes = told(report, folder)
+        notes = stated(report, folder)
         assert len(notes) == 5
         assert notes[3].endswith("14 more records were left out")
 

@@ -356,7 +356,7 @@ def test_a_lost_mode_counts_whole_after_a_design_change() -> None:
 class TestFinding:
     """The sentences on what a run shows."""
 
-    def told(self, run: Run) -> list[str]:
+    def stated(self, run: Run) -> list[str]:
         board = leaderboard(run).to_dict("records")
         return finding(run, board, tell_apart(run, [row["strategy"] for row in board]).tiers)
 
@@ -364,7 +364,7 @@ class TestFinding:
         run = synthetic_run(60, 12, failing=0.0)
         best, *others = leaderboard(run).to_dict("records")
         count = len(set(structures_of(run).values()) or run.meta["cases"])
-        headline, tier, *_ = self.told(run)
+        headline, tier, *_ = self.stated(run)
         assert headline.replace("\u2212", "-") == (
             f"{best['strategy']} leads: it takes away {100 * best['skill']:.0f} % of the nominal "
             f"models' error on unseen data (skill {best['skill']:.3f}, 95 % interval "
@@ -376,24 +376,24 @@ class TestFinding:
         assert tier.endswith(f" and {len(first) - 5} more; {60 - len(first)} of 60 are below.")
 
     def test_no_improvement_is_told_as_such(self) -> None:
-        headline, *_ = self.told(run_of(WORSE))
+        headline, *_ = self.stated(run_of(WORSE))
         assert headline.startswith("No strategy improves on the nominal models on unseen data")
         assert "\u2212" in headline
 
     def test_equal_skills_share_the_lead(self) -> None:
         twins = [result(name, 0.1) for name in ("a", "b")]
-        assert self.told(run_of(*twins))[0].startswith("a and b share the first rank: each takes")
+        assert self.stated(run_of(*twins))[0].startswith("a and b share the first rank: each takes")
 
     def test_few_structures_or_no_model(self) -> None:
-        alone = self.told(run_of(GOOD))
+        alone = self.stated(run_of(GOOD))
         assert len(alone) == 1
         assert "interval" not in alone[0]
-        assert "Whether the others differ from it is not tested." in self.told(RUN)
-        assert self.told(run_of(FAILED)) == ["No strategy gave a possible model."]
-        assert self.told(Run({}, ())) == []
+        assert "Whether the others differ from it is not tested." in self.stated(RUN)
+        assert self.stated(run_of(FAILED)) == ["No strategy gave a possible model."]
+        assert self.stated(Run({}, ())) == []
 
     def test_stands_in_the_markdown(self) -> None:
-        headline = self.told(RUN)[0]
+        headline = self.stated(RUN)[0]
         assert escape(headline) in MarkdownReporter().render(RUN)
 
 

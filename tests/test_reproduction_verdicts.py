@@ -17,7 +17,7 @@ SEARCHED = Ground("searched", "found by trying", 12)
 FITTED = Ground("fitted", "the length is fitted to it")
 GIVEN = Ground("input", "the paper was given it")
 UNSEEN = Ground("cannot-be-checked", "needs shapes that are not printed")
-MISPRINT = Ground("misprint", "the columns beside it give another figure")
+MISPRINT = Ground("misprint", "the columns next to it give another figure")
 AGREEMENTS = (FREE, STATED, SEARCHED, FITTED, GIVEN, UNSEEN)
 
 

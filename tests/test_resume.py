@@ -265,13 +265,13 @@ def test_differences_between_a_run_and_its_repetition_are_told() -> None:
     block = replace(first.blocks["used"], rms_percent=7.0)
     changed = replace(first, blocks={**first.blocks, "used": block})
     failed = replace(second, status="failed")
-    told = result_differences(run, replace(run, results=(changed, failed)))
-    assert len(told) == 2
-    assert told[0].startswith(
+    stated = result_differences(run, replace(run, results=(changed, failed)))
+    assert len(stated) == 2
+    assert stated[0].startswith(
         "corner, softer" if second.strategy < first.strategy else "corner, un"
     )
-    assert any("then, 7.0 % now" in line for line in told)
-    assert any("ok then, failed now" in line for line in told)
+    assert any("then, 7.0 % now" in line for line in stated)
+    assert any("ok then, failed now" in line for line in stated)
     assert "not run now" in result_differences(run, replace(run, results=(first,)))[0]
     assert environment_differences(run.meta, run.meta) == []
     other = {**run.meta, "versions": {**run.meta["versions"], "numpy": "1.0"}}

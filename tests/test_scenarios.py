@@ -112,8 +112,8 @@ def test_cases_of_one_structure_say_so() -> None:
     """All of them, so that no built-in case counts twice as evidence."""
     shared: dict[str, set[str]] = {}
     for file in HERE.glob("**/case.toml"):
-        told = tomllib.loads(file.read_text(encoding="utf-8"))["case"]
-        shared.setdefault(told.get("structure", told["name"]), set()).add(told["name"])
+        stated = tomllib.loads(file.read_text(encoding="utf-8"))["case"]
+        shared.setdefault(stated.get("structure", stated["name"]), set()).add(stated["name"])
     assert {label: names for label, names in shared.items() if len(names) > 1} == {
         "ladder": {
             *("frame", "frame-solid", "frame-beam", "frame-beam-asymmetric"),

@@ -59,7 +59,7 @@ def test_other_values_last_as_long_as_their_block() -> None:
         raise KeyError
     assert settings.sure_fault == Settings().sure_fault
     assert settings_table()["sure_fault"] == Setting(
-        0.9, "probability", "decision", "from which data or input are mended"
+        0.9, "probability", "decision", "from which data or input are corrected"
     )
 
 

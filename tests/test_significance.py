@@ -237,13 +237,13 @@ class TestScreen:
         found = re.findall(rf"(\w+) +{number} to {number} +1 ", text)
         assert {name for name, *_ in found} == {"first", "second"}
         assert all(float(low) < float(skills[name]) < float(high) for name, low, high in found)
-        assert "1 of 3 are below" in said.partition("Beside it in tier 1, not shown to differ")[2]
+        assert "1 of 3 are below" in said.partition("Next to it in tier 1, not shown to differ")[2]
 
     def test_says_why_nothing_is_tested(self) -> None:
         scores = {"first": np.full((20, 3, 9), 0.1), "second": np.full((20, 3, 9), 5.0)}
         text = TerminalReporter().render(run_of(scores, dict.fromkeys(TWENTY, "one")))
-        told = "Ranks are not tested: no two strategies differ on 6 structures"
-        assert told in " ".join(text.split())
+        stated = "Ranks are not tested: no two strategies differ on 6 structures"
+        assert stated in " ".join(text.split())
         assert "tier 1" not in text
 
 

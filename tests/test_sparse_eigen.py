@@ -83,7 +83,7 @@ def test_low_rank_changes_with_negative_eigenvalues(ladder: FrameBuilder) -> Non
     updated = replace(model, stiffness_change=LowRank(basis, core), mass_change=mass)
     found = agree(updated, 12)
     assert (found < -1.0).sum() == 2
-    assert len(found) == 14  # the negative ones come besides
+    assert len(found) == 14  # the negative ones come as well
 
 
 def test_indefinite_sparse_stiffness(ladder: FrameBuilder) -> None:

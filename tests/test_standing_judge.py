@@ -75,7 +75,7 @@ def process(judges: Judges[int]) -> int:
 
 
 def hostile() -> Iterator[bytes]:
-    """Yield answers that want to change something in whoever reads them."""
+    """Yield answers that want to change something in anyone who reads them."""
     model, size = CASE.model, CASE.model.size
     spoilt = model.stiffness.copy()
     spoilt.data[:] = np.nan
@@ -130,7 +130,7 @@ def test_a_judge_that_hangs_is_ended_in_time_and_replaced(judges: Judges[int]) -
     fresh = result(judges, GOOD)
     stopped = process(judges)
     os.kill(stopped, signal.SIGSTOP)
-    # More than a pipe holds: whoever sends it must not wait for who does not read.
+    # More than a pipe holds: anyone who sends it must not wait for who does not read.
     large = GOOD + bytes(2**20)
     assert judges.start(0, b"corner", verdict(large), replace(LIMITS, seconds=1.0)) is None
     ending = ended(judges)

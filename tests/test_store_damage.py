@@ -372,6 +372,6 @@ def test_a_comparison_tells_what_is_damaged(tmp_path: Path) -> None:
     file = store.file_of(RUN)
     change_data(file, "0.99", "0.98")
     words = ["compare", RUN, "20260102T000000Z-bbbbbb", "--store", str(store.folder)]
-    told = CliRunner().invoke(bench, words)
-    assert told.exit_code == 0, told.output
-    assert f"{file.name}:2:damaged" in "".join(told.output.split())
+    stated = CliRunner().invoke(bench, words)
+    assert stated.exit_code == 0, stated.output
+    assert f"{file.name}:2:damaged" in "".join(stated.output.split())

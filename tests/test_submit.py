@@ -64,7 +64,7 @@ class Repository:
         assert set(inputs) <= set(action["inputs"])
         given = {name: entry.get("default", "") for name, entry in action["inputs"].items()}
         given |= {"install": "", "cases": CASE, "strategy": "fitted", **inputs}
-        summary, failed, told = self.folder / "summary.md", 0, ""
+        summary, failed, stated = self.folder / "summary.md", 0, ""
         summary.unlink(missing_ok=True)
         path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
         ours = {key: text for key, text in os.environ.items() if not key.startswith("PYTEST")}
@@ -84,18 +84,18 @@ class Repository:
             done = subprocess.run(
                 script, env=ours | env, cwd=self.folder, capture_output=True, text=True, timeout=300
             )
-            failed, told = failed or done.returncode, told + done.stdout + done.stderr
+            failed, stated = failed or done.returncode, stated + done.stdout + done.stderr
         text = summary.read_text(encoding="utf-8") if summary.exists() else ""
-        return failed, told, text
+        return failed, stated, text
 
 
 @pytest.fixture(scope="module")
 def repository(tmp_path_factory: pytest.TempPathFactory) -> Repository:
     """Return a repository whose first run is committed as ``baseline.json``."""
     made = Repository(tmp_path_factory.mktemp("repository"))
-    code, told, summary = made.act(output="baseline.json")
-    assert code == 0, told
-    assert told.splitlines()[-1] == "accepted: baseline.json"
+    code, stated, summary = made.act(output="baseline.json")
+    assert code == 0, stated
+    assert stated.splitlines()[-1] == "accepted: baseline.json"
     assert summary.startswith("# Submission: accepted\n")
     assert "no baseline: commit the result file" in summary
     assert "| fitted |" in summary
@@ -127,21 +127,21 @@ def test_the_result_file_goes_onto_a_leaderboard(repository: Repository, tmp_pat
 
 def test_as_good_as_before_is_accepted(repository: Repository) -> None:
     repository.becomes(f"{FACTOR} * (1.0 + 1e-6)", "0.1.1")
-    code, told, summary = repository.act(baseline="baseline.json")
-    assert code == 0, told
+    code, stated, summary = repository.act(baseline="baseline.json")
+    assert code == 0, stated
     assert "# B is not worse than A" in summary
     assert result_of(repository)["results"][0]["provenance"]["strategy"].startswith("0.1.1+")
 
 
 def test_a_regression_fails_with_one_line_and_keeps_the_file(repository: Repository) -> None:
     repository.becomes("factor = 4.0 * float(ratio.sum() / (ratio @ ratio))", "0.2.0")
-    code, told, summary = repository.act(baseline="baseline.json", output="worse.json")
+    code, stated, summary = repository.act(baseline="baseline.json", output="worse.json")
     assert code == 1
-    (line,) = [line for line in told.splitlines() if "worse than the baseline" in line]
+    (line,) = [line for line in stated.splitlines() if "worse than the baseline" in line]
     assert re.fullmatch(
         r"bench: fitted is worse than the baseline: unseen, as a ratio: \S+, allowed 1.01", line
     )
-    assert "not accepted: worse.json" in told.splitlines()
+    assert "not accepted: worse.json" in stated.splitlines()
     assert summary.startswith("# Submission: not accepted\n- fitted is worse than the baseline")
     assert "# B is worse than A" in summary
     assert len(result_of(repository, "worse.json")["results"]) == 1
@@ -151,10 +151,10 @@ def test_a_regression_fails_with_one_line_and_keeps_the_file(repository: Reposit
 
 def test_a_crash_fails_and_is_named(repository: Repository) -> None:
     repository.becomes('__import__("os").abort()', "0.3.0")
-    code, told, summary = repository.act(baseline="baseline.json")
+    code, stated, summary = repository.act(baseline="baseline.json")
     assert code == 1
-    assert f"bench: fitted crashed on {CASE}" in told
-    assert "bench: fitted breaks the rule " in told
+    assert f"bench: fitted crashed on {CASE}" in stated
+    assert "bench: fitted breaks the rule " in stated
     assert f"- fitted crashed on {CASE}" in summary
     assert result_of(repository)["results"][0]["status"] == "crashed"
 
@@ -163,28 +163,28 @@ def test_failing_tests_of_the_repository_fail_the_job(repository: Repository) ->
     repository.becomes(FACTOR)
     own = repository.folder / "own_test.py"
     own.write_text("def test_own():\n    assert False, 'a test of the repository'\n")
-    code, told, _ = repository.act(tests="own_test.py -p no:cacheprovider")
+    code, stated, _ = repository.act(tests="own_test.py -p no:cacheprovider")
     assert code == 1
-    assert "a test of the repository" in told
+    assert "a test of the repository" in stated
     # The result file is made all the same.
-    assert told.splitlines()[-1] == "accepted: submission.json"
+    assert stated.splitlines()[-1] == "accepted: submission.json"
 
 
 @pytest.mark.parametrize("name", ["*", "sr?"])
 def test_names_are_no_patterns_of_files(repository: Repository, name: str) -> None:
     assert sorted(repository.folder.glob(name))
-    code, told, _ = repository.act(strategy=f"{name}\nother", tests=f"--co -q {name}")
+    code, stated, _ = repository.act(strategy=f"{name}\nother", tests=f"--co -q {name}")
     assert code != 0
-    assert f"no strategy {name!r}" in told, told
-    assert f"file or directory not found: {name}\n" in told, told
+    assert f"no strategy {name!r}" in stated, stated
+    assert f"file or directory not found: {name}\n" in stated, stated
 
 
 def test_what_is_wrong_before_the_run_is_one_line(repository: Repository) -> None:
-    code, told, summary = repository.act(strategy="fited")
+    code, stated, summary = repository.act(strategy="fited")
     assert code == 2
-    assert "fited" in told
-    assert "Traceback" not in told
+    assert "fited" in stated
+    assert "Traceback" not in stated
     assert summary == ""
-    code, told, _ = repository.act(baseline="none.json")
+    code, stated, _ = repository.act(baseline="none.json")
     assert code == 2
-    assert "none.json" in told
+    assert "none.json" in stated

@@ -1,4 +1,4 @@
-"""The committed suite: what every structure must hold, whoever wrote it."""
+"""The committed suite: what every structure must hold, anyone who wrote it."""
 
 from __future__ import annotations
 

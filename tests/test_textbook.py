@@ -122,7 +122,7 @@ import femubench
 
 class Lead:
     name = "lead-filling"
-    citation = "A. Stranger (2026), Lead."
+    citation = "A. Third party (2026), Lead."
 
     def places(self, model):
         return ["all"]
@@ -157,7 +157,7 @@ def test_the_screen_says_where_all_start_from(tmp_path: Path) -> None:
     assert "All start from the models of the textbooks." in " ".join(shown.output.split())
     locked = CliRunner().invoke(bench, ["run", "--locked", "x", "--nominal", "textbook"])
     assert locked.exit_code == 2
-    assert "nominal cannot be given beside it" in locked.output
+    assert "nominal cannot be given next to it" in locked.output
 
 
 def test_who_is_not_applicable_scores_as_who_leaves_the_model_as_it_is(tmp_path: Path) -> None:
@@ -166,11 +166,11 @@ def test_who_is_not_applicable_scores_as_who_leaves_the_model_as_it_is(tmp_path:
     run = femubench.rank(["frame", "suite/bracket"], both, jobs=1, store=tmp_path)
     own = {(r.case, r.strategy, r.nominal): r for r in run.results}
     for case, _, nominal in own:
-        found, beside = own[case, "declining", nominal], own[case, "unchanged", nominal]
+        found, companions = own[case, "declining", nominal], own[case, "unchanged", nominal]
         assert (found.status, found.blocks) == ("not-applicable", {})
-        assert found.score == pytest.approx(beside.score, rel=1e-9)
-        assert found.rank == beside.rank == 1
-        given = {name: block.rms_percent for name, block in beside.blocks.items()}
+        assert found.score == pytest.approx(companions.score, rel=1e-9)
+        assert found.rank == companions.rank == 1
+        given = {name: block.rms_percent for name, block in companions.blocks.items()}
         drawn = nominal == "drawn"
         assert found.start_percent == (pytest.approx(given, rel=1e-9) if drawn else {})
     assert own["frame", "declining", "textbook"].score == 1.0

@@ -317,7 +317,7 @@ def test_records_cut_off_are_left_out(tmp_path: Path) -> None:
 
 
 def test_a_fault_is_judged_by_the_faults_that_are_named(same: sweep.Same) -> None:
-    """Whatever is said of the structure beside it, which is told apart."""
+    """Whatever is said of the structure next to it, which is distinguished."""
     swapped = truth("data-fault", SWAP)
 
     def record(verdict: str, *sides: tuple[str, str]) -> dict[str, Any]:
@@ -337,5 +337,8 @@ def test_a_fault_is_judged_by_the_faults_that_are_named(same: sweep.Same) -> Non
         ("unknown", "unknown", record("unknown", cause)),
         ("other place", "none", record("named", ("sensors-swapped@sensor:1Z+5Z", "data"))),
     ]
-    for outcome, beside, found in cases:
-        assert (sweep.outcome(swapped, found, same), sweep.beside(found)) == (outcome, beside)
+    for outcome, companions, found in cases:
+        assert (sweep.outcome(swapped, found, same), sweep.companions(found)) == (
+            outcome,
+            companions,
+        )

@@ -47,10 +47,10 @@ def test_the_committed_cases_are_those_that_are_drawn() -> None:
     for name, draw in DRAWS.items():
         truth = read_truth(OPENSEES / name)
         assert (truth.kind, truth.structure, truth.seed) == (draw.kind, draw.plan.name, draw.seed)
-        for told, fault in zip(truth.causes, draw.faults, strict=True):
-            assert told.size == (None if fault.size is None else pytest.approx(fault.size, 1e-3))
+        for stated, fault in zip(truth.causes, draw.faults, strict=True):
+            assert stated.size == (None if fault.size is None else pytest.approx(fault.size, 1e-3))
             for word in ("what", "effect", "place", "also", "unit"):
-                assert getattr(told, word) == getattr(fault, word)
+                assert getattr(stated, word) == getattr(fault, word)
     assert 8 <= len(SHOWN) <= 16
 
 

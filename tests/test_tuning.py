@@ -1,4 +1,4 @@
-"""`benchmarks/tuning.py` and `ablation.py`: chosen on one half, told on the other."""
+"""`benchmarks/tuning.py` and `ablation.py`: chosen on one half, stated on the other."""
 
 from __future__ import annotations
 

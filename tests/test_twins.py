@@ -43,7 +43,7 @@ from femubench.core.fem.sections import rectangular_tube, round_tube
 from femubench.core.library.rank import plan_again, plan_run, rank, request_of, textbook_of
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.run.beside import choose_beside
+from femubench.core.run.companions import choose_beside
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
@@ -289,7 +289,7 @@ def run() -> Run:
     others = choose_beside([case], twins, 2, 11)
     truth = tuple(case.measurement.frequencies[case.measurement.frequencies > 0.0])
     able = [toys.Unchanged(), Memory(truth[:8]), Chance(), Drawn()]
-    return run_jobs([case], able, seeds=(0, 1), jobs=2, starts=Starts(beside=others))
+    return run_jobs([case], able, seeds=(0, 1), jobs=2, starts=Starts(companions=others))
 
 
 def test_who_knows_a_case_by_heart_is_marked(run: Run) -> None:
@@ -328,8 +328,8 @@ def test_over_many_structures_the_signs_decide(run: Run) -> None:
 def test_one_twin_may_be_chance_and_who_is_never_good_knows_nothing(run: Run) -> None:
     def with_scores(here: float, *there: float) -> bool:
         names = {f"one~{i}": "one" for i, _ in enumerate(there, start=1)}
-        told = {"of": names, "again": {}, "reference": {name: {"higher": 3.0} for name in names}}
-        meta = {"reference": {"one": {"higher": 3.0}}, "twins": told}
+        stated = {"of": names, "again": {}, "reference": {name: {"higher": 3.0} for name in names}}
+        meta = {"reference": {"one": {"higher": 3.0}}, "twins": stated}
         jobs = [
             replace(
                 run.results[0],
@@ -350,11 +350,11 @@ def test_one_twin_may_be_chance_and_who_is_never_good_knows_nothing(run: Run) ->
 
 def test_a_job_that_was_stopped_says_nothing_of_what_a_strategy_knows(run: Run) -> None:
     """A twin that took too long, on a machine with more to do: the other answers are compared."""
-    told = {f"one~{i}": "one" for i in (1, 2, 3)}
-    reference = {name: {"higher": 3.0} for name in told}
+    stated = {f"one~{i}": "one" for i in (1, 2, 3)}
+    reference = {name: {"higher": 3.0} for name in stated}
     meta = {
         "reference": {"one": {"higher": 3.0}},
-        "twins": {"of": told, "again": {}, "reference": reference},
+        "twins": {"of": stated, "again": {}, "reference": reference},
     }
     answer = replace(
         run.results[0],
@@ -364,7 +364,7 @@ def test_a_job_that_was_stopped_says_nothing_of_what_a_strategy_knows(run: Run) 
         blocks={"higher": replace(run.results[0].blocks["higher"], rms_percent=0.5)},
     )
     for status in ("timeout", "crashed"):
-        stopped = [replace(answer, case=name, status=status, blocks={}) for name in told]
+        stopped = [replace(answer, case=name, status=status, blocks={}) for name in stated]
         assert twin_skills(Run(meta, (answer,), tuple(stopped))) == {}
         some = (*stopped[:2], replace(answer, case="one~3"))
         found = twin_skills(Run(meta, (answer,), some))["s"]
@@ -372,7 +372,7 @@ def test_a_job_that_was_stopped_says_nothing_of_what_a_strategy_knows(run: Run) 
         assert not found.suspicious
         over = replace(answer, status=status, blocks={})
         assert twin_skills(Run(meta, (over,), some)) == {}
-    failed = [replace(answer, case=name, status="failed", blocks={}) for name in told]
+    failed = [replace(answer, case=name, status="failed", blocks={}) for name in stated]
     assert twin_skills(Run(meta, (answer,), tuple(failed)))["s"].suspicious
 
 
@@ -386,10 +386,10 @@ def test_no_figure_of_the_run_has_twins_in_it(run: Run) -> None:
     assert {result.case for result in run.results} == {"frame-solid"}
     assert set(run.meta["cases"]) == set(run.meta["reference"]) == {"frame-solid"}
     names = {"frame-solid~1", "frame-solid~2", "frame-solid~again"}
-    assert {result.case for result in run.beside} == names
-    told = {result.case: result.provenance for result in run.beside}
-    assert told["frame-solid~2"]["twin_of"] == "frame-solid"
-    assert told["frame-solid~again"]["again"] == "frame-solid"
+    assert {result.case for result in run.companions} == names
+    stated = {result.case: result.provenance for result in run.companions}
+    assert stated["frame-solid~2"]["twin_of"] == "frame-solid"
+    assert stated["frame-solid~again"]["again"] == "frame-solid"
     alone = leaderboard(Run({k: v for k, v in run.meta.items() if k != "twins"}, run.results))
     assert leaderboard(run).equals(alone)
 
@@ -418,16 +418,16 @@ def test_reports_tell_of_twins(run: Run) -> None:
 
 def test_runs_with_twins_are_kept_read_and_resumed(run: Run, tmp_path: Path) -> None:
     back = run_from_json(run_to_json(run))
-    assert back.beside == run.beside
+    assert back.companions == run.companions
     store = Store(tmp_path / "store")
     options = {"jobs": 1, "store": store, "nominal": "textbook"}
     first = rank("suite/bracket", "unchanged", twins=1, **options)  # type: ignore[arg-type]
     kept = store.load()
-    assert [r.case for r in kept.beside] == ["suite/bracket~1", "suite/bracket~again"]
+    assert [r.case for r in kept.companions] == ["suite/bracket~1", "suite/bracket~again"]
     assert kept.meta["request"]["twin_seed"] == kept.meta["twins"]["seed"]
     plugins = load_plugins()
     repeats = plan_again(request_of(kept), plugins)
-    assert [t.digest for t in repeats.starts.beside.twins] == [
+    assert [t.digest for t in repeats.starts.companions.twins] == [
         kept.meta["twins"]["cases"]["suite/bracket~1"]["digest"]
     ]
     # The seed of the last run is taken, so that the same words go on with it.
@@ -442,7 +442,7 @@ def test_runs_with_twins_are_kept_read_and_resumed(run: Run, tmp_path: Path) -> 
 def test_what_was_measured_has_no_twins(tmp_path: Path) -> None:
     given = {"twins": 2, "twin_seed": 1}
     plan = plan_run(["frame", "frame-solid"], "unchanged", load_plugins(), given)
-    assert [t.name for t in plan.starts.beside.twins] == ["frame-solid~1", "frame-solid~2"]
+    assert [t.name for t in plan.starts.companions.twins] == ["frame-solid~1", "frame-solid~2"]
     with pytest.raises(InputError, match="twins"):
         plan_run("frame", "unchanged", load_plugins(), {"twins": 101})
 

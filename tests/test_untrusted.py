@@ -1,4 +1,4 @@
-"""Files of strangers: no way out of a case folder, no waiting, no code in data, limits on size."""
+"""Files of third parties: no way out of a case folder, no waiting, no code in data, limits on size."""
 
 from __future__ import annotations
 
@@ -358,7 +358,7 @@ TRUSTED = {
     "core/conformance": "asks whether a strategy can be pickled, which is a rule of the contract",
 }
 # Arrays of one publication, from the folder that the user names for it; no case can ask for it.
-# The reader of strangers' files reads them in a process of its own.
+# The reader of third parties' files reads them in a process of its own.
 MATLAB = {"plugins/readers/matlab.py", "scenarios/matlab_footbridge.py"}
 CODE = {"pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib", "marshal", "shelve",
         "yaml", "ruamel", "jsonpickle", "dbm"}  # fmt: skip

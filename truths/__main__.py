@@ -18,7 +18,7 @@ HERE = Path(__file__).parent
 STATE = HERE.parent / "build" / "truths.json"
 NEEDED = {"gmsh": "gmsh", "skfem": "scikit-fem", "matplotlib": "matplotlib"}
 STEPS = ("suite", "defects", "faults")
-# What a solid's figures follow from, besides the structure's own file.
+# What a solid's figures follow from, in addition to the structure's own file.
 SOLVER = (
     "bricks",
     "elasticity",

@@ -1,4 +1,4 @@
-"""Draw defects over the structures, solve them beside the healthy solids, write their folders."""
+"""Draw defects over the structures, solve them next to the healthy solids, write their folders."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def _draw_defects(
         second = _make(structure, solid, str(rng.choice(ATTACHED)), rng)
         if second is not None and second.kind != kind and second.place != first.place:
             return first, second
-    raise ValueError(f"{structure.name} has no second place beside {kind}")
+    raise ValueError(f"{structure.name} has no second place next to {kind}")
 
 
 def damaged(base: Healthy, defects: tuple[Defect, ...]) -> tuple[Observed, list[TrueCause], float]:

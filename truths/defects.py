@@ -323,7 +323,7 @@ def cut_flange(structure: Structure, solid: Solid, rng: Generator) -> Defect | N
 
 
 def clamp_mass(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
-    """Leave a clamp beside the axis of a member."""
+    """Leave a clamp next to the axis of a member."""
     member = pick(rng, structure.solid_members)
     assert member is not None
     share = round(float(rng.uniform(0.1, 0.9)), 2)
@@ -337,7 +337,7 @@ def clamp_mass(structure: Structure, solid: Solid, rng: Generator) -> Defect | N
     nodes = nodes_at(member, share)
     return Defect(
         "clamp-mass",
-        f"clamp of {mass:g} kg beside the axis of {member.name} at {share:g}",
+        f"clamp of {mass:g} kg next to the axis of {member.name} at {share:g}",
         "added-mass",
         f"{member.name}@{share:g}",
         lambda s, mesh: (replace(s, lumps=(*s.lumps, lump)), mesh),

@@ -283,7 +283,7 @@ def _ranked(
     options: Sequence[Option], labels: Sequence[str], level: Option | None
 ) -> tuple[Advice, ...]:
     """Return the best options; those that clearly tell the first explanation from all stay."""
-    rows = [(option, *_told(option, labels)) for option in options]
+    rows = [(option, *_describe(option, labels)) for option in options]
     # Clearly all comes before very clearly some.
     rows = in_order(rows, lambda row: -row[2])
     clear = settings.visible_deviations**2
@@ -295,24 +295,24 @@ def _ranked(
         worth = size >= settings.worth_measuring
         if (worth and seen[option.kind] <= settings.of_a_kind) or not chosen:
             chosen.append(Advice(text, size))
-    beside: list[Advice] = []
+    adjacent: list[Advice] = []
     if level is not None and min(level.distances) >= settings.worth_measuring:
-        beside.append(Advice(level.text, min(level.distances)))
-    kept = [*chosen[: settings.advised - len(beside)], *beside]
+        adjacent.append(Advice(level.text, min(level.distances)))
+    kept = [*chosen[: settings.advised - len(adjacent)], *adjacent]
     return tuple(in_order(kept, lambda advice: -advice.separation))
 
 
-def _told(option: Option, labels: Sequence[str]) -> tuple[str, float]:
+def _describe(option: Option, labels: Sequence[str]) -> tuple[str, float]:
     """Return the text of an option and its separation from those that it tells from the first."""
     pairs = list(zip(labels[1:], option.distances, strict=True))
-    told = [(label, d) for label, d in pairs if d >= settings.worth_measuring]
-    if not told or len(told) == len(pairs):
+    stated = [(label, d) for label, d in pairs if d >= settings.worth_measuring]
+    if not stated or len(stated) == len(pairs):
         return option.text, min(option.distances)
     # Explanations that differ in textbook effects alone have one name.
-    names = " and ".join(dict.fromkeys(label for label, _ in told if label != labels[0]))
+    names = " and ".join(dict.fromkeys(label for label, _ in stated if label != labels[0]))
     if not names:
-        return option.text, min(d for _, d in told)
-    return f"{option.text} (tells {labels[0]} from {names} only)", min(d for _, d in told)
+        return option.text, min(d for _, d in stated)
+    return f"{option.text} (tells {labels[0]} from {names} only)", min(d for _, d in stated)
 
 
 def _label(view: Outlook) -> str:

@@ -31,12 +31,12 @@ def with_floor(
         file: for the sentences.
         frequency_share, shape_share: relative deviations where no other one is stated.
     """
-    m, told = measurement, []
+    m, stated = measurement, []
     relative, low = _raised(m.frequency_std / m.frequencies, np.ones(len(m)), frequency_share)
     frequency_std = np.where(low, relative * m.frequencies, m.frequency_std)
     if low.any():
         modes = ", ".join(str(m.numbers[k]) for k in np.flatnonzero(low))
-        told.append(
+        stated.append(
             _sentence(file, f"the frequency of mode {modes}", relative[low], "the frequency")
         )
     shape_std, lows = m.shape_std.copy(), np.zeros(m.shapes.shape, dtype=bool)
@@ -48,10 +48,10 @@ def with_floor(
         lows[known, k] = low
     if lows.any():
         share = (shape_std / np.abs(np.nan_to_num(m.shapes)).max(axis=0, initial=0.0))[lows]
-        told.append(_sentence(file, _places(m, lows), share, "the largest component"))
-    if not told:
+        stated.append(_sentence(file, _places(m, lows), share, "the largest component"))
+    if not stated:
         return m, ()
-    return replace(m, frequency_std=frequency_std, shape_std=shape_std), tuple(told)
+    return replace(m, frequency_std=frequency_std, shape_std=shape_std), tuple(stated)
 
 
 def _raised(std: FloatArray, size: FloatArray, share: float) -> tuple[FloatArray, BoolArray]:

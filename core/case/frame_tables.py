@@ -1,4 +1,4 @@
-"""Joints and members of a frame that stand in tables of their own beside `case.toml`."""
+"""Joints and members of a frame that stand in tables of their own next to `case.toml`."""
 
 from __future__ import annotations
 

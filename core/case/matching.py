@@ -1,4 +1,4 @@
-"""The sensors of a test beside the structure: units, axes, and the nearest place of each."""
+"""The sensors of a test next to the structure: units, axes, and the nearest place of each."""
 
 from __future__ import annotations
 
@@ -66,13 +66,13 @@ class Placed(NamedTuple):
     Arguments:
         sensors: that fit it.
         matches: where each was taken to sit.
-        told: what to say of units and places.
+        stated: what to say of units and places.
         turn: from coordinates of the test to those of the model in m, (3, 3).
     """
 
     sensors: Sensors
     matches: tuple[Match, ...]
-    told: tuple[str, ...]
+    stated: tuple[str, ...]
     turn: FloatArray
 
 
@@ -104,11 +104,11 @@ def size_of(points: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class Placement:
-    """Coordinates of a test beside the structure.
+    """Coordinates of a test next to the structure.
 
     Arguments:
         site: the structure.
-        alignment: how the test lies beside it.
+        alignment: how the test lies next to it.
         every: all coordinates of the test as they were given, finite, (k, 3).
     """
 
@@ -173,7 +173,7 @@ class Placement:
         raise Misfit(what, f"at most {self.limit:.3g} m {tolerance}{self._advice()}")
 
     def check_span(self, matches: Sequence[Match], file: str) -> tuple[str, ...]:
-        """Return what to say of sensors that lie close together beside the size of the structure.
+        """Return what to say of sensors that lie close together next to the size of the structure.
 
         Raises:
             Misfit: when they are moved, and lie closer together than they may be moved.
@@ -244,7 +244,7 @@ def match_sensors(
         read: what the plugin read.
         file: for messages.
         site: the structure.
-        alignment: how the test lies beside it; the unit is detected where it has none.
+        alignment: how the test lies next to it; the unit is detected where it has none.
         wanted: labels with a shape; None for all.
 
     Raises:
@@ -258,7 +258,7 @@ def match_sensors(
         i for i, label in enumerate(read.labels) if known[i] and (wanted is None or label in wanted)
     ]
     kept: list[tuple[Match, str]] = []
-    told: tuple[str, ...] = ()
+    stated: tuple[str, ...] = ()
     if rows:
         test = Placement(site, alignment, read.xyz[rows])
         unit = test.detect_unit()
@@ -266,7 +266,7 @@ def match_sensors(
         test = replace(test, alignment=replace(alignment, unit=scale))
         matches = test.match_labels([read.labels[i] for i in rows])
         try:
-            told = test.check_span(matches, file.name)
+            stated = test.check_span(matches, file.name)
             for i, match in zip(rows, matches, strict=True):
                 test.check_near(match)
                 way = alignment.direction(read.directions[i])
@@ -279,8 +279,8 @@ def match_sensors(
         if alignment.unit is None and unit != "m":
             ratio = size_of(test.every) / test.size
             why = f"in m the sensors would span {ratio:.3g} times the structure."
-            told = (f"{file.name}: coordinates were taken in {unit}, since {why}", *told)
-        told = (*told, *describe_matches([match for match, _ in kept], file.name))
+            stated = (f"{file.name}: coordinates were taken in {unit}, since {why}", *stated)
+        stated = (*stated, *describe_matches([match for match, _ in kept], file.name))
     if not kept:
         expected = "nodes with coordinates, in a direction that the model has"
         raise InputError("no sensor fits the structure", file=file, expected=expected)
@@ -288,7 +288,7 @@ def match_sensors(
     places = np.array([match.xyz for match in found])
     labels = tuple(match.sensor for match in found)
     sensors = Sensors(labels, places, tuple(way for _, way in kept))
-    return Placed(sensors, found, told, scale * alignment.turn)
+    return Placed(sensors, found, stated, scale * alignment.turn)
 
 
 def describe_matches(matches: Sequence[Match], file: str) -> tuple[str, ...]:

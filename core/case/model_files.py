@@ -96,7 +96,7 @@ def read_as_it_is(paths: ModelFiles, readers: Sequence[Reader]) -> Model:
 
 
 def further_files(path: Path, readers: Sequence[Reader]) -> tuple[Path, ...]:
-    """Return the files that are opened besides a model's own, e.g. those that it includes.
+    """Return the files that are opened in addition to a model's own, e.g. those that it includes.
 
     Raises:
         InputError: for a file that no reader reads.
@@ -166,7 +166,7 @@ def _read(paths: ModelFiles, readers: Sequence[Reader]) -> Model:
         return matrix_model(mass, stiffness)
     if not hasattr(reader, "read_model"):
         known = [s for r in readers if hasattr(r, "read_model") for s in r.suffixes]
-        expected = f"{', '.join(known)}; or one with the stiffness, beside one with the mass"
+        expected = f"{', '.join(known)}; or one with the stiffness, next to one with the mass"
         raise InputError(
             "no model is read from this kind of file", file=paths.model, expected=expected
         )
@@ -188,7 +188,7 @@ def _a_model(found: object, file: Path) -> Model:
 
 
 def _labelled(model: Model, paths: ModelFiles, readers: Sequence[Reader]) -> Model:
-    """Return the model with the labels and places that a file besides gives."""
+    """Return the model with the labels and places that a file in addition to gives."""
     geometry = model.geometry
     assert isinstance(geometry, MatrixGeometry)
     if paths.dofs is not None:

@@ -227,9 +227,9 @@ class _Building:
             return measurement
         with at_key("measurement", "repeats"):
             path = self.files.path(spec.repeats)
-        found, told = with_repeats(measurement, path)
+        found, stated = with_repeats(measurement, path)
         found, more = with_floor(found, spec.repeats, FREQUENCY_STD, spec.shape_std)
-        self.notes |= dict.fromkeys((*told, *more))
+        self.notes |= dict.fromkeys((*stated, *more))
         return found
 
     def frfs(self, sensors: Sensors) -> FrequencyResponses | None:
@@ -297,7 +297,7 @@ class _Building:
         else:
             labels = self.labels(modes)
             found = match_sensors(read.sensors, path, site, alignment, labels)
-        self.notes |= dict.fromkeys(found.told)
+        self.notes |= dict.fromkeys(found.stated)
         return found
 
     def labels(self, modes: str) -> frozenset[str]:
@@ -312,8 +312,8 @@ class _Building:
             found = read_modes(path, sensors, share)
         else:
             found = match_modes(read, path, sensors, share)
-        found, told = with_floor(found, name, FREQUENCY_STD, share)
-        self.notes |= dict.fromkeys(told)
+        found, stated = with_floor(found, name, FREQUENCY_STD, share)
+        self.notes |= dict.fromkeys(stated)
         return found
 
     def modifications(self, model: Model, site: Site, sensors: Sensors) -> tuple[Modification, ...]:

@@ -17,7 +17,7 @@ from femubench.core.typing import FloatArray
 _FEWEST = 3
 _SAME_STD = 1e-9  # relative
 _ROUNDING = 1e-12  # of an eigenvalue of a correlation matrix
-_TOLD = 0.05  # share of the correlations that is shrunk away without a word
+_STATED = 0.05  # share of the correlations that is shrunk away without a word
 
 
 def with_repeats(measurement: Measurement, file: Path) -> tuple[Measurement, tuple[str, ...]]:
@@ -48,15 +48,15 @@ def with_repeats(measurement: Measurement, file: Path) -> tuple[Measurement, tup
     correlation, share = shrunk_correlation(whole)
     std = whole.std(axis=0, ddof=1) / np.sqrt(count)
     found = _with(measurement, list(columns.values()), whole.mean(axis=0), std, correlation)
-    told = f"{file.name}: means of {count} repeats of {len(columns)} modes"
+    stated = f"{file.name}: means of {count} repeats of {len(columns)} modes"
     if count < len(rows):
-        told += f" ({len(rows) - count} more lack a mode)"
-    if share > _TOLD and len(columns) > 1:
-        told += (
+        stated += f" ({len(rows) - count} more lack a mode)"
+    if share > _STATED and len(columns) > 1:
+        stated += (
             f"; so few tell their correlations only roughly, which were shrunk by "
             f"{100.0 * share:.0f} %"
         )
-    return found, (f"{told}.",)
+    return found, (f"{stated}.",)
 
 
 def with_covariance(measurement: Measurement, file: Path) -> Measurement:

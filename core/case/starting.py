@@ -37,7 +37,7 @@ class Beginning:
         modes: a file with the measured modes.
         mass, dofs: files with the mass, and with labels or places of the rows of matrices.
         sensors: a file with the places of sensors, where `modes` has none.
-        model_unit: of the lengths of the model; None where it was not told.
+        model_unit: of the lengths of the model; None where it was not stated.
         unit, frame, tolerance: of the test, as the keys of ``[measurement]``.
     """
 
@@ -70,7 +70,7 @@ def start_case(
 
     Arguments:
         folder: new or empty; it appears complete or not at all.
-        given: the files, and what was told of them.
+        given: the files, and what was given of them.
         readers: reader plugins.
         draw: draws the matches of a case into a file; None for no picture.
 
@@ -191,8 +191,8 @@ class _Keys:
         for key, path in (("file", given.model), ("mass", given.mass), ("dofs", given.dofs)):
             if path is not None:
                 yield f"{key} = {_quoted(self.copies[path])}"
-        told = "" if given.model_unit else "   # not told: m, N and kg were taken"
-        yield f'unit = "{given.model_unit or "m"}"{told}'
+        stated = "" if given.model_unit else "   # not stated: m, N and kg were taken"
+        yield f'unit = "{given.model_unit or "m"}"{stated}'
         if case is not None:
             yield f"# It {sizes_of(case.model)}."
         yield "# free = true   # if it hung free: nothing that holds it to ground is then suspected"

@@ -57,7 +57,7 @@ from femubench.core.modal.measurement import Measurement
 
 @contextmanager
 def new_folder(folder: Path) -> Iterator[Path]:
-    """Give a folder beside the wanted one that takes its place when all went well.
+    """Give a folder next to the wanted one that takes its place when all went well.
 
     Raises:
         InputError: when the wanted folder holds anything, or nothing can be written there.
@@ -222,7 +222,7 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
 
     Arguments:
         case: what to write.
-        known: what the file of the case that it comes from says besides.
+        known: what the file of the case that it comes from says as well.
         comment: lines for the top of `case.toml`.
 
     Raises:
@@ -254,8 +254,8 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
     if case.frfs is not None:
         measurement["frfs"] = "frfs.npz"
         files["frfs.npz"] = responses_npz(case.frfs)
-    told = {key: getattr(case, key) for key in ("name", "title", "source", "structure")}
-    info = {key: value for key, value in told.items() if value}
+    stated = {key: getattr(case, key) for key in ("name", "title", "source", "structure")}
+    info = {key: value for key, value in stated.items() if value}
     content: Keys = {"case": info, "model": keys, "measurement": measurement}
     tables = []
     for item in modifications:

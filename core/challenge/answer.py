@@ -1,4 +1,4 @@
-"""The answer to a blind case, in the JSON of ``bench diagnose``; strangers write it."""
+"""The answer to a blind case, in the JSON of ``bench diagnose``; third parties write it."""
 
 from __future__ import annotations
 

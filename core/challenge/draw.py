@@ -121,11 +121,11 @@ class Candidates:
 
     @property
     def drawn(self) -> list[str]:
-        """Return the effects to choose from: what tells more of one is not always told from it."""
+        """Return the effects to choose from: what tells more of one is not always stated from it."""
         return [n for n in self.places if getattr(self.effects[n], "refines", None) is None]
 
     @property
-    def strangers(self) -> tuple[str, ...]:
+    def third_parties(self) -> tuple[str, ...]:
         """Return the causes outside the catalogue that the kind of data can show."""
         return tuple(key for key in OUTSIDE if self.kind != "C" or key not in SENSOR_FAULTS)
 
@@ -163,7 +163,7 @@ class Candidates:
         return self.causes(self.cause(effect or str(self.rng.choice(self.drawn))))
 
     def pair(self, effect: str | None) -> Candidate:
-        """Return a truth with two effects, either of which shows beside the other.
+        """Return a truth with two effects, either of which shows next to the other.
 
         Raises:
             ModelError: when it does not, or both sit at one place.
@@ -189,7 +189,7 @@ class Candidates:
             ModelError: when it does not show, or a single effect explains the data as well.
             IndexError: when the structure has no place for it.
         """
-        name = name or str(self.rng.choice(self.strangers))
+        name = name or str(self.rng.choice(self.third_parties))
         count = len(self.specimen.points)
         found = OUTSIDE[name](self.nothing().frame, count, self.rng)
         drawn = Candidate(found.frame, outside=found.text, sensors=found.sensors)
@@ -326,7 +326,7 @@ def draw_case(
         specimen, kind, catalogue, scatter, np.random.default_rng(choice), elements
     )
     if hidden != "none":
-        known = tuple(candidates.strangers if hidden == "outside" else candidates.places)
+        known = tuple(candidates.third_parties if hidden == "outside" else candidates.places)
         if effect is not None and effect not in known:
             what = f"{effect!r} cannot be hidden in {structure}"
             raise InputError(what, key="effect", expected=f"one of {', '.join(known)}")

@@ -1,7 +1,7 @@
 """Seal a truth so that nobody sees it by accident, and so that nobody can change it unnoticed.
 
 The seal hides from a casual look and commits the one who drew the case: the sha256 of nonce and
-truth can be told to everyone. It is no cryptography against a determined reader: the truth is in
+truth can be stated to everyone. It is no cryptography against a determined reader: the truth is in
 the file, merely compressed and encoded.
 """
 
@@ -81,9 +81,9 @@ def unseal(text: str, file: Path | None = None) -> tuple[Truth | GivenTruth, str
     if hashlib.sha256(raw).hexdigest() != content.commitment:
         raise InputError("changed since it was sealed", file=file, expected=wanted)
     try:
-        told = json.loads(raw)
-        (key,) = told.keys() & _TRUTHS.keys()
-        truth: Truth | GivenTruth = _TRUTHS[key].validate_python(told[key])
+        stated = json.loads(raw)
+        (key,) = stated.keys() & _TRUTHS.keys()
+        truth: Truth | GivenTruth = _TRUTHS[key].validate_python(stated[key])
     except (ValidationError, ValueError, AttributeError, TypeError, RecursionError):
         raise InputError("not a sealed truth", file=file, expected=wanted) from None
     return truth, content.commitment

@@ -92,12 +92,12 @@ def _specimen(
     """
     middle = Place(member=at.removeprefix("the "), s=0.5)
     change = (PointMass(middle, mass),), (GroundSpring(middle, "z", float(spring)),)
-    told = f"{mass:g} kg and {spring} N/m at the middle of {at}"
+    stated = f"{mass:g} kg and {spring} N/m at the middle of {at}"
     points = {}
     for i, word in enumerate(words):
         place, _, direction = word.partition(":")
         points[f"P{i + 1}{direction}"] = (_at(place), direction)
-    return Specimen(name, title, frame, points, change, told)
+    return Specimen(name, title, frame, points, change, stated)
 
 
 def _ladder(name: str, stretch: float = 1.0) -> Specimen:

@@ -35,7 +35,7 @@ class Change:
     """What a model may change by at a place.
 
     An effect states the terms, their coefficients and the added dofs; the rest is filled in by
-    whoever places it (`change_of`).
+    anyone who places it (`change_of`).
 
     Arguments:
         terms: fixed matrices.

@@ -62,10 +62,10 @@ class Hypothesis:
     @property
     def name(self) -> str:
         """Return the slug that it is weighed under: its own, or that of what it tells more of."""
-        return self.effect.name if self.told is None else self.told
+        return self.effect.name if self.stated is None else self.stated
 
     @property
-    def told(self) -> str | None:
+    def stated(self) -> str | None:
         """Return the slug of the effect that it tells more of, None for an effect by itself."""
         return getattr(self.effect, "refines", None)
 

@@ -39,7 +39,7 @@ class Parameter:
         one_sided: whether x >= 0.
         textbook: a value that physics gives without any fit, e.g. 1 for shear deformation.
         wording: how a size is worded: in its `unit`, or as a relative ``change`` or a ``share``,
-            which have no unit and are told in percent too.
+            which have no unit and are stated in percent too.
         std: prior standard deviation of x.
         reach: largest |x| that is looked at, whatever the bounds of the value allow.
         fatal: whether an optimum at a bound is a divergence rather than a result.

@@ -50,7 +50,7 @@ def tabulate_change(
     """Return the change of an effect that does not state one, interpolated between values.
 
     Polynomials through Chebyshev points in the coordinates of the parameters; dofs that the
-    extended model has besides those of the nominal one are condensed statically.
+    extended model has in addition to those of the nominal one are condensed statically.
 
     Raises:
         ModelError: for more than two parameters, or when the extended model has lost dofs.

@@ -26,7 +26,7 @@ class Limits:
         sandbox: whether it runs in one; with ``processes`` only in a namespace of processes where
             that is possible, in the folder and with the environment of its parent.
         hidden: folders that it does not see there, wherever they are.
-        shown: files of code that it sees there besides what can be imported.
+        shown: files of code that it sees there in addition to what can be imported.
     """
 
     seconds: float | None = 600.0

@@ -85,7 +85,7 @@ def go_apart(walls: Walls | None, at: str, room: int, processes: int) -> None:
     # The first process of the namespace, whose end ends all in it, is a program that reads until
     # the end, and small, where a copy of this process would be as large as this one. That it hears
     # of no signal from within makes it no place for a strategy: one that ends itself would go on.
-    # Whoever may look at it goes where its folder leads. From the root it moves to the new one.
+    # Anyone who may look at it goes where its folder leads. From the root it moves to the new one.
     os.chdir("/")
     reads, alive = os.pipe()
     for descriptor in range(3, alive):

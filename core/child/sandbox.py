@@ -118,7 +118,7 @@ def walls_around(hidden: Iterable[str], code: Iterable[str] = ()) -> Walls:
 
     Arguments:
         hidden: folders that are empty there, wherever they are.
-        code: files that are there besides what can be imported.
+        code: files that are there in addition to what can be imported.
     """
     links = tuple((path, os.readlink(path)) for path in _SYSTEM if os.path.islink(path))
     shown = {path for path in _SYSTEM if os.path.isdir(path) and not os.path.islink(path)}
@@ -172,7 +172,7 @@ def _own_folders(package: Path) -> set[Path]:
 
 
 def _other_own() -> Iterator[Path]:
-    """Yield where femubench is installed besides, in a place whose other packages are shown."""
+    """Yield where femubench is installed as well, in a place whose other packages are shown."""
     for prefix in dict.fromkeys((sys.prefix, sys.base_prefix, "/usr", "/usr/local")):
         yield from Path(prefix).glob("lib*/python3*/*-packages/femubench")
     yield from (Path(entry or os.curdir).absolute() / "femubench" for entry in sys.path)

@@ -107,14 +107,14 @@ def diagnose(
     from femubench.core.library.diagnose import diagnosis_of, has_model
     from femubench.core.library.report import rendering
 
-    with progress(read.name, quiet=quiet) as told:
+    with progress(read.name, quiet=quiet) as on_advance:
         found = diagnosis_of(
             *(read, names, plugins),
             pairs=not no_pairs,
             faults=not no_faults,
             tolerance=tolerance,
             budget=budget,
-            told=told,
+            on_advance=on_advance,
             others=others,
             decisions=decisions_from(words),
         )

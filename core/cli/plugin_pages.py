@@ -10,7 +10,7 @@ from pathlib import Path
 from femubench.core.cli.registry import wrap_text
 from femubench.core.plugin.foreign import Foreign, doc_of
 from femubench.core.plugin.loader import Plugins, show_entry
-from femubench.core.plugin.options import ToldOptions, options_of
+from femubench.core.plugin.options import StatedOptions, options_of
 from femubench.core.plugin.validation import CHECKS, KINDS
 from femubench.core.roles import (
     Effect,
@@ -91,7 +91,7 @@ def _strategy(strategy: Strategy) -> Iterator[Row]:
 
 def _open_mappings(strategy: object) -> Iterator[str]:
     """Return options that take further entries by name, such as ``stiffness.ry=1e4``."""
-    if isinstance(strategy, ToldOptions):
+    if isinstance(strategy, StatedOptions):
         yield from strategy.open
     elif is_dataclass(strategy):
         for field in fields(strategy):

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from femubench.core.pace import Advance, Told
+from femubench.core.pace import Advance, OnAdvance
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,8 +17,8 @@ _WIDE, _BAR = 32, 14  # characters
 
 
 @contextmanager
-def progress(what: str = "", *, quiet: bool = False) -> Iterator[Told | None]:
-    """Give the function that is told how far something is; None where stderr is no terminal.
+def progress(what: str = "", *, quiet: bool = False) -> Iterator[OnAdvance | None]:
+    """Give the function that is stated how far something is; None where stderr is no terminal.
 
     A line with a bar, pieces done of how many, the time gone by and the time left, which takes
     itself away. No time is shown as left while none is known.
@@ -32,12 +32,12 @@ def progress(what: str = "", *, quiet: bool = False) -> Iterator[Told | None]:
         return
     from rich.console import Console
 
-    with show_progress(what, Console(stderr=True), time.monotonic) as told:
-        yield told
+    with show_progress(what, Console(stderr=True), time.monotonic) as on_advance:
+        yield on_advance
 
 
 @contextmanager
-def show_progress(what: str, console: Console, clock: Callable[[], float]) -> Iterator[Told]:
+def show_progress(what: str, console: Console, clock: Callable[[], float]) -> Iterator[OnAdvance]:
     """Give the function that changes a line of a terminal; see `progress`.
 
     Arguments:

@@ -82,7 +82,7 @@ def report(
         ]
         kept = store_in(store)
         found = read_run(run, kept)
-        # What was left out is told on stderr where a report has no room for it.
+        # What was left out is stated on stderr where a report has no room for it.
         silent = any(writer.name not in _TELLING for writer in writers)
         for note in way_of("terminal", "notes")(found) if silent else ():
             click.echo(f"bench: {note}", err=True)
@@ -96,7 +96,7 @@ def report(
 def _write_diagnosis(
     data: Mapping[str, Any], path: Path, formats: Iterable[str], output: Path | None
 ) -> dict[str, Path]:
-    """Show a diagnosis, or write it beside its file; return the files by format."""
+    """Show a diagnosis, or write it next to its file; return the files by format."""
     from femubench.core.library.report import SUFFIXES, rendering
 
     files = {}

@@ -20,7 +20,7 @@ class _PaperName(click.Argument):
 
     def make_metavar(self, *_: click.Context) -> str:  # none before click 8.2
         """Return what may stand there."""
-        return f"[{'|'.join(load_plugins(strangers=False).papers)}]"
+        return f"[{'|'.join(load_plugins(third_parties=False).papers)}]"
 
 
 @click.command("reproduce")
@@ -42,7 +42,7 @@ def reproduce(
 ) -> None:
     """Recompute the tables of the papers, cell by cell.
 
-    Each printed figure stands beside ours, with a verdict and its reason: it agrees independently,
+    Each printed figure stands next to ours, with a verdict and its reason: it agrees independently,
     under a convention, after a search or after a fit; it is input, a misprint or cannot be checked;
     or it does not follow from the text. Without a paper, both.
     """
@@ -54,8 +54,8 @@ def reproduce(
     from femubench.core.library.report import rendering
     from femubench.core.library.reproduce import papers_of, studies_of, write_studies
 
-    with progress(quiet=quiet) as told:
-        studies = studies_of(papers_of(plugins, paper), plugins, told)
+    with progress(quiet=quiet) as on_advance:
+        studies = studies_of(papers_of(plugins, paper), plugins, on_advance)
     if json_file is not None and json_file != options.SCREEN:
         write_atomically(json_file, rendering(studies, "json"))
     files, figures = ([], 0) if output is None else write_studies(studies, output)

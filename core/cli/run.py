@@ -85,7 +85,7 @@ def _checked(ctx: click.Context, cases: Iterable[str], strategies: Iterable[str]
     case_folders(cases, plugins.scenarios)
     for name in _FIXED if ctx.params["locked"] is not None else ():
         if options.is_given(ctx, name):
-            raise InputError(f"--locked repeats a run as it was; {name} cannot be given beside it")
+            raise InputError(f"--locked repeats a run as it was; {name} cannot be given next to it")
     return plugins
 
 
@@ -133,7 +133,7 @@ def _header(plan: Plan, place: str) -> str:
 
 def _twins(plan: Plan) -> str:
     """Return how many twins of which kind there are, from which seed; nothing of none."""
-    twins = plan.starts.beside.twins
+    twins = plan.starts.companions.twins
     if not plan.options.twins:
         return ""
     kinds = Counter(" and ".join(twin.families) for twin in twins)

@@ -76,7 +76,7 @@ def _forecast(plan: StudyPlan, store: Store, workers: int) -> Iterator[str]:
         yield wrap_text(
             f"{least}{_spoken(found.seconds)} of processor time, {_spoken(found.wall(workers))} on "
             f"{count_noun(workers, 'worker')}: medians of earlier results, and judging; processes "
-            "take some time to start besides",
+            "take some time to start as well",
             hanging=2,
         )
     if unknown:

@@ -72,7 +72,7 @@ def submit(
     with progress(quiet=quiet) as advance:
         found = prepared(
             strategies, cases, {"twins": 2, **given}, where, output=output, baseline=baseline,
-            fail=thresholds, tell=(lambda line: None) if quiet else click.echo, told=advance,
+            fail=thresholds, tell=(lambda line: None) if quiet else click.echo, on_advance=advance,
         )  # fmt: skip
     if summary is not None:
         with summary.open("a", encoding="utf-8") as file:

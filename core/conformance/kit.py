@@ -139,7 +139,7 @@ class Bench:
         subject: the strategy, effect, reader or scenario.
         reference: the strategy that time and memory are compared with, if there is one.
         cases: further problems.
-        helpers: what a check in a worker is given besides, e.g. readers.
+        helpers: what a check in a worker is given as well, e.g. readers.
         seconds, memory: what one trial may take.
         jobs: number of workers; None for the number of processors.
     """

@@ -114,8 +114,8 @@ def nominal_fault(case: Case) -> str:
 
 def source_fault(case: Case) -> str:
     """Look for title and source."""
-    told = case.source.strip() and case.title.strip()
-    return "" if told else "title or source is empty, expected both"
+    stated = case.source.strip() and case.title.strip()
+    return "" if stated else "title or source is empty, expected both"
 
 
 _CASES = {

@@ -92,15 +92,15 @@ def _survives(bench: Bench, names: Sequence[str]) -> Verdict:
     found = bench.observe(_runs(names))
     simpler = bench.observe(_runs([_SIMPLER.get(name, PLAIN) for name in names]))
     pairs = zip(names, found, simpler, strict=True)
-    told = [item for name, item, base in pairs if name == PLAIN or base.survived]
-    if not told:
+    stated = [item for name, item, base in pairs if name == PLAIN or base.survived]
+    if not stated:
         return kit.not_applicable(f"not looked at: {simpler[0].problem} fails already")
-    lost = [item for item in told if not item.survived]
+    lost = [item for item in stated if not item.survived]
     if lost:
         return fail_check(f"{lost[0].problem}: {lost[0].text}, {_HONEST}{_more(lost)}")
-    if all(item.kind == "lacking" for item in told):
-        return kit.not_applicable(told[0].text)
-    refused = [item for item in told if item.kind in ("not-applicable", "failed")]
+    if all(item.kind == "lacking" for item in stated):
+        return kit.not_applicable(stated[0].text)
+    refused = [item for item in stated if item.kind in ("not-applicable", "failed")]
     return pass_check(f"refused {refused[0].problem}: {refused[0].text}" if refused else "")
 
 

@@ -158,7 +158,7 @@ def _observe(trial: Trial) -> tuple[Observation, bytes]:
 
 
 def import_subject(subject: Any) -> Any:  # noqa: ANN401 - any role
-    """Return a subject whose code is there: in a worker that of a stranger may be imported."""
+    """Return a subject whose code is there: in a worker that of a third party may be imported."""
     if isinstance(subject, Variant):
         return replace(subject, base=import_thing(subject.base))
     return import_thing(subject)

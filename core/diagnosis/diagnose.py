@@ -124,13 +124,13 @@ def diagnose(
     with effort.scope(_expected(case)):
         # Faults of data and input first, then the causes that are left without them.
         inquiry = inquire(case.model, used, wrong, terms)
-        mended = correct_case(case, inquiry.mended)
-        proof = _proof(mended, inquiry.examination, terms, case)
+        repaired = correct_case(case, inquiry.repaired)
+        proof = _proof(repaired, inquiry.examination, terms, case)
         with effort.piece("advice"):
-            looks = _looks(case.model, mended, (*registered, *known))
+            looks = _looks(case.model, repaired, (*registered, *known))
             posterior, leader = inquiry.examination.posterior, proof.leader
             decision = decide(posterior, proof.adequate, leader, proof.log_bayes, proof.confirmed)
-            found = _written(mended, inquiry, decision, proof, looks, begin)
+            found = _written(repaired, inquiry, decision, proof, looks, begin)
     return replace(found, notes=(*case.notes, *found.notes, *_conditions(effort)))
 
 
@@ -192,15 +192,15 @@ def _written(
     begin: float,
 ) -> Diagnosis:
     examination = inquiry.examination
-    mended, loose = fault_causes(inquiry.mended), fault_causes(inquiry.loose)
+    repaired, loose = fault_causes(inquiry.repaired), fault_causes(inquiry.loose)
     best, posterior = proof.leader, examination.posterior
     group = [best, *(posterior.best(key) for key in decision.group[1:])] if decision.group else []
     shown = group if decision.verdict == "ambiguous" else group[:1]
     options = [list_causes(examination, explanation, decision.held) for explanation in shown]
     causes = _group_causes(options)
     top = posterior.names[decision.group[0]] if decision.group else decision.nothing
-    told = decision, causes, options, top, proof.gain_rms
-    said = sentence_of(*told, reference=case.reference is not None)
+    stated = decision, causes, options, top, proof.gain_rms
+    said = sentence_of(*stated, reference=case.reference is not None)
     named = bool(decision.group)
     nothing = examination.nominal
     # Both in units of one noise: that of an explanation holds what it takes for model error.
@@ -211,9 +211,9 @@ def _written(
     used = case.measurement.select(case.used)
     return Diagnosis(
         case=case.name,
-        verdict="named" if (mended or loose) and decision.verdict == "none" else decision.verdict,
-        sentence=with_faults(said, mended, loose),
-        causes=(*mended, *causes, *loose),
+        verdict="named" if (repaired or loose) and decision.verdict == "none" else decision.verdict,
+        sentence=with_faults(said, repaired, loose),
+        causes=(*repaired, *causes, *loose),
         rivals=rivals_of(examination, best if named else None, group),
         reason=_reason(decision),
         advice=_advice(examination, group),
@@ -283,11 +283,11 @@ def _reason(decision: Decision) -> str:
 def _advice(examination: Examination, group: Sequence[Explanation]) -> tuple[Advice, ...]:
     """Return what parts the names of a group, and each name's places, from each other."""
     others = (e for found in group for e in elsewhere(examination.posterior, found))
-    told = [*group, *others][: settings.advised]
-    if len(told) < 2:
+    stated = [*group, *others][: settings.advised]
+    if len(stated) < 2:
         return ()
-    problems = [examination.problem_of(e) for e in told]
-    fits = [e.fit for e in told]
+    problems = [examination.problem_of(e) for e in stated]
+    fits = [e.fit for e in stated]
     return advise(examination.model, problems, fits, tolerance=examination.tolerance)
 
 
@@ -340,9 +340,9 @@ def _error_notes(examination: Examination, leader: Explanation) -> tuple[str, ..
     widths = class_widths()
     wide = {row.name: row.scale / widths.get(row.name, np.inf) for row in ratios}
     largest = sorted(ratios, key=lambda row: -wide[row.name])[: settings.of_a_kind]
-    told = ", ".join(f"{row.name} {100.0 * row.scale:.2g} %" for row in largest)
+    stated = ", ".join(f"{row.name} {100.0 * row.scale:.2g} %" for row in largest)
     return (
-        f"What the drawing itself gets wrong, above all: {told} (standard deviations). That the "
+        f"What the drawing itself gets wrong, above all: {stated} (standard deviations). That the "
         "structure is a beam model but for ordinary scatter has probability "
         f"{examination.like_a_beam:.2g}.",
     )

@@ -9,24 +9,24 @@ import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.words import join_names, percent
-from femubench.core.inference.charge import Charge, Mended
+from femubench.core.inference.charge import Charge, Repaired
 from femubench.core.inference.settings import settings
 from femubench.core.schema.diagnosis import Cause, CauseParameter
 
 
-def correct_case(case: Case, mended: Iterable[Mended]) -> Case:
-    """Return a case with its faults mended, or the datum discounted that is wrong.
+def correct_case(case: Case, repaired: Iterable[Repaired]) -> Case:
+    """Return a case with its faults corrected, or the datum discounted that is wrong.
 
     Design changes keep their own data: whether those have the fault too is not known.
     """
-    for fault in mended:
+    for fault in repaired:
         charge = replace(fault.charge, model=case.model, measurement=case.measurement)
-        model, measurement = charge.mended
+        model, measurement = charge.repaired
         case = replace(case, model=model, measurement=measurement)
     return case
 
 
-def fault_causes(mended: Iterable[Mended]) -> list[Cause]:
+def fault_causes(repaired: Iterable[Repaired]) -> list[Cause]:
     """Return faults as causes, on the side of the data or of the input."""
     return [
         Cause(
@@ -37,7 +37,7 @@ def fault_causes(mended: Iterable[Mended]) -> list[Cause]:
             fault.charge.suspect.words,
             side=fault.charge.fault.side,
         )
-        for fault in mended
+        for fault in repaired
     ]
 
 
@@ -52,14 +52,16 @@ def _parameters(charge: Charge) -> list[CauseParameter]:
     return [*known, CauseParameter(p.name, value, std, p.unit, wording=p.wording)]
 
 
-def with_faults(sentence: str, mended: Sequence[Cause], loose: Sequence[Cause]) -> str:
-    """Return the sentence of a verdict with the faults that were mended before it, or only told."""
-    if mended:
-        sentence = f"{_told(mended)}. With that mended: {sentence[0].lower()}{sentence[1:]}"
-    return f"{sentence} {_told(loose)}." if loose else sentence
+def with_faults(sentence: str, repaired: Sequence[Cause], loose: Sequence[Cause]) -> str:
+    """Return the sentence of a verdict with the faults that were corrected before it, or only stated."""
+    if repaired:
+        sentence = (
+            f"{_describe(repaired)}. With that corrected: {sentence[0].lower()}{sentence[1:]}"
+        )
+    return f"{sentence} {_describe(loose)}." if loose else sentence
 
 
-def _told(faults: Iterable[Cause]) -> str:
+def _describe(faults: Iterable[Cause]) -> str:
     text = join_names(
         f"{cause.summary} (probability {percent(cause.probability)})" for cause in faults
     )

@@ -58,10 +58,10 @@ def scatter_rows(state: State) -> tuple[Scatter, ...]:
         state: after the fit.
     """
     known = [row for kind in get_args(Kind) if (row := scatter_of(state, kind)) is not None]
-    told = [replace(row, warning=_warning(row)) for row in known]
-    if any(row.warning for row in told[1:]):
-        told[0] = replace(told[0], warning="")
-    return tuple(told)
+    stated = [replace(row, warning=_warning(row)) for row in known]
+    if any(row.warning for row in stated[1:]):
+        stated[0] = replace(stated[0], warning="")
+    return tuple(stated)
 
 
 def _warning(row: Scatter) -> str:

@@ -138,24 +138,24 @@ def _estimate_label(item: Data) -> str:
 
 def _cause_label(cause: Data) -> str:
     several = len(cause["parameters"]) > 1
-    told = []
+    stated = []
     for item in cause["parameters"]:
         wording, name = item.get("wording", "value"), str(item["name"])
         if item["value"] is None:
             continue
         if item.get("textbook"):
-            told.append("textbook value")
+            stated.append("textbook value")
         elif wording == "value":
             size = _size(item["value"], item["unit"])
-            told.append(f"{name} {size}" if several else size)
+            stated.append(f"{name} {size}" if several else size)
         elif wording == "share":
-            told.append(f"{name} {100.0 * item['value']:.2g} %")
+            stated.append(f"{name} {100.0 * item['value']:.2g} %")
         else:
-            told.append(f"{name.removeprefix(_CHANGE)} {percent(item['value'])}")
+            stated.append(f"{name.removeprefix(_CHANGE)} {percent(item['value'])}")
             if not several:
-                return told[0]
+                return stated[0]
     effect = str(cause["effect"]).replace("-", " ")
-    return f"{effect} {', '.join(dict.fromkeys(told))}".strip()
+    return f"{effect} {', '.join(dict.fromkeys(stated))}".strip()
 
 
 def _size(value: float, unit: str) -> str:

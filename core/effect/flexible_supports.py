@@ -1,7 +1,7 @@
 """Supports that give: springs between a support and the ground, their motion condensed.
 
 A support takes dofs q out of the model. Released, they come back with stiffness K_qq, K_qu and mass
-M_qq, M_qu beside the free dofs u, and each hangs on a spring. They follow statically, q = -G K_qu u
+M_qq, M_qu next to the free dofs u, and each hangs on a spring. They follow statically, q = -G K_qu u
 with G = (K_qq + D)^-1 and D the springs' stiffnesses on the diagonal. What is left is of low rank:
 
     dK = -K_uq G K_qu ,   dM = -(M_uq G K_qu + its transpose) + K_uq G M_qq G K_qu
@@ -58,7 +58,7 @@ def soften_supports(frame: Frame, series: Mapping[Held, float]) -> Frame:
     springs = [GroundSpring(point_of(frame, word), d, k) for (word, d), k in freed.items()]
     for spring in frame.springs:
         held = str(point_of(frame, str(spring.at))), spring.direction.lstrip("+-")
-        # A spring beside a support is at rest, and acts where that gives.
+        # A spring next to a support is at rest, and acts where that gives.
         other = np.inf if held in freed else given.get(held, np.inf)
         softer = spring.stiffness / (1.0 + spring.stiffness / other) if other else 0.0
         springs.append(replace(spring, stiffness=softer))
@@ -89,7 +89,7 @@ def flexible_supports_change(model: Model, parts: Sequence[Sequence[Held]]) -> C
     }
     fixed = [(held, column) for held, column in listed if np.isinf(stiff[held])]
     condensed = _condensed(model, [held for held, _ in fixed], [column for _, column in fixed])
-    terms, present, beside = [], [], []
+    terms, present, companions = [], [], []
     for (word, direction), column in listed:
         row = point_motion(model, point_of(frame, word))[[DIRECTIONS.index(direction)]]
         for spring in frame.springs if np.isfinite(stiff[word, direction]) else ():
@@ -97,8 +97,8 @@ def flexible_supports_change(model: Model, parts: Sequence[Sequence[Held]]) -> C
             if same and spring.direction.lstrip("+-") == direction and spring.stiffness:
                 terms.append(Term("stiffness", RowOperator(row, np.eye(1))))
                 present.append(spring.stiffness)
-                beside.append(column)
-    own, taken = np.array(present), np.array(beside, dtype=np.int64)
+                companions.append(column)
+    own, taken = np.array(present), np.array(companions, dtype=np.int64)
 
     def coefficients(values: FloatArray) -> FloatArray:
         softer = -(own**2) / (own + values[:, taken])

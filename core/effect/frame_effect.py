@@ -21,7 +21,7 @@ class FrameEffect(Effect):
     Attributes:
         name: a slug such as ``"loose-bolt"``.
         summary: what the model lacks, as a clause: ``"a bolt is loose"``.
-        caution: a sentence for whoever finds this effect named; a note of the diagnosis.
+        caution: a sentence for anyone who finds this effect named; a note of the diagnosis.
         softens: whether its stiffness may fall with the level of excitation, so that a second
             level is worth measuring.
         innate: whether it is there from the day that the structure was built, so that it cannot

@@ -19,7 +19,7 @@ TWIST = np.array([3, 9])
 BEND_XY = np.array([1, 5, 7, 11])
 BEND_XZ = np.array([2, 4, 8, 10])
 SLOPE_SIGN = np.array([1.0, -1.0, 1.0, -1.0])
-# Beside those that decide on the interpolation, which the mass matrix shares.
+# Next to those that decide on the interpolation, which the mass matrix shares.
 MASS_PROPERTIES = (
     *("rhoA", "rhoJp", "rhoIy", "rhoIz", "rigid_mass_1", "rigid_mass_2", "ecc_y", "ecc_z"),
 )
@@ -146,13 +146,13 @@ class BeamProperties:
         """Return a batch in which one property is multiplied, one factor an element."""
         return replace(self, **{name: getattr(self, name) * factor})
 
-    def alike(self, *beside: FloatArray | IntArray) -> tuple[IntArray, IntArray]:
+    def alike(self, *adjacent: FloatArray | IntArray) -> tuple[IntArray, IntArray]:
         """Return one element of every kind, (c,), and the kind of each element, (n,).
 
         Arguments:
-            beside: further numbers that are equal within a kind, (n,) each.
+            next to: further numbers that are equal within a kind, (n,) each.
         """
-        table = np.column_stack([*(getattr(self, f.name) for f in fields(self)), *beside])
+        table = np.column_stack([*(getattr(self, f.name) for f in fields(self)), *adjacent])
         table = table / np.maximum(np.abs(table).max(axis=0, initial=0.0), 1e-300)
         _, first, kind = np.unique(
             table.round(_DIGITS), axis=0, return_index=True, return_inverse=True

@@ -304,7 +304,7 @@ def preload_stiffness(structure: MeshedFrame, member: str, force: float) -> Spar
 
 
 def preload_forces(structure: MeshedFrame, member: str) -> tuple[FloatArray, SparseArray | None]:
-    """Return the internal forces of a preload of 1 N, and its stiffness beside the elements.
+    """Return the internal forces of a preload of 1 N, and its stiffness next to the elements.
 
     With `unit_preload_matrices`, they are the `preload_stiffness` with fewer numbers.
 
@@ -320,12 +320,12 @@ def preload_forces(structure: MeshedFrame, member: str) -> tuple[FloatArray, Spa
         ModelError: as for `preload_stiffness`.
 
     Examples:
-        >>> forces, beside = fem.preload_forces(structure, "rung-middle")
-        >>> forces.shape[1], beside
+        >>> forces, next to = fem.preload_forces(structure, "rung-middle")
+        >>> forces.shape[1], next to
         (6, None)
     """
     state = statics_of(structure).state(member)
-    return np.hstack([state.force, state.moment]), _beside_elements(structure, state)
+    return np.hstack([state.force, state.moment]), _elements_next_to(structure, state)
 
 
 def unit_preload_matrices(structure: MeshedFrame) -> FloatArray:
@@ -376,11 +376,11 @@ def gravity_stiffness(structure: MeshedFrame) -> SparseArray:
 
 def _stiffness(structure: MeshedFrame, state: StressState) -> SparseArray:
     total = structure.plan.assemble(geometric_matrices(structure, state))
-    beside = _beside_elements(structure, state)
-    return total if beside is None else total + beside
+    adjacent = _elements_next_to(structure, state)
+    return total if adjacent is None else total + adjacent
 
 
-def _beside_elements(structure: MeshedFrame, state: StressState) -> SparseArray | None:
+def _elements_next_to(structure: MeshedFrame, state: StressState) -> SparseArray | None:
     """Return the geometric stiffness of all that is no element, sparse (n, n)."""
     connections, bodies = structure.mesh.connections, structure.kinematics.bodies
     parts = []  # relative motions, and their forms

@@ -134,7 +134,7 @@ class Projector:
         return Projection(hypothesis, rows, cores, is_mass, weights, small is None)
 
     def widen(self, projection: Projection, added: FloatArray) -> Projection:
-        """Return a projection on further vectors besides, which stand behind those of the basis.
+        """Return a projection on further vectors as well, which stand behind those of the basis.
 
         Arguments:
             projection: on the basis.
@@ -155,7 +155,7 @@ class Projector:
         kept, new = np.delete(np.arange(size), known + np.arange(r)), known + np.arange(r)
         cores = np.zeros((len(change.terms), size, size))
         cores[:, kept[:, None], kept] = projection.cores
-        found = self._beside(change.terms, added, change.extra)
+        found = self._next_to(change.terms, added, change.extra)
         for core, (cross, own) in zip(cores, found, strict=True):
             core[np.ix_(kept, new)], core[np.ix_(new, kept)] = cross, cross.T
             core[np.ix_(new, new)] = own
@@ -217,7 +217,7 @@ class Projector:
             for i, term in enumerate(terms)
         ]
 
-    def _beside(
+    def _next_to(
         self, terms: Sequence[Term], added: FloatArray, extra: int
     ) -> list[tuple[FloatArray, FloatArray]]:
         """Return terms between all vectors and further ones, and between these alone."""

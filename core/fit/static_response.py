@@ -33,7 +33,7 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.sparse_eigen import ShiftedModel
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
-_A_MODE, _SPARE = 4, 20  # modes that are solved for every measured one, and besides
+_A_MODE, _SPARE = 4, 20  # modes that are solved for every measured one, and as well
 _RIGID, _MISSED = 6, 6
 _SHIFT = 0.5  # of the first elastic eigenvalue, below zero
 _FROM_SENSORS, _FROM_HYPOTHESIS = 40, 64  # vectors at most
@@ -197,7 +197,7 @@ class Basis:
             space: the coordinates of the basis.
             parts: the hypotheses, in any coordinates of the model.
             rounds: 1 for the response to what they exert on the modes, 2 for that to what they
-                exert on this response besides, and to its inertia.
+                exert on this response as well, and to its inertia.
         """
         near = self.modes.take(np.arange(self.tracked))
         forces = [find_forces(part.hypothesis, near) for part in parts]
@@ -246,7 +246,7 @@ class Basis:
     def with_motions(
         self, space: Space, parts: Sequence[Projection], added: FloatArray
     ) -> Coordinates:
-        """Return coordinates for some hypotheses in which the model can move as given besides.
+        """Return coordinates for some hypotheses in which the model can move as given as well.
 
         Arguments:
             space: any coordinates of the model.
@@ -276,7 +276,7 @@ class Coordinates:
     Arguments:
         basis: of the model.
         space: the coordinates with the hypotheses in them.
-        added: motions beside those of the basis, (n, r).
+        added: motions next to those of the basis, (n, r).
         turn: the last coordinates from the response of the basis and these, orthogonal.
     """
 

@@ -53,7 +53,7 @@ def lscf_poles(frequencies: FloatArray, responses: ComplexArray, largest: int) -
 
     A right matrix fraction H = B(z) A(z)^-1 with complex coefficients in z, which runs once
     around the unit circle from the lowest to the highest line. The lowest coefficient of A is
-    one: poles that only follow noise then grow, and are told from decaying ones.
+    one: poles that only follow noise then grow, and are distinguished from decaying ones.
 
     Arguments:
         frequencies: at even distances, in Hz, (n_f,).

@@ -64,7 +64,7 @@ class Charge:
     @property
     def loosens(self) -> float:
         """Return how many times as large as without the fault deviations are stated, at median."""
-        _, other = self.mended
+        _, other = self.repaired
         names = ("frequency_std", "shape_std")
         ratios = [(getattr(self.measurement, n) / getattr(other, n)).ravel() for n in names]
         known = np.concatenate(ratios)
@@ -77,7 +77,7 @@ class Charge:
         return self.suspect.parameter is not None and self.changed == 1
 
     @property
-    def mended(self) -> Corrected:
+    def repaired(self) -> Corrected:
         """Return model and data without the fault.
 
         A single datum cannot tell its own error: it is discounted, by what the error may be.
@@ -97,7 +97,7 @@ class Charge:
 
 
 @dataclass(frozen=True)
-class Mended:
+class Repaired:
     """A fault that was found, with the probability that it is this one at this place."""
 
     charge: Charge

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Literal
 
 from femubench.core.inference.settings import settings
-from femubench.core.pace import Advance, Pace, Told
+from femubench.core.pace import Advance, OnAdvance, Pace
 
 Kind = Literal["faults", "typed", "single", "together", "more", "values", "unseen", "advice"]
 # So many pieces; or so many where what was found leaves no more than noise, and where not.
@@ -49,17 +49,17 @@ class Effort:
 
     Arguments:
         budget: seconds from now on for the search for several causes; None for no end.
-        told: called when a piece begins or ends.
+        stated: called when a piece begins or ends.
         clock: seconds from any time on.
     """
 
     def __init__(
         self,
         budget: float | None = None,
-        told: Told | None = None,
+        on_advance: OnAdvance | None = None,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
-        self.budget, self._told, self._clock = budget, told, clock
+        self.budget, self._on_advance, self._clock = budget, on_advance, clock
         self._begin, self.cut = clock(), False
         self._pace = Pace(dict(zip(_KINDS, settings.work_of_pieces, strict=True)))
         self._done = 0
@@ -110,7 +110,7 @@ class Effort:
         self._tell(1, f" {done}/{total}")
 
     def _tell(self, current: int, step: str = "") -> None:
-        if self._told is None or self._piece is None:
+        if self._on_advance is None or self._piece is None:
             return
         kind, begin = self._piece
         numbers = dict.fromkeys(_KINDS, 0.0)
@@ -122,7 +122,7 @@ class Effort:
         left = here + sum(n * self._pace.of(name) for name, n in numbers.items())
         total = self._done + current + round(sum(numbers.values()))
         what = f"{_KINDS[kind]}{step}"
-        self._told(Advance(self._done, total, what, left if known else None, here))
+        self._on_advance(Advance(self._done, total, what, left if known else None, here))
 
     def _number(self, number: Number) -> float:
         if isinstance(number, tuple):
@@ -130,7 +130,7 @@ class Effort:
         return number
 
     def stops(self) -> bool:
-        """Tell whether the time is spent; whoever asks leaves the rest, which is remembered."""
+        """Tell whether the time is spent; anyone who asks leaves the rest, which is remembered."""
         spent = self.budget is not None and self._clock() - self._begin >= self.budget
         self.cut = self.cut or spent
         return spent

@@ -1,9 +1,9 @@
-"""Faults of the data and of what was typed in, weighed beside physical causes on the same data.
+"""Faults of the data and of what was typed in, weighed next to physical causes on the same data.
 
 A beam model gets much wrong of a real structure, but a sensor with the wrong sign is like nothing
 that it gets wrong. So suspects are tried on the model as drawn, with its own error as noise: first
 all of them at the scales of model error that suit the data as they are, then those that promise
-something at scales of their own. What is more probable than no fault is mended, the physical causes
+something at scales of their own. What is more probable than no fault is corrected, the physical causes
 are sought anew, and all is compared by the density of what was measured, as it was measured: where
 mending multiplies a datum, times that factor; where it widens a deviation, over that deviation.
 
@@ -32,7 +32,7 @@ from femubench.core.fit.modal_fit import State, log_evidence, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
 from femubench.core.fit.static_response import Basis, place_data
-from femubench.core.inference.charge import Charge, Mended, charges_of
+from femubench.core.inference.charge import Charge, Repaired, charges_of
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.examine import (
     Examination,
@@ -54,18 +54,18 @@ Weighed = list[tuple[Charge, float]]
 
 @dataclass(frozen=True)
 class Inquiry:
-    """An examination of model and data with the faults mended that were found.
+    """An examination of model and data with the faults corrected that were found.
 
     Arguments:
         examination: of what is left.
-        mended: the faults.
+        corrected: the faults.
         loose: deviations that are stated far too large. That hides causes and makes none, so they
-            are told and stay.
+            are stated and stay.
     """
 
     examination: Examination
-    mended: tuple[Mended, ...] = ()
-    loose: tuple[Mended, ...] = ()
+    repaired: tuple[Repaired, ...] = ()
+    loose: tuple[Repaired, ...] = ()
 
 
 def inquire(
@@ -74,13 +74,13 @@ def inquire(
     faults: Iterable[Fault],
     terms: Terms,
 ) -> Inquiry:
-    """Weigh explanations of data by physical causes, and by faults beside them.
+    """Weigh explanations of data by physical causes, and by faults next to them.
 
     Arguments:
         model: the nominal model.
         measurement: the used modes and nothing else.
         faults: what may be wrong with either.
-        terms: of every examination. Beside a pure beam model, without any model error, all would
+        terms: of every examination. Next to a pure beam model, without any model error, all would
             look like faults: these are sought with an ordinary one.
 
     Raises:
@@ -90,17 +90,17 @@ def inquire(
     effort = terms.effort
     # What was typed in is wrong in both states, and so no part of what differs.
     known = tuple(f for f in faults if terms.reference is None or f.side == "data")
-    mended: list[Mended] = []
-    model, measurement = _possible(model, measurement, known, mended)
+    repaired: list[Repaired] = []
+    model, measurement = _possible(model, measurement, known, repaired)
     if not known:
         return Inquiry(terms.examine(model, measurement))
     now = _Drawn(model, measurement, terms.reference, terms.width or 1.0)
     ranked = _weighed(now, known, effort)
-    while len(mended) < settings.faults_mended:
+    while len(repaired) < settings.faults_corrected:
         found = _definite(now, ranked, terms)
         if found is None:
             break
-        mended.append(found)
+        repaired.append(found)
         now = now.remove_fault(found.charge)
         ranked = _weighed(now, known, effort)
     reweighing = [charge for charge, _ in ranked if charge.reweighs]
@@ -109,20 +109,20 @@ def inquire(
     # Other deviations would excuse whatever is wrong: they are the last resort.
     other = _reweighed(now, reweighing, seen, terms)
     if other is None:
-        return Inquiry(seen, tuple(mended))
+        return Inquiry(seen, tuple(repaired))
     if other.charge.loosens < 1.0:
-        return Inquiry(terms.examine(*other.charge.mended), (*mended, other))
+        return Inquiry(terms.examine(*other.charge.repaired), (*repaired, other))
     surely = replace(other.charge, x=other.charge.x - 2.0 * other.charge.std)
     clearly = surely.loosens > settings.wrong_factor
-    return Inquiry(seen, tuple(mended), (other,) if clearly else ())
+    return Inquiry(seen, tuple(repaired), (other,) if clearly else ())
 
 
 def _sure_odds() -> float:
-    """Return ln of the odds from which a fault is mended."""
+    """Return ln of the odds from which a fault is corrected."""
     return log(settings.sure_fault / (1.0 - settings.sure_fault))
 
 
-def _definite(now: _Drawn, ranked: Weighed, terms: Terms) -> Mended | None:
+def _definite(now: _Drawn, ranked: Weighed, terms: Terms) -> Repaired | None:
     """Return the most probable fault, but for deviations; None where no fault is as probable."""
     pairs = [(c, g) for c, g in ranked if not c.reweighs and now.mostly(c)]
     if max((gain for _, gain in pairs), default=-np.inf) < _sure_odds():
@@ -133,7 +133,7 @@ def _definite(now: _Drawn, ranked: Weighed, terms: Terms) -> Mended | None:
     sound = seen.adequacy > settings.adequate_p and len(seen.best.parts) < 2
     least = without - now.log_density - (0.0 if sound else settings.lag)
     tried = [(c, gain) for c, gain in pairs if gain > least][: settings.candidates]
-    densities = [_density(now, *pair, single.examine(*pair[0].mended)) for pair in tried]
+    densities = [_density(now, *pair, single.examine(*pair[0].repaired)) for pair in tried]
     if not tried:
         return None
     best = int(np.argmax(densities))
@@ -141,12 +141,12 @@ def _definite(now: _Drawn, ranked: Weighed, terms: Terms) -> Mended | None:
     probability = exp(densities[best] - float(logsumexp([without, *densities, *rest])))
     found = now.refine(tried[best][0])
     sure = probability > settings.sure_fault and _inside(found)
-    return Mended(found, probability) if sure else None
+    return Repaired(found, probability) if sure else None
 
 
 def _reweighed(
     now: _Drawn, charges: Sequence[Charge], seen: Examination, terms: Terms
-) -> Mended | None:
+) -> Repaired | None:
     """Return other deviations, if those are more probable than the stated ones."""
     plain, caused = now.log_density, log_density(seen, now.measurement)
     without = float(np.logaddexp(plain, caused))
@@ -161,24 +161,24 @@ def _reweighed(
         return None
     # Wrong deviations lead to wrong causes, and these to wrong deviations: to and fro.
     for _ in range(settings.few_steps if charge.loosens < 1.0 else 0):
-        mended = terms.single().examine(*charge.mended)
-        density = log_density(mended, now.measurement) + now.prior(charge)
-        charge = now.add_causes(mended.best).estimate(charge)
+        repaired = terms.single().examine(*charge.repaired)
+        density = log_density(repaired, now.measurement) + now.prior(charge)
+        charge = now.add_causes(repaired.best).estimate(charge)
         if not _inside(charge):
             return None
     odds = density - without
-    return Mended(charge, 1.0 / (1.0 + exp(-min(odds, 700.0)))) if odds > _sure_odds() else None
+    return Repaired(charge, 1.0 / (1.0 + exp(-min(odds, 700.0)))) if odds > _sure_odds() else None
 
 
-def _density(now: _Drawn, charge: Charge, gain: float, mended: Examination) -> float:
-    """Return ln of prior times density with a fault mended.
+def _density(now: _Drawn, charge: Charge, gain: float, repaired: Examination) -> float:
+    """Return ln of prior times density with a fault corrected.
 
     Arguments:
         gain: under model error alone, with the prior, in nats above no fault.
-        mended: the examination without the fault.
+        corrected: the examination without the fault.
     """
     prior = now.prior(charge)
-    return _with_causes(mended, now.log_density + gain - prior, now.measurement) + prior
+    return _with_causes(repaired, now.log_density + gain - prior, now.measurement) + prior
 
 
 def _with_causes(seen: Examination, plain: float, measured: Measurement) -> float:
@@ -193,10 +193,10 @@ def _with_causes(seen: Examination, plain: float, measured: Measurement) -> floa
 
 
 class _Drawn:
-    """A model as drawn beside its data, what a beam model gets wrong as noise.
+    """A model as drawn next to its data, what a beam model gets wrong as noise.
 
     Arguments:
-        model, measurement: with the faults mended that were found before.
+        model, measurement: with the faults corrected that were found before.
         reference, width: as in `inquire`.
         basis: modes of the model, where they are known.
     """
@@ -244,7 +244,7 @@ class _Drawn:
     def remove_fault(self, charge: Charge) -> _Drawn:
         """Return the same without a fault."""
         if charge not in self._without:
-            model, measurement = charge.mended
+            model, measurement = charge.repaired
             basis = self.basis if model is self.model else None
             other = _Drawn(model, measurement, self.reference, self.width, basis)
             self._without[charge] = other
@@ -331,11 +331,11 @@ class _Drawn:
         """Return a fault with its parameter estimated, and what it gains at the present scales."""
         try:
             if charge.suspect.parameter is None or charge.single:
-                return charge, float(self.likelier([charge.mended[1]])[0]) + charge.log_prior
+                return charge, float(self.likelier([charge.repaired[1]])[0]) + charge.log_prior
             found = self.estimate(charge)
             if not _inside(found):
                 return found, -np.inf
-            return found, float(self.likelier([found.mended[1]])[0]) + self.prior(found)
+            return found, float(self.likelier([found.repaired[1]])[0]) + self.prior(found)
         except (FemubenchError, la.LinAlgError):
             return charge, -np.inf
 
@@ -346,7 +346,7 @@ class _Drawn:
         for first in range(0, len(fixed), settings.block):
             some = fixed[first : first + settings.block]
             with suppress(FemubenchError, la.LinAlgError):
-                gains.update(zip(some, self.likelier(c.mended[1] for c in some), strict=True))
+                gains.update(zip(some, self.likelier(c.repaired[1] for c in some), strict=True))
         return [
             (c, float(gains[c]) + c.log_prior) if c in gains else self.screen(c) for c in charges
         ]
@@ -384,7 +384,7 @@ class _Drawn:
         """Return a fault of what was typed in with what it gains at the present scales."""
         problem, noise = self.state.problem, self.state.problem.noise
         try:
-            rest = noise.residual(raw_residual(problem, charge.mended[0]))
+            rest = noise.residual(raw_residual(problem, charge.repaired[0]))
         except (FemubenchError, la.LinAlgError):
             return []
         return [(charge, 0.5 * (self.state.chi2 - float(rest @ rest)) + charge.log_prior)]
@@ -428,10 +428,10 @@ def _weighed(now: _Drawn, faults: Sequence[Fault], effort: Effort) -> Weighed:
 
 
 def _possible(
-    model: Model, measurement: Measurement, faults: Sequence[Fault], mended: list[Mended]
+    model: Model, measurement: Measurement, faults: Sequence[Fault], repaired: list[Repaired]
 ) -> tuple[Model, Measurement]:
-    """Return model and data without what cannot be; `mended` is filled."""
-    while len(mended) < settings.faults_mended:
+    """Return model and data without what cannot be; `repaired` is filled."""
+    while len(repaired) < settings.faults_corrected:
         blatant = [c for c in charges_of(model, measurement, faults) if c.suspect.blatant]
         if not blatant:
             break
@@ -441,8 +441,8 @@ def _possible(
         if not gain > settings.lag:
             break
         others = float(logsumexp(np.array(costs)[best] - np.array(costs)))
-        mended.append(Mended(blatant[best], exp(-others) / (1.0 + exp(-gain))))
-        model, measurement = blatant[best].mended
+        repaired.append(Repaired(blatant[best], exp(-others) / (1.0 + exp(-gain))))
+        model, measurement = blatant[best].repaired
     return model, measurement
 
 
@@ -450,7 +450,7 @@ def _half_chi2(charge: Charge | None, model: Model, measurement: Measurement) ->
     """Return half of chi-square of a model as drawn, without a fault; infinite without modes."""
     try:
         if charge is not None:
-            model, measurement = charge.mended
+            model, measurement = charge.repaired
         data = Data(measurement, np.zeros(0))
         noise = Noise.of(np.zeros((len(data), 0)), 0.0)
         problem = place_data(Basis.of(model, measurement), data, noise, ())
@@ -463,7 +463,7 @@ def log_density(examination: Examination, measured: Measurement) -> float:
     """Return ln of the density of what was measured, over all explanations.
 
     Arguments:
-        examination: of these data, or of the same with some mended.
+        examination: of these data, or of the same with some corrected.
         measured: the data as they were measured.
     """
     data = examination.problem.data

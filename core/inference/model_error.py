@@ -309,7 +309,7 @@ class Inadequacy:
 
     @property
     def _count(self) -> int:
-        """Return the number of scales besides that of an explanation's own error."""
+        """Return the number of scales in addition to that of an explanation's own error."""
         return len(self.names) + (len(self.residual) > 0)
 
     def _variances(self, v: FloatArray) -> tuple[FloatArray, float]:
@@ -384,7 +384,7 @@ class Inadequacy:
     def _fitted(
         self, y: FloatArray, free: FloatArray, first: FloatArray, near: Fitted | None
     ) -> Fitted:
-        """Return the most probable scales of data with a covariance of their own besides."""
+        """Return the most probable scales of data with a covariance of their own as well."""
 
         def cost(v: FloatArray) -> tuple[float, FloatArray]:
             inverse, log_det = _inverse(self.covariance(v) + free)
@@ -472,7 +472,7 @@ class Inadequacy:
             scales: of an explanation.
             slopes: sensitivities of all data to each class, (N, p_k).
             earlier: which data are of the reference, (N,).
-            raw: residuals of all data beside the explanation, (N,).
+            raw: residuals of all data next to the explanation, (N,).
             unseen: rows, (u,).
         """
         tau, unshared = self._variances(scales)

@@ -102,7 +102,7 @@ class Explanation:
     @property
     def tells_more(self) -> bool:
         """Tell whether an effect that tells more of another one is among the causes."""
-        return any(part.hypothesis.told is not None for part in self.parts)
+        return any(part.hypothesis.stated is not None for part in self.parts)
 
     @property
     def place(self) -> str:

@@ -149,7 +149,7 @@ class Settings:
         20.0, "Bayes factor", "which the data must add: strong evidence (Kass & Raftery 1995)"
     )
     nearly_all: float = _decision(
-        0.95, "probability", "covered by the places that are told; more than that leaves no doubt"
+        0.95, "probability", "covered by the places that are stated; more than that leaves no doubt"
     )
     adequate_p: float = _decision(
         0.05, "probability", "what is left, were it noise: above it nothing more is sought"
@@ -185,7 +185,7 @@ class Settings:
     )
     # Where unseen data confirm.
     visible_deviations: float = _decision(
-        3.0, "deviations", "by which two predictions must differ to be told apart"
+        3.0, "deviations", "by which two predictions must differ to be distinguished"
     )
     telling_deviations: float = _decision(
         0.5, "deviations", "by which a single mode must change to say anything"
@@ -203,7 +203,7 @@ class Settings:
         5.0, "times the usual error", "a mode farther off was not measured, or is not that mode"
     )
     # Where a fault begins.
-    sure_fault: float = _decision(0.9, "probability", "from which data or input are mended")
+    sure_fault: float = _decision(0.9, "probability", "from which data or input are corrected")
     lag: float = _decision(
         20.0, "nats", "behind which a fault, causes or a pure beam model are not tried"
     )
@@ -221,7 +221,7 @@ class Settings:
         0.005, "of a frequency", "change by physics that a model leaves out that is worth one"
     )
     notable_deviations: float = _decision(
-        2.0, "deviations", "the same beside the measurement; a resonance so close hides"
+        2.0, "deviations", "the same next to the measurement; a resonance so close hides"
     )
     unequal_elements: float = _decision(
         20.0, "ratio of lengths", "of neighbours, above which a mesh is ill made"
@@ -283,7 +283,7 @@ class Settings:
         20.0, "of the cost", "so far behind the best a fit is not brought to its end"
     )
     seeds: int = _cost(6, "causes", "about which pairs are sought where no single one suffices")
-    partners: int = _cost(8, "causes", "fitted beside a seed, or carried on from other scales")
+    partners: int = _cost(8, "causes", "fitted next to a seed, or carried on from other scales")
     promise_share: float = _cost(
         0.3, "of the chi-square to earn", "which a partner must promise, were effects to add up"
     )
@@ -302,7 +302,7 @@ class Settings:
     )
     scale_settled: float = _cost(1e-5, "relative", "change of the cost at which these steps end")
     general_modes: int = _cost(20, "elastic modes", "that random changes couple")
-    faults_mended: int = _cost(3, "faults", "more are no matter of mending")
+    faults_corrected: int = _cost(3, "faults", "more are no matter of mending")
     grid_points: int = _cost(13, "points", "on which the parameter of a fault is sought first")
     coordinate_margin: float = _cost(
         0.02, "prior deviations", "step of a curvature, and what is off a bound"
@@ -320,7 +320,7 @@ class Settings:
         1.5, "prior deviations", "between neighbours on a grid, above which modes change places"
     )
     large_shortlist: int = _cost(
-        240, "hypotheses", "of a large model in its coordinates; a quarter beside a seed"
+        240, "hypotheses", "of a large model in its coordinates; a quarter next to a seed"
     )
     large_sizes: tuple[float, ...] = _cost(
         (0.12, 0.5, 1.3, 2.6), "prior deviations", "at which each of them is tried"

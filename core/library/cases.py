@@ -37,7 +37,7 @@ def way_of(style: str, way: str) -> Callable[..., Any]:
     Raises:
         InputError: when there is no such format, or it does not show that.
     """
-    formats = load_plugins(strangers=False).reporters
+    formats = load_plugins(third_parties=False).reporters
     found = getattr(formats.get(style), way, None)
     if callable(found):
         return found  # type: ignore[no-any-return]
@@ -191,7 +191,7 @@ def read_cases(given: CaseLike | Iterable[CaseLike], plugins: Plugins) -> list[C
         else item
         for item in wanted
     ]
-    # Results of two folders under one name could not be told apart.
+    # Results of two folders under one name could not be distinguished.
     seen: dict[str, Path] = {}
     for case in found:
         if case.name in seen:

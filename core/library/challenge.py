@@ -127,7 +127,7 @@ def challenge(
 def _given(case: Path, path: Path, seed: int, truths: Path, reference: bool) -> Challenge:
     """Pose one of the truths in a folder, at any depth.
 
-    Their structures are folders in ``structures`` there or beside the truth, or built-in cases.
+    Their structures are folders in ``structures`` there or next to the truth, or built-in cases.
 
     Raises:
         InputError: when there is no truth, one is faulty, or something cannot be written.
@@ -138,18 +138,18 @@ def _given(case: Path, path: Path, seed: int, truths: Path, reference: bool) -> 
         what = f"no folder with {TRUTH_FILE}" + (f" and {HEALTHY}" if reference else "")
         raise InputError(what, file=truths, expected="a folder of truths")
     room = rooms[int(np.random.default_rng(seed).integers(len(rooms)))]
-    told = read_truth(room)
-    near = (folder / "structures" / told.structure for folder in (room.parent, truths))
+    stated = read_truth(room)
+    near = (folder / "structures" / stated.structure for folder in (room.parent, truths))
     structure = next((folder for folder in near if folder.is_dir()), None)
     if structure is None:
         owners = scenarios_of(usable_plugins().scenarios)
-        named = [name for name in owners if name.rpartition("/")[2] == told.structure]
+        named = [name for name in owners if name.rpartition("/")[2] == stated.structure]
         if not named:
-            what = f"no structure {told.structure!r}"
+            what = f"no structure {stated.structure!r}"
             expected = "a folder in `structures`, or a built-in case"
             raise InputError(what, file=room / TRUTH_FILE, key="structure", expected=expected)
         structure = owners[named[0]].folder(named[0])
-    hidden = GivenTruth(told, seed, reference, digest="")
+    hidden = GivenTruth(stated, seed, reference, digest="")
     return _sealed(case, path, lambda: pose(room, structure, case, reference), hidden)
 
 

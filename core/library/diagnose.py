@@ -19,7 +19,7 @@ from femubench.core.files import check_new, make_folder
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.settings import Value, overridden
 from femubench.core.library.cases import CaseLike, as_list, one_case, usable_plugins, way_of
-from femubench.core.pace import Told
+from femubench.core.pace import OnAdvance
 from femubench.core.plugin.loader import Plugins, list_faults
 from femubench.core.plugin.validation import check_effect, choose_names
 from femubench.core.roles import Effect
@@ -88,14 +88,14 @@ def diagnosis_of(
     faults: bool = True,
     tolerance: float | None = None,
     budget: float | None = None,
-    told: Told | None = None,
+    on_advance: OnAdvance | None = None,
     others: Sequence[str] = (),
     decisions: Mapping[str, Value] | None = None,
 ) -> Diagnosis:
     """Return the diagnosis; see `diagnose`.
 
-    `told` is called with how far it is, and how long the rest takes; `others` are the plugins of
-    strangers that are asked for; `decisions` are settings with other values than the standard ones.
+    `stated` is called with how far it is, and how long the rest takes; `others` are the plugins of
+    third parties that are asked for; `decisions` are settings with other values than the standard ones.
     """
     if budget is not None and not budget >= 0.0:
         raise InputError(f"budget = {budget!r}", expected="seconds >= 0")
@@ -106,7 +106,7 @@ def diagnosis_of(
     try:
         # Many small matrices: threads would only wait for each other.
         with threadpool_limits(1), overridden(decisions or {}):
-            effort = Effort(budget, told)
+            effort = Effort(budget, on_advance)
             wrong = (list_faults(*others) if others else None) if faults else ()
             return search(read, effects=wanted, faults=wrong, pairs=pairs, effort=effort)
     except NotApplicable as fault:

@@ -14,7 +14,7 @@ def begin_case(folder: Path, given: Beginning, plugins: Plugins) -> Case:
 
     Arguments:
         folder: new or empty.
-        given: the files, and what was told of them.
+        given: the files, and what was given of them.
         plugins: whose readers read them.
 
     Raises:

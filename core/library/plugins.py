@@ -24,7 +24,7 @@ def init_case(
     folder: str | PathLike[str],
     model: str | PathLike[str] | None = None,
     modes: str | PathLike[str] | None = None,
-    **told: Any,  # noqa: ANN401 - as `Beginning` has it
+    **stated: Any,  # noqa: ANN401 - as `Beginning` has it
 ) -> tuple[Path, ...]:
     """Write a case folder from the files of a model and of a test, or an example; return its files.
 
@@ -32,7 +32,7 @@ def init_case(
         folder: new or empty.
         model, modes: files with the model and with the measured modes; without both a commented
             example is written.
-        told: ``mass``, ``dofs`` and ``sensors``, further files; ``model_unit``, ``unit`` and
+        stated: ``mass``, ``dofs`` and ``sensors``, further files; ``model_unit``, ``unit`` and
             ``tolerance``, and ``frame`` for the axes, as the keys of a case.
 
     Raises:
@@ -43,14 +43,14 @@ def init_case(
         >>> [path.name for path in femubench.init_case("my-structure")]
         ['case.toml', 'sensors.csv', 'modes.csv', 'modified.csv']
     """
-    if model is None and modes is None and not told:
+    if model is None and modes is None and not stated:
         return write_example(Path(folder))
     if model is None or modes is None:
         missing = "model" if model is None else "modes"
         expected = "a file with the model and one with the modes"
         raise InputError("is missing", key=missing, expected=expected)
-    paths = {key: Path(told[key]) for key in ("mass", "dofs", "sensors") if told.get(key)}
-    given = Beginning(Path(model), Path(modes), **{**told, **paths})
+    paths = {key: Path(stated[key]) for key in ("mass", "dofs", "sensors") if stated.get(key)}
+    given = Beginning(Path(model), Path(modes), **{**stated, **paths})
     begin_case(Path(folder), given, usable_plugins())
     return tuple(sorted(path for path in Path(folder).rglob("*") if path.is_file()))
 

@@ -38,7 +38,7 @@ def publish(
         unverified: whether to take, marked as such, what cannot be verified: runs without sandbox
             or twins, of cases that are not installed here, or with figures that do not agree.
         address: where the site will be found, ``https://...``, for the links of its feeds; None for
-            what it was told before.
+            what it was given before.
 
     Raises:
         InputError: for a file that is not sound, or cannot be verified, a folder with something

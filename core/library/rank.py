@@ -22,7 +22,7 @@ from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import check_strategy, choose_names
 from femubench.core.plugin.variants import Variant, label_variant, strategy_of
 from femubench.core.roles import Strategy
-from femubench.core.run.beside import Beside, choose_beside
+from femubench.core.run.companions import Companions, choose_beside
 from femubench.core.run.executor import open_executor
 from femubench.core.run.frames import modes_frame, results_frame
 from femubench.core.run.recording import Progress
@@ -98,7 +98,7 @@ class Run(results.Run):
     @classmethod
     def of(cls, run: results.Run) -> Run:
         """Return a run as one that has tables."""
-        return cls(run.meta, run.results, run.beside)
+        return cls(run.meta, run.results, run.companions)
 
     @property
     def table(self) -> pd.DataFrame:
@@ -210,7 +210,9 @@ def _changed(request: Request, given: Mapping[str, Any]) -> Request:
     """
     for name in ("seeds", "seed", "nominal", "twins"):
         if name in given and (name, given[name]) != ("twins", 0):
-            raise InputError(f"--resume alone goes on as before; {name} needs CASE or -s beside it")
+            raise InputError(
+                f"--resume alone goes on as before; {name} needs CASE or -s next to it"
+            )
     if {"timeout", "timeouts"} & given.keys():
         request = replace(request, timeout=DEFAULT_TIMEOUT, timeouts={})
     how = ("timeout", "timeouts", "memory", "resume", "overwrite")
@@ -242,7 +244,7 @@ def _plan(
     choose_names("strategy to limit", request.timeouts, [strategy.name for strategy in strategies])
     classes = classes_of(plugins)
     drawn: Sequence[Twin] = ()
-    others = Beside()
+    others = Companions()
     if request.twins:
         drawn = draw_twins_of(cases, classes, request.twins, request.twin_seed or 0)
         others = choose_beside(cases, drawn, request.twins, request.twin_seed or 0)

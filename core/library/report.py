@@ -184,7 +184,7 @@ def render_report(found: Reporter, run: Run, exhibits: object = None) -> str | b
 
 
 def write_apart(origin: Origin, question: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the reporter of a stranger writes; runs in a process of its own.
+    """Return what the reporter of a third party writes; runs in a process of its own.
 
     Arguments:
         origin: the plugin.

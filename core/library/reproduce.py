@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from femubench.core.files import check_can_make, make_folder, write_atomically
 from femubench.core.library.cases import as_list, read_cases, usable_plugins, way_of
 from femubench.core.library.report import drawings, rendering
-from femubench.core.pace import Advance, Told
+from femubench.core.pace import Advance, OnAdvance
 from femubench.core.plugin.foreign import is_foreign
 from femubench.core.plugin.loader import Plugins, show_entry
 from femubench.core.plugin.validation import choose_names
@@ -61,18 +61,18 @@ def papers_of(plugins: Plugins, papers: str | Sequence[str] | None = None) -> tu
 def studies_of(
     papers: Sequence[str],
     plugins: Plugins,
-    told: Told | None = None,
+    on_advance: OnAdvance | None = None,
     clock: Callable[[], float] = time.monotonic,
 ) -> tuple[Study, ...]:
     """Return the studies of papers; see `reproduce`.
 
     Arguments:
-        told: called after each update with how many are computed, of how many.
+        stated: called after each update with how many are computed, of how many.
         clock: seconds from any time on.
     """
     found = []
     wanted = [plugins.papers[name] for name in papers]
-    watched = _Updates([getattr(paper, "done", (1,)) for paper in wanted], told, clock)
+    watched = _Updates([getattr(paper, "done", (1,)) for paper in wanted], on_advance, clock)
     for paper in wanted:
         cases = {case.name: case for case in read_cases(paper.cases, plugins)}
         # Many small matrices: threads would only wait for each other.
@@ -85,20 +85,23 @@ class _Updates:
     """Updates that are computed, and the time that the rest takes, as such re-runs have it."""
 
     def __init__(
-        self, rows: Sequence[Sequence[int]], told: Told | None, clock: Callable[[], float]
+        self,
+        rows: Sequence[Sequence[int]],
+        on_advance: OnAdvance | None,
+        clock: Callable[[], float],
     ) -> None:
         before = accumulate((row[-1] for row in rows), initial=0)
         self._after = [
             first + x for first, row in zip(before, rows, strict=False) for x in row[:-1]
         ]
         self._whole = sum(row[-1] for row in rows)
-        self._told, self._clock, self._begin = told, clock, clock()
+        self._on_advance, self._clock, self._begin = on_advance, clock, clock()
         self._done = 0
 
     def step(self) -> None:
         """Count an update."""
         self._done += 1
-        if self._told is None:
+        if self._on_advance is None:
             return
         after = [*self._after, self._whole]
         place = min(self._done, len(self._after))
@@ -106,7 +109,7 @@ class _Updates:
         rate = (self._clock() - self._begin) / here
         left = rate * (self._whole - here), rate * (following - here)
         total = max(len(self._after), self._done)
-        self._told(Advance(self._done, total, "updates", *left))
+        self._on_advance(Advance(self._done, total, "updates", *left))
 
 
 def write_studies(studies: Sequence[Study], folder: Path) -> tuple[list[str], int]:

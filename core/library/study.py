@@ -189,7 +189,7 @@ def _strategies(read: StudyFile, plugins: Plugins) -> tuple[list[Strategy], dict
 
 
 def _cases(read: StudyFile, plugins: Plugins) -> list[Case]:
-    """Return the cases, each once; folders are those beside the study file."""
+    """Return the cases, each once; folders are those next to the study file."""
     known = case_names(plugins.scenarios)
     found: dict[str, Case] = {}
     for number, word in enumerate(read.tables.axes.cases):

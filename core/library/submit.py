@@ -17,7 +17,7 @@ from femubench.core.library.plugins import check
 from femubench.core.library.publish import refusal_of
 from femubench.core.library.rank import Run, plan_run, read_run
 from femubench.core.library.report import render_report, rendering, report, reporter
-from femubench.core.pace import Told
+from femubench.core.pace import OnAdvance
 from femubench.core.run.executor import open_executor
 from femubench.core.run.runner import Receivers
 from femubench.core.schema.run_options import Where
@@ -56,7 +56,7 @@ def submit(
     baseline: str | PathLike[str] | None = None,
     fail: Iterable[str | Threshold] = (),
     tell: Callable[[str], None] = lambda line: None,
-    told: Told | None = None,
+    on_advance: OnAdvance | None = None,
 ) -> SubmissionReview:
     """Check strategies, run them, compare them with an earlier run, and write the result file.
 
@@ -68,7 +68,7 @@ def submit(
         baseline: the result file of an earlier run; without one nothing is compared.
         fail: what counts as worse, as in `compare`.
         tell: is given a line at the start of every step.
-        told: how far the run is, and how long the rest takes.
+        stated: how far the run is, and how long the rest takes.
 
     Raises:
         InputError: for an unknown name, a faulty case or baseline, or no job in common with it.
@@ -88,7 +88,7 @@ def submit(
     tell(f"run {', '.join(names)}")
     plan = plan_run(list(cases), names, usable_plugins(), given)
     with open_executor(where) as executor:
-        run = Run.of(plan.run(executor, Receivers(advance=told)))
+        run = Run.of(plan.run(executor, Receivers(advance=on_advance)))
     report(run, file, style="json")
     faults += _unanswered(run, names)
     found = None
@@ -119,8 +119,8 @@ def _losses(found: Comparison) -> Iterator[str]:
     for item in whole or found.excesses:
         where = "" if item.scenario is None else f" on {item.scenario}"
         was = "lost results" if item.metric == "failures" else f"{item.metric}, as a ratio"
-        told = f"{was}: {item.value:.3g}, allowed {item.most:g}"
-        yield f"{item.strategy} is worse than the baseline{where}: {told}"
+        on_advance = f"{was}: {item.value:.3g}, allowed {item.most:g}"
+        yield f"{item.strategy} is worse than the baseline{where}: {on_advance}"
 
 
 def summary_of(found: SubmissionReview) -> str:

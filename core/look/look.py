@@ -24,7 +24,7 @@ def look(
     """Return what is odd in a model or its measurement at first sight.
 
     Each warning comes with the changes of the elastic frequencies in the measured range, were it
-    mended, where that can be said.
+    corrected, where that can be said.
 
     Arguments:
         model: the nominal one; a pair of matrices is only weighed and compared with the sensors.

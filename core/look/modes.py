@@ -29,7 +29,7 @@ Changes = tuple[tuple[int, float], ...]
 
 @dataclass(frozen=True)
 class Seen:
-    """A model beside its measurement.
+    """A model next to its measurement.
 
     Arguments:
         model: any model.
@@ -91,7 +91,7 @@ class Seen:
 
     @property
     def large(self) -> bool:
-        """Tell whether the model is too large for another one to be solved beside it."""
+        """Tell whether the model is too large for another one to be solved next to it."""
         return self.model.size > SOLVED_LIMIT
 
     def notable(self, effect: str, what: str, changes: FloatArray | None) -> list[LookWarning]:

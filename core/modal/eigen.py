@@ -184,7 +184,7 @@ def solve_modes(model: Model, count: int | None = None) -> Modes:
     Arguments:
         model: any model; up to 500 dofs it is solved densely and completely.
         count: number of modes wanted, rigid ones included; None for all (small models), or 20
-            of a large one, which has its negative eigenvalues besides. What of them is known, by
+            of a large one, which has its negative eigenvalues as well. What of them is known, by
             `modes_of` or without a solution, is not solved again.
 
     Raises:

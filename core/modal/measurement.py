@@ -71,7 +71,7 @@ class Measurement(Shown):
         )
 
     def widen(self, std: FloatArray) -> Measurement:
-        """Return the same modes with errors of their own besides.
+        """Return the same modes with errors of their own as well.
 
         Arguments:
             std: of the further, independent errors of the frequencies in Hz, (m,).

@@ -308,7 +308,7 @@ def _round_ticks(axis: MatplotlibAxis, low: float, high: float) -> None:
 
 def _points(chart: Chart, series: Series, ax: Axes) -> Iterator[tuple[int, float, float]]:
     """Give index and place of what can be drawn; tell at the edge what lies beyond it."""
-    told: dict[str, tuple[float, tuple[float, float]]] = {}
+    stated: dict[str, tuple[float, tuple[float, float]]] = {}
     (left, right), (bottom, top) = ax.get_xlim(), sorted(ax.get_ylim())
     for index, pair in enumerate(zip(series.x, series.y, strict=True)):
         if not all(
@@ -325,10 +325,10 @@ def _points(chart: Chart, series: Series, ax: Axes) -> Iterator[tuple[int, float
             "▲" if y > top else "▼" if y < bottom else "▶" if x > right else "◀" if x < left else ""
         )
         value = y if arrow in "▲▼" else x
-        if arrow and (arrow not in told or abs(value) > abs(told[arrow][0])):
-            told[arrow] = (value, at)
+        if arrow and (arrow not in stated or abs(value) > abs(stated[arrow][0])):
+            stated[arrow] = (value, at)
         yield index, *at
-    for arrow, (value, at) in told.items():
+    for arrow, (value, at) in stated.items():
         side = "right" if at[0] > 0.5 * (left + right) else "left"
         ax.annotate(
             f"{arrow} {value:.3g}", at, xytext=(6.0 if side == "left" else -6.0, 0.0),

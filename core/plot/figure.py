@@ -48,7 +48,7 @@ class Curve:
     Arguments:
         label: in the legend.
         x, y: in the units of the axes, (n,).
-        role: decides the line's style, so that curves are told apart without colour.
+        role: decides the line's style, so that curves are distinguished without colour.
     """
 
     label: str
@@ -137,8 +137,10 @@ class MatrixImage(Figure):
             ax.axhline(index + 0.5, color="black", linewidth=0.5)
             ax.axvline(index + 0.5, color="black", linewidth=0.5)
         ax.set(xlabel=self.column_label, ylabel=self.row_label)
-        beside = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
-        bar = figure_of(ax).colorbar(image, cax=beside, extend="min", format=FuncFormatter(_power))
+        adjacent = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
+        bar = figure_of(ax).colorbar(
+            image, cax=adjacent, extend="min", format=FuncFormatter(_power)
+        )
         bar.set_label(self.value_label)
 
 
@@ -148,7 +150,7 @@ class StructureMap(Figure):
 
     Arguments:
         structure: with its mesh.
-        values: one an element, >= 0, (n,); printed beside the element too.
+        values: one an element, >= 0, (n,); printed next to the element too.
         value_label: with unit.
     """
 
@@ -169,7 +171,7 @@ class Bars(Figure):
 
     Arguments:
         groups: labels along the axis, (n,).
-        series: label and values, (n,) each; told apart by hatching.
+        series: label and values, (n,) each; distinguished by hatching.
         value_label: with unit.
         lines: horizontal marks, label and value.
     """

@@ -64,8 +64,8 @@ def changes(case: Case, result: UpdateResult, *, ax: Axes | None = None) -> Axes
         >>> plot.changes(case, result).get_figure().savefig("changes.svg")
     """
     frame = result.model.structure
-    told = [{**vars(p), "places": place_words(frame, p.places)} for p in result.parameters]
-    found = changes_found(case, told)
+    stated = [{**vars(p), "places": place_words(frame, p.places)} for p in result.parameters]
+    found = changes_found(case, stated)
     if not any(finding.kind != "elsewhere" for finding in found):
         raise InputError("no parameter that changed has a place on the structure")
     wireframe = wireframe_of(case)

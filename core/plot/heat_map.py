@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _MOST_NUMBERED = 150  # cells with their number; more have no room
 _DARK = 0.5  # of the scale, beyond which the colour of a cell is too dark for black letters
 _SCALES = (0.25, 0.5, 1.0)  # the skill with the darkest blue
-_LONGEST_LABELS = 45  # letters of all labels of the columns that stand beside each other
+_LONGEST_LABELS = 45  # letters of all labels of the columns that stand next to each other
 _GREY = "0.85"
 
 

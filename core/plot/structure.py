@@ -180,7 +180,7 @@ def draw_sensors(ax: Axes, wireframe: Wireframe, view: View) -> None:
 
 
 def draw_names(ax: Axes, wireframe: Wireframe, view: View) -> FloatArray:
-    """Write the names of joints and members beside them, where there are few enough to read.
+    """Write the names of joints and members next to them, where there are few enough to read.
 
     Returns the points that are taken, on the page, (n, 2).
     """
@@ -192,7 +192,7 @@ def draw_names(ax: Axes, wireframe: Wireframe, view: View) -> FloatArray:
         names = [joint.name for joint in wireframe.joints]
         taken = place_names(ax, joints, names, avoid=taken, size=10.0, color=INK)
     if len(wireframe.members) <= _MOST_NAMES and wireframe.members:
-        # Beside the middle, where a cause may have its number.
+        # Next to the middle, where a cause may have its number.
         middles = 0.62 * lines[:, 0] + 0.38 * lines[:, 1]
         names = [member.name for member in wireframe.members]
         taken = place_names(ax, middles, names, avoid=taken, size=8.5, color=SOFT)
@@ -200,7 +200,7 @@ def draw_names(ax: Axes, wireframe: Wireframe, view: View) -> FloatArray:
 
 
 def draw_element_values(ax: Axes, wireframe: Wireframe, values: FloatArray, label: str) -> None:
-    """Draw a value for every element as colour and width, and write it beside the element.
+    """Draw a value for every element as colour and width, and write it next to the element.
 
     Arguments:
         values: >= 0, (n_elements,).

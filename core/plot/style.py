@@ -27,7 +27,7 @@ INK, SOFT, PAGE, MEMBER, CAUSE = (
     COLOURS[role] for role in ("ink", "soft", "page", "member", "cause")
 )
 BEFORE, AFTER = COLOURS["before"], COLOURS["after"]
-# Okabe & Ito (2008): told apart with any kind of colour vision.
+# Okabe & Ito (2008): distinguished with any kind of colour vision.
 BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY = (
     "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9",
 )  # fmt: skip
@@ -52,7 +52,7 @@ _SETTINGS: dict[str, Any] = {
     "svg.fonttype": "none",
     "hatch.linewidth": 0.7,
 }
-_LONGEST = 22  # letters of a name beside a point
+_LONGEST = 22  # letters of a name next to a point
 _WIDTH, _HEIGHT = 0.31, 0.62  # half of a letter, of its size
 _SIDES = np.array([[np.cos(a), np.sin(a)] for a in np.arange(8) * np.pi / 4.0])
 
@@ -108,7 +108,7 @@ def report_style(name: str) -> Iterator[None]:
 
 
 def curve_style(role: str, rank: int, points: int) -> dict[str, Any]:
-    """Return the look of a curve, told apart from others without colour.
+    """Return the look of a curve, distinguished from others without colour.
 
     Arguments:
         role: a key of `STYLES`.
@@ -152,7 +152,7 @@ def place_names(
     size: float = 8.0,
     **look: Any,  # noqa: ANN401 - what matplotlib knows of a text
 ) -> FloatArray:
-    """Write names beside points, off each other and off what is there, as far as there is room.
+    """Write names next to points, off each other and off what is there, as far as there is room.
 
     Arguments:
         points: in the units of the axes, whose limits are final, (n, 2).

@@ -50,7 +50,7 @@ def svg(
     with report_style(name), warnings.catch_warnings():
         # Letters that the font lacks are drawn by the reader's font.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        # Names that are too long for the drawing stand beside it.
+        # Names that are too long for the drawing stand next to it.
         warnings.filterwarnings("ignore", message="constrained_layout not applied")
         ax = own_axes(None, size)
         draw(ax=ax)

@@ -1,4 +1,4 @@
-"""What a plugin of a stranger is asked, answered in a process in which its code may run.
+"""What a plugin of a third party is asked, answered in a process in which its code may run.
 
 Whatever it does there to the process is done to the answer on itself alone. Answers are plain data;
 `foreign` makes of them what the rest of the program looks at.
@@ -40,26 +40,26 @@ def describe_plugin(origin: Origin, _: Mapping[str, Any]) -> dict[str, Any]:
     """Say what a plugin offers and what is wrong with it."""
     source = source_of(origin)
     broken: list[BrokenPlugin] = []
-    told: dict[str, list[dict[str, Any]]] = {}
+    offers: dict[str, list[dict[str, Any]]] = {}
     try:
         found = offers_of(source, broken)
     except BaseException as fault:  # of whatever kind: it is the plugin's own
         found = None
         broken.append(broken_plugin(source, fault))
     for kind, offered in (found or {kind: Offers() for kind in _DESCRIBE}).items():
-        told[kind] = []
+        offers[kind] = []
         for name in offered:
             try:
-                told[kind].append(_told(origin, kind, offered[name]))
+                offers[kind].append(_describe_offer(origin, kind, offered[name]))
             except BaseException as fault:
                 broken.append(broken_plugin(source, fault, kind))
     faults = [asdict(fault) for fault in broken]
     for item in faults:
         item["traceback"] = item["traceback"][-_LONGEST_TRACE:]
-    return {"loaded": found is not None, "offers": told, "broken": faults}
+    return {"loaded": found is not None, "offers": offers, "broken": faults}
 
 
-def _told(origin: Origin, kind: str, offered: Any) -> dict[str, Any]:  # noqa: ANN401 - of any role
+def _describe_offer(origin: Origin, kind: str, offered: Any) -> dict[str, Any]:  # noqa: ANN401 - of any role
     found = _DESCRIBE[kind](offered)
     if kind == "strategies":
         name = origin.distribution.rpartition(" ")[0]
@@ -67,7 +67,7 @@ def _told(origin: Origin, kind: str, offered: Any) -> dict[str, Any]:  # noqa: A
     return found
 
 
-def _strategy(strategy: Any) -> dict[str, Any]:  # noqa: ANN401 - with what it likes besides
+def _strategy(strategy: Any) -> dict[str, Any]:  # noqa: ANN401 - with what it likes as well
     promises: object = list_declared(strategy, "promises")
     own: dict[str, object] = {}
     held: object = strategy
@@ -100,7 +100,7 @@ def _scenario(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def _reader(reader: Any) -> dict[str, Any]:  # noqa: ANN401 - a reader with what it likes besides
+def _reader(reader: Any) -> dict[str, Any]:  # noqa: ANN401 - a reader with what it likes as well
     ways = [name for name in _WAYS["readers"] if hasattr(reader, name)]
     return {**_common(reader), "suffixes": list(reader.suffixes), "ways": ways}
 
@@ -126,7 +126,7 @@ def _common(offered: Any) -> dict[str, Any]:  # noqa: ANN401 - of any role
 def describe_variant(origin: Origin, question: Mapping[str, Any]) -> dict[str, Any]:
     """Say what a strategy is with other options."""
     base = import_offer(origin, "strategies", question["name"])
-    return _told(origin, "strategies", with_options(base, question["options"]))
+    return _describe_offer(origin, "strategies", with_options(base, question["options"]))
 
 
 def folder(origin: Origin, question: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,8 +1,8 @@
-"""What plugins of strangers offer, known from a description and never imported to be listed.
+"""What plugins of third parties offer, known from a description and never imported to be listed.
 
 A `ForeignStrategy` is imported where its `update` is called, which is in a worker; folders of cases
 are made and reports are written in processes of their own. An effect, a fault, a paper and a reader
-work on models and are imported by whoever uses one by its name.
+work on models and are imported by anyone who uses one by its name.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from femubench.core.plugin import apart
 from femubench.core.plugin.apart import Origin
 from femubench.core.plugin.distribution import select_known
 from femubench.core.plugin.importing import Later, import_offer
-from femubench.core.plugin.options import SIMPLE, ToldOptions, with_options
+from femubench.core.plugin.options import SIMPLE, StatedOptions, with_options
 from femubench.core.plugin.validation import (
     CHECKS,
     check_name,
@@ -87,17 +87,17 @@ class Foreign(Later):
 
 
 @dataclass(frozen=True)
-class ForeignStrategy(ToldOptions):
-    """A strategy of a stranger: imported by the process in which `update` is called.
+class ForeignStrategy(StatedOptions):
+    """A strategy of a third party: imported by the process in which `update` is called.
 
     Arguments:
         handle: by which it is imported.
-        told: its description, plain data as JSON.
+        stated: its description, plain data as JSON.
         chosen: options that are not the usual ones, likewise.
     """
 
     handle: Handle
-    told: str
+    description: str
     chosen: str = "{}"
 
     @property
@@ -108,53 +108,53 @@ class ForeignStrategy(ToldOptions):
     @property
     def citation(self) -> str:
         """Return what it says of its source."""
-        return str(self._told["citation"])
+        return str(self._description["citation"])
 
     @property
     def needs(self) -> frozenset[str]:
         """Return what a case must have."""
-        return frozenset(self._told["needs"])
+        return frozenset(self._description["needs"])
 
     @property
-    def promises(self) -> Any:  # noqa: ANN401 - what is no set was told as it is
+    def promises(self) -> Any:  # noqa: ANN401 - what is no set was given as it is
         """Return what every result keeps."""
-        found = self._told["promises"]
+        found = self._description["promises"]
         return frozenset(found) if isinstance(found, list) else found
 
     @property
     def settings(self) -> tuple[str, ...]:
         """Return other values of its options, in the words of the command line."""
-        return tuple(self._told["settings"])
+        return tuple(self._description["settings"])
 
     @property
     def baseline(self) -> bool:
         """Tell whether it leaves the model as it is."""
-        return bool(self._told["baseline"])
+        return bool(self._description["baseline"])
 
     @property
     def yardstick(self) -> bool:
         """Tell whether others are compared with it."""
-        return bool(self._told["yardstick"])
+        return bool(self._description["yardstick"])
 
     @property
     def doc(self) -> str:
         """Return what it says of itself."""
-        return str(self._told["doc"])
+        return str(self._description["doc"])
 
     @property
     def about(self) -> dict[str, str]:
         """Return what its package says of it: home page, summary, authors, DOI."""
-        return dict(self._told["about"])
+        return dict(self._description["about"])
 
     @property
     def options(self) -> dict[str, Any]:
         """Return the options that fit on a command line, with their present values."""
-        return dict(self._told["options"])
+        return dict(self._description["options"])
 
     @property
     def open(self) -> tuple[str, ...]:
         """Return options that take further entries by name."""
-        return tuple(self._told["open"])
+        return tuple(self._description["open"])
 
     @property
     def usual(self) -> ForeignStrategy:
@@ -167,7 +167,7 @@ class ForeignStrategy(ToldOptions):
     @property
     def modules(self) -> tuple[str, ...]:
         """Return the packages, or lone modules, that hold its source: the plugin's, its own."""
-        own = str(self._told["module"]).partition(".")[0]
+        own = str(self._description["module"]).partition(".")[0]
         return tuple(dict.fromkeys((self.handle.origin.top, own)))
 
     def update(self, model: Any, measurement: Any, rng: Any) -> Any:  # noqa: ANN401 - see the roles
@@ -188,25 +188,25 @@ class ForeignStrategy(ToldOptions):
         return ForeignStrategy(self.handle, _varied(self.handle, chosen), chosen)
 
     @property
-    def _told(self) -> dict[str, Any]:
-        return _parsed(self.told)
+    def _description(self) -> dict[str, Any]:
+        return _parsed(self.description)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # One text: the bytes of a pickle also tell which of several texts are one object.
         origin = self.handle.origin
         parts = [origin.plugin, origin.value, origin.distribution, self.name]
-        return _strategy_of, (json.dumps([*parts, self.told, self.chosen]),)
+        return _strategy_of, (json.dumps([*parts, self.description, self.chosen]),)
 
 
 def _strategy_of(text: str) -> ForeignStrategy:
-    plugin, value, distribution, name, told, chosen = json.loads(text)
+    plugin, value, distribution, name, description, chosen = json.loads(text)
     handle = Handle(Origin(plugin, value, distribution), "strategies", name)
-    return ForeignStrategy(handle, told, chosen)
+    return ForeignStrategy(handle, description, chosen)
 
 
 @lru_cache(maxsize=1000)
-def _parsed(told: str) -> dict[str, Any]:
-    return dict(json.loads(told))
+def _parsed(description: str) -> dict[str, Any]:
+    return dict(json.loads(description))
 
 
 @lru_cache(maxsize=1000)
@@ -215,7 +215,7 @@ def _varied(handle: Handle, chosen: str) -> str:
     options = json.loads(chosen)
     limits: Mapping[str, Any] = {"seconds": apart.SECONDS, "most": apart.MOST, "walled": True}
     found = handle.origin.ask(_VARY, name=handle.name, options=options, **limits)
-    return strategy_of(handle, found).told
+    return strategy_of(handle, found).description
 
 
 @dataclass(frozen=True)
@@ -239,12 +239,12 @@ class _Maker:
 
 @dataclass(frozen=True)
 class ForeignReader:
-    """A reader of a stranger: imported here when a file with its suffix is to be read.
+    """A reader of a third party: imported here when a file with its suffix is to be read.
 
     Arguments:
         handle: by which it is imported.
         suffixes: of the files that it reads.
-        ways: what it offers beside the two methods of every reader.
+        ways: what it offers next to the two methods of every reader.
         doc: what it says of itself.
     """
 
@@ -279,12 +279,12 @@ def _loaded(handle: Handle) -> Any:  # noqa: ANN401 - as the kind has it
 
 @dataclass(frozen=True)
 class ForeignReporter:
-    """A reporter of a stranger, whose text is written in a process of its own.
+    """A reporter of a third party, whose text is written in a process of its own.
 
     Arguments:
         handle: by which it is imported.
         suffix: of its files.
-        ways: what it offers beside `render`.
+        ways: what it offers next to `render`.
         doc: what it says of itself.
     """
 
@@ -332,12 +332,12 @@ class ForeignReporter:
 
 
 def is_foreign(offered: object) -> bool:
-    """Tell whether the code of what is offered is that of a stranger and not imported here."""
+    """Tell whether the code of what is offered is that of a third party and not imported here."""
     return isinstance(offered, (Foreign, ForeignStrategy, ForeignReader, ForeignReporter))
 
 
 def import_thing(offered: Any) -> Any:  # noqa: ANN401 - as the kind has it
-    """Import a thing in this process where it is a stranger's; return it as it is otherwise."""
+    """Import a thing in this process where it is a third party's; return it as it is otherwise."""
     if isinstance(offered, ForeignStrategy):
         return offered.load()
     return offered.handle.load() if is_foreign(offered) else offered
@@ -350,77 +350,80 @@ def doc_of(offered: object) -> str:
     return (type(offered).__doc__ or "")[:_LONGEST_DOC]
 
 
-def strategy_of(handle: Handle, told: Mapping[str, Any]) -> ForeignStrategy:
+def strategy_of(handle: Handle, description: Mapping[str, Any]) -> ForeignStrategy:
     """Return a strategy as it is described.
 
     Raises:
         PluginError: where the description is none.
     """
-    promises, options = told.get("promises"), of_type(told.get("options"), dict, "options")
+    promises, options = (
+        description.get("promises"),
+        of_type(description.get("options"), dict, "options"),
+    )
     for key, value in options.items():
         if not isinstance(value, SIMPLE):
             raise PluginError(f"option {key[:80]!r} is no plain value")
     plain = {
-        "citation": harmless(of_type(told.get("citation"), str, "citation")),
-        "needs": check_texts(told.get("needs"), "needs", known=CAPABILITIES),
+        "citation": harmless(of_type(description.get("citation"), str, "citation")),
+        "needs": check_texts(description.get("needs"), "needs", known=CAPABILITIES),
         "promises": check_texts(promises, "promises") if isinstance(promises, list)
         else harmless(of_type(promises, str, "promises")),
-        "settings": check_texts(told.get("settings"), "settings"),
+        "settings": check_texts(description.get("settings"), "settings"),
         "options": options,
-        "open": check_texts(told.get("open"), "open options"),
-        "baseline": told.get("baseline") is True,
-        "yardstick": told.get("yardstick") is True,
-        "module": harmless(of_type(told.get("module"), str, "module")),
-        "doc": _doc(told),
-        "about": select_known(of_type(told.get("about"), dict, "what its package says")),
+        "open": check_texts(description.get("open"), "open options"),
+        "baseline": description.get("baseline") is True,
+        "yardstick": description.get("yardstick") is True,
+        "module": harmless(of_type(description.get("module"), str, "module")),
+        "doc": _doc(description),
+        "about": select_known(of_type(description.get("about"), dict, "what its package says")),
     }  # fmt: skip
     return ForeignStrategy(handle, json.dumps(plain))
 
 
-def _doc(told: Mapping[str, Any]) -> str:
-    lines = of_type(told.get("doc"), str, "the docstring")[:_LONGEST_DOC].splitlines()
+def _doc(description: Mapping[str, Any]) -> str:
+    lines = of_type(description.get("doc"), str, "the docstring")[:_LONGEST_DOC].splitlines()
     # The indentation tells paragraphs and sections apart.
     kept = [" " * (len(line) - len(line.lstrip())) + harmless(line) for line in lines]
     return "\n".join(kept)
 
 
-def _scenario(handle: Handle, told: Mapping[str, Any]) -> Scenario:
+def _scenario(handle: Handle, description: Mapping[str, Any]) -> Scenario:
     cases: dict[str, Path | Callable[[], Path]] = {}
-    for name, folder in of_type(told.get("cases"), dict, "cases").items():
+    for name, folder in of_type(description.get("cases"), dict, "cases").items():
         cases[name] = Path(folder) if isinstance(folder, str) else _Maker(handle, name)
-    title = harmless(of_type(told.get("title"), str, "title"))
-    classes = tuple(check_texts(told.get("classes"), "classes"))
-    return Scenario(handle.name, title, cases, classes, told.get("default") is True)
+    title = harmless(of_type(description.get("title"), str, "title"))
+    classes = tuple(check_texts(description.get("classes"), "classes"))
+    return Scenario(handle.name, title, cases, classes, description.get("default") is True)
 
 
-def _reader(handle: Handle, told: Mapping[str, Any]) -> ForeignReader:
-    suffixes = tuple(check_texts(told.get("suffixes"), "suffixes"))
-    return ForeignReader(handle, suffixes, _ways(told), _doc(told))
+def _reader(handle: Handle, description: Mapping[str, Any]) -> ForeignReader:
+    suffixes = tuple(check_texts(description.get("suffixes"), "suffixes"))
+    return ForeignReader(handle, suffixes, _ways(description), _doc(description))
 
 
-def _reporter(handle: Handle, told: Mapping[str, Any]) -> ForeignReporter:
-    suffix = of_type(told.get("suffix"), str, "suffix")
-    return ForeignReporter(handle, suffix, _ways(told), _doc(told))
+def _reporter(handle: Handle, description: Mapping[str, Any]) -> ForeignReporter:
+    suffix = of_type(description.get("suffix"), str, "suffix")
+    return ForeignReporter(handle, suffix, _ways(description), _doc(description))
 
 
-def _ways(told: Mapping[str, Any]) -> frozenset[str]:
-    return frozenset(check_texts(told.get("ways"), "methods"))
+def _ways(description: Mapping[str, Any]) -> frozenset[str]:
+    return frozenset(check_texts(description.get("ways"), "methods"))
 
 
-def _effect(handle: Handle, told: Mapping[str, Any]) -> Foreign:
-    summary = harmless(of_type(told.get("summary"), str, "summary"))
-    return Foreign(handle, _doc(told), summary=summary)
+def _effect(handle: Handle, description: Mapping[str, Any]) -> Foreign:
+    summary = harmless(of_type(description.get("summary"), str, "summary"))
+    return Foreign(handle, _doc(description), summary=summary)
 
 
-def _fault(handle: Handle, told: Mapping[str, Any]) -> Foreign:
-    side = of_type(told.get("side"), str, "side")
+def _fault(handle: Handle, description: Mapping[str, Any]) -> Foreign:
+    side = of_type(description.get("side"), str, "side")
     if side not in ("data", "input"):
         raise PluginError(f"side is {side[:80]!r}, neither 'data' nor 'input'")
-    return Foreign(handle, _doc(told), side=side)
+    return Foreign(handle, _doc(description), side=side)
 
 
-def _paper(handle: Handle, told: Mapping[str, Any]) -> Foreign:
-    return Foreign(handle, _doc(told))
+def _paper(handle: Handle, description: Mapping[str, Any]) -> Foreign:
+    return Foreign(handle, _doc(description))
 
 
 _MADE: Mapping[str, Callable[[Handle, Mapping[str, Any]], Any]] = {
@@ -434,13 +437,13 @@ _MADE: Mapping[str, Callable[[Handle, Mapping[str, Any]], Any]] = {
 }
 
 
-def make_proxy(origin: Origin, kind: str, told: object) -> Any:  # noqa: ANN401 - as the kind has it
+def make_proxy(origin: Origin, kind: str, description: object) -> Any:  # noqa: ANN401 - as the kind has it
     """Return what stands for a thing that a plugin describes.
 
     Raises:
         PluginError: where the description is none, or what it describes does not fill its role.
     """
-    plain: dict[str, Any] = of_type(told, dict, f"one of the {kind}")
+    plain: dict[str, Any] = of_type(description, dict, f"one of the {kind}")
     handle = Handle(origin, kind, of_type(plain.get("name"), str, "name"))
     found = _MADE[kind](handle, plain)
     if isinstance(found, Foreign):

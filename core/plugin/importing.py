@@ -1,7 +1,7 @@
 """Import one plugin and collect what it offers, apart from all others.
 
 What is wrong with one thing that a plugin offers is recorded and touches nothing else. It runs in
-this process for what comes with femubench, and in processes of their own for plugins of strangers.
+this process for what comes with femubench, and in processes of their own for plugins of third parties.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class BrokenPlugin:
         distribution: what was installed, with its version.
         hook: the hook concerned; empty when the plugin could not be loaded at all.
         message: one line.
-        traceback: for whoever asks for it.
+        traceback: for anyone who asks for it.
     """
 
     plugin: str
@@ -69,7 +69,7 @@ class Offers(UserDict[str, Any]):
     """What plugins offer of one kind, by name, in the order of the plugins.
 
     Asking for an entry that was offered by reference loads it, and so does asking for an effect, a
-    fault or a paper of a stranger, which imports the stranger's plugin here. Both raise PluginError
+    fault or a paper of a third party, which imports the third party's plugin here. Both raise PluginError
     where that fails or where the entry does not fill its role.
     """
 
@@ -99,7 +99,7 @@ class Source:
 
     @property
     def origin(self) -> Origin | None:
-        """Return the entry point of a stranger; None of what comes along or is given by hand."""
+        """Return the entry point of a third party; None of what comes along or is given by hand."""
         point = self.entry_point
         if point is None or self.own:
             return None
@@ -191,7 +191,7 @@ def offers_of(source: Source, broken: list[BrokenPlugin]) -> dict[str, Offers] |
 
 
 def import_offer(origin: Origin, kind: str, name: str) -> Any:  # noqa: ANN401 - as the kind has it
-    """Import a stranger's plugin here and return one thing that it offers.
+    """Import a third party's plugin here and return one thing that it offers.
 
     Raises:
         PluginError: when it cannot be imported or does not offer the thing.

@@ -35,7 +35,7 @@ from femubench.core.version import __version__
 
 DESCRIBE = "femubench.core.plugin.describing:described"
 _LONGEST_MESSAGE = 2000  # characters
-_MOST_FAULTS = 50  # of one plugin that are told
+_MOST_FAULTS = 50  # of one plugin that are stated
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class LoadedPlugin:
 
 
 def show_entry(offers: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401 - as the kind has it
-    """Return an entry, of a stranger's effect or fault what is known of it without its code."""
+    """Return an entry, of a third party's effect or fault what is known of it without its code."""
     entry = offers.data[name] if isinstance(offers, Offers) else None
     return entry if isinstance(entry, Foreign) else offers[name]
 
@@ -80,7 +80,7 @@ def load_plugins(
     points: Iterable[EntryPoint] | None = None,
     extra: Mapping[str, object] | None = None,
     *,
-    strangers: bool = True,
+    third_parties: bool = True,
 ) -> Plugins:
     """Return what all plugins offer.
 
@@ -88,7 +88,7 @@ def load_plugins(
         points: the entry points; by default all of the group ``femubench`` that are installed,
             and those of the clone that femubench is imported from where it is not installed.
         extra: further plugins by name, already imported.
-        strangers: whether plugins that did not come with femubench are described.
+        third parties: whether plugins that did not come with femubench are described.
     """
     installed = tuple(entry_points(group=PROJECT) if points is None else points)
     sources = _installed(installed)
@@ -100,14 +100,16 @@ def load_plugins(
     found: dict[str, Offers] = {kind: Offers() for kind in CHECKS}
     loaded: list[LoadedPlugin] = []
     broken: list[BrokenPlugin] = []
-    told = _descriptions([s.origin for s in sources if strangers and s.origin is not None])
+    description = _descriptions(
+        [s.origin for s in sources if third_parties and s.origin is not None]
+    )
     for source in sources:
         if source.origin is None:
             offers = take(source, found, broken)
             if offers is not None:
                 loaded.append(LoadedPlugin(source.name, source.distribution, offers))
-        elif strangers:
-            loaded += _believed(source.origin, told[source.origin], found, broken)
+        elif third_parties:
+            loaded += _believed(source.origin, description[source.origin], found, broken)
     return Plugins(**found, loaded=tuple(loaded), broken=tuple(broken))
 
 
@@ -132,18 +134,25 @@ def _descriptions(origins: Sequence[Origin]) -> dict[Origin, Any]:
 
 def _believed(
     origin: Origin,
-    told: Any,  # noqa: ANN401 - what a stranger told
+    description: Any,  # noqa: ANN401 - what a third party stated
     found: Mapping[str, Offers],
     broken: list[BrokenPlugin],
 ) -> Iterator[LoadedPlugin]:
-    """Take what a stranger's plugin says that it offers, where it fills its role."""
-    if isinstance(told, str) or "fault" in told:
-        message = told if isinstance(told, str) else ": ".join(map(str, told["fault"]))
+    """Take what a third party's plugin says that it offers, where it fills its role."""
+    if isinstance(description, str) or "fault" in description:
+        message = (
+            description
+            if isinstance(description, str)
+            else ": ".join(map(str, description["fault"]))
+        )
         broken.append(_wrong(origin, "", message))
         return
     try:
-        faults = [_told_broken(origin, item) for item in of_type(told["broken"], list, "faults")]
-        offered = {kind: of_type(told["offers"][kind], list, kind) for kind in found}
+        faults = [
+            _broken_as_stated(origin, item)
+            for item in of_type(description["broken"], list, "faults")
+        ]
+        offered = {kind: of_type(description["offers"][kind], list, kind) for kind in found}
     except (KeyError, TypeError, PluginError) as fault:
         broken.append(_wrong(origin, "", f"its description is none: {fault}"))
         return
@@ -154,7 +163,7 @@ def _believed(
     broken += faults[:_MOST_FAULTS]
     if len(faults) > _MOST_FAULTS:
         broken.append(_wrong(origin, "", f"and {len(faults) - _MOST_FAULTS} more faults"))
-    if told.get("loaded") is True:
+    if description.get("loaded") is True:
         yield LoadedPlugin(origin.plugin, origin.distribution, offers, own=False)
 
 
@@ -178,7 +187,7 @@ def _wrong(origin: Origin, hook: str, message: str, trace: str = "") -> BrokenPl
     return BrokenPlugin(origin.plugin, origin.distribution, hook, clean, trace)
 
 
-def _told_broken(origin: Origin, item: Any) -> BrokenPlugin:  # noqa: ANN401 - what a stranger told
+def _broken_as_stated(origin: Origin, item: Any) -> BrokenPlugin:  # noqa: ANN401 - what a third party stated
     texts = [of_type(item[key], str, key) for key in ("hook", "message", "traceback")]
     trace = "".join(f"{_printable(line)}\n" for line in texts[2].splitlines())
     return _wrong(origin, harmless(texts[0])[:80], texts[1], trace)
@@ -217,7 +226,7 @@ def list_faults(*plugins: str) -> tuple[Fault, ...]:
 
 
 def _registered(kind: str, plugins: Sequence[str]) -> Iterator[Any]:
-    found = load_plugins(strangers=bool(plugins))
+    found = load_plugins(third_parties=bool(plugins))
     choose_names("plugin", plugins, (plugin.plugin for plugin in found.loaded))
     offers: Offers = getattr(found, kind)
     for plugin in found.loaded:

@@ -13,7 +13,7 @@ from femubench.core.roles import Strategy
 SIMPLE = (bool, int, float, str, type(None))
 
 
-class ToldOptions(ABC):
+class StatedOptions(ABC):
     """A strategy whose options are known and set without its code."""
 
     @property
@@ -42,7 +42,7 @@ class ToldOptions(ABC):
 
 def options_of(strategy: object) -> dict[str, Any]:
     """Return the options that fit on a command line, with their present values."""
-    if isinstance(strategy, ToldOptions):
+    if isinstance(strategy, StatedOptions):
         return strategy.options
     if not is_dataclass(strategy) or isinstance(strategy, type):
         return {}
@@ -60,9 +60,9 @@ def with_options(base: Strategy, options: Mapping[str, object]) -> Strategy:
     Raises:
         InputError: for a value that it refuses.
     """
-    if isinstance(base, ToldOptions):
-        told: Any = base
-        found: Strategy = told.with_options(options) if options else told
+    if isinstance(base, StatedOptions):
+        description: Any = base
+        found: Strategy = description.with_options(options) if options else description
         return found
     changed = base
     for key, value in options.items():
@@ -84,7 +84,7 @@ def _with(holder: Any, key: str, value: object) -> Any:  # noqa: ANN401 - a stra
 def entry_of(strategy: object, key: str, missing: object) -> object:
     """Return the present entry of an option that maps names to numbers, else what is missing."""
     name, _, inner = key.partition(".")
-    if isinstance(strategy, ToldOptions):
+    if isinstance(strategy, StatedOptions):
         return 0.0 if inner and name in strategy.open else missing
     holder = getattr(strategy, name, None) if is_dataclass(strategy) else None
     return float(holder.get(inner, 0.0)) if inner and isinstance(holder, Mapping) else missing

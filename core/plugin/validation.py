@@ -204,18 +204,18 @@ def check_name(filled: object) -> None:
 
 
 def of_type(value: object, wanted: type[Thing], what: str) -> Thing:
-    """Return a value that a process of a stranger told.
+    """Return a value that a process of a third party stated.
 
     Raises:
         PluginError: when it is of another type.
     """
     if not isinstance(value, wanted):
-        raise PluginError(f"{what} was told as {type(value).__name__}, not {wanted.__name__}")
+        raise PluginError(f"{what} was given as {type(value).__name__}, not {wanted.__name__}")
     return value
 
 
 def check_texts(value: object, what: str, known: Iterable[str] | None = None) -> list[str]:
-    """Return a list of lines that a process of a stranger told.
+    """Return a list of lines that a process of a third party stated.
 
     Raises:
         PluginError: when it is none, or an entry is not among the known ones.

@@ -13,7 +13,7 @@ from dataclasses import dataclass, is_dataclass
 from typing import Any, cast
 
 from femubench.core.errors import InputError
-from femubench.core.plugin.options import SIMPLE, ToldOptions, entry_of, options_of, with_options
+from femubench.core.plugin.options import SIMPLE, StatedOptions, entry_of, options_of, with_options
 from femubench.core.plugin.validation import did_you_mean
 from femubench.core.roles import Strategy, list_declared
 
@@ -90,7 +90,7 @@ def label_variant(strategy: Strategy, default: Strategy | None = None) -> Varian
     Arguments:
         default: the same with default options; None for what its class makes without arguments.
     """
-    if default is None and isinstance(strategy, ToldOptions):
+    if default is None and isinstance(strategy, StatedOptions):
         default = strategy.usual
     if default is None:
         try:
@@ -98,10 +98,12 @@ def label_variant(strategy: Strategy, default: Strategy | None = None) -> Varian
         except TypeError:  # it has none
             default = strategy
     usual, present = _settings(default), _settings(strategy)
-    told = {key: value for key, value in present.items() if usual.get(key, _UNKNOWN) != value}
+    description = {
+        key: value for key, value in present.items() if usual.get(key, _UNKNOWN) != value
+    }
     words = [
         f"{_shortest(key, usual)}={str(value).lower() if isinstance(value, bool) else str(value)}"
-        for key, value in told.items()
+        for key, value in description.items()
     ]
     return Variant(strategy, strategy.name + (f":{','.join(words)}" if words else ""))
 

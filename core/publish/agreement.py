@@ -51,8 +51,8 @@ def findings_of(submissions: Iterable[Submission], references: References) -> li
     for item in submissions:
         for result in item.run.ranked:
             # The names go with the key: a forged key must not put two jobs together.
-            told = (result.provenance[name] for name in ("case", "strategy", "femubench"))
-            key = "\0".join((result.key, *map(str, told)))
+            stated = (result.provenance[name] for name in ("case", "strategy", "femubench"))
+            key = "\0".join((result.key, *map(str, stated)))
             job = result.case, result.strategy, result.seed, key
             listed = groups.setdefault(job, [])
             for number, known in enumerate(listed):

@@ -65,8 +65,8 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
     versions = {version: groups[version] for version in sorted(groups, key=age)}
     latest = {version.strategy: version for version in versions}  # the last one stays
     ranked = _ranked_cases(latest.values(), versions, current)
-    told = _stated_in_runs(submissions, "structures"), _stated_in_runs(submissions, "classes")
-    ground = Scope(ranked, current, references, *told)
+    stated = _stated_in_runs(submissions, "structures"), _stated_in_runs(submissions, "classes")
+    ground = Scope(ranked, current, references, *stated)
     runs = [
         {
             "file": f"data/{item.name}",

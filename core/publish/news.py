@@ -28,21 +28,21 @@ def news_of(
             for name in version["runs"]:
                 owners.setdefault(name, []).append((strategy, version))
     present: dict[str, Mapping[str, Any]] = {}
-    told: list[dict[str, Any]] = []
+    stated: list[dict[str, Any]] = []
     leader = ""
     for run in runs:
         found = owners.get(run["file"].rpartition("/")[2], [])
         for strategy, version in sorted(found, key=lambda item: str(item[0]["name"])):
             if version["runs"][0] == run["file"].rpartition("/")[2]:
                 kind = "version" if strategy["name"] in present else "strategy"
-                told.append(_entry(kind, strategy["name"], version, run))
+                stated.append(_entry(kind, strategy["name"], version, run))
         present |= {strategy["name"]: version for strategy, version in found}
         first = _leaders(present)
         if first and leader not in first:
             leader = first[0]
-            told.append(_entry("leader", leader, present[leader], run))
+            stated.append(_entry("leader", leader, present[leader], run))
     pages = {strategy["name"]: strategy["page"] for strategy in strategies}
-    return [{**item, "page": pages[item["strategy"]]} for item in told[::-1][:_MOST]]
+    return [{**item, "page": pages[item["strategy"]]} for item in stated[::-1][:_MOST]]
 
 
 def _leaders(present: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -59,5 +59,5 @@ def _leaders(present: Mapping[str, Mapping[str, Any]]) -> list[str]:
 def _entry(
     kind: str, strategy: str, version: Mapping[str, Any], run: Mapping[str, Any]
 ) -> dict[str, Any]:
-    told = {name: version[name] for name in ("version", "femubench", "skill", "low", "high")}
-    return {"kind": kind, "when": run["started"], "strategy": strategy, **told}
+    stated = {name: version[name] for name in ("version", "femubench", "skill", "low", "high")}
+    return {"kind": kind, "when": run["started"], "strategy": strategy, **stated}

@@ -1,4 +1,4 @@
-"""Keep a static site of published runs: read all, build it beside the old one, swap."""
+"""Keep a static site of published runs: read all, build it next to the old one, swap."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def publish(
         render: from the content of ``index.json`` to the pages by relative name.
         verify: checks what can be checked of a run.
         unverified: whether to take, marked as such, what that refuses.
-        address: where the site will be found; None for what it was told before.
+        address: where the site will be found; None for what it was given before.
 
     Raises:
         InputError: for a file that is not sound, a folder with something else in it, or an address
@@ -74,13 +74,13 @@ def publish(
     data = folder / DATA
     names = sorted(path for path in data.glob("*.json")) if data.is_dir() else []
     old = [read_submission(path, published=True) for path in names]
-    marker, told = folder / MARKER, address
-    if told is None and marker.exists():
-        told = parse_json(read_text(marker, MIB), file=marker, expected=KIND).get("address")
-    if not _ADDRESS.fullmatch(told := str(told or "")):
+    marker, stated = folder / MARKER, address
+    if stated is None and marker.exists():
+        stated = parse_json(read_text(marker, MIB), file=marker, expected=KIND).get("address")
+    if not _ADDRESS.fullmatch(stated := str(stated or "")):
         expected = "http or https, without a query"
-        raise InputError(f"{harmless(told)!r} is no address of a site", expected=expected)
-    home = f"{told.rstrip('/')}/" if told else ""
+        raise InputError(f"{harmless(stated)!r} is no address of a site", expected=expected)
+    home = f"{stated.rstrip('/')}/" if stated else ""
     merged = _merge_runs([*old, *(_submission(file, verify, unverified) for file in files)])
     index = {**index_of(merged), "address": home}
     pages = {
@@ -164,7 +164,7 @@ def _merge_runs(submissions: Iterable[Submission]) -> list[Submission]:
 
 
 def _replace(folder: Path, pages: Mapping[str, str]) -> None:
-    """Write a folder beside the old one and let them change places.
+    """Write a folder next to the old one and let them change places.
 
     Whatever happens on the way, the old site is there whole, or the new one is.
     """

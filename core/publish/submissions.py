@@ -159,11 +159,11 @@ def read_submission(
         verified = True
     if not verified:
         meta = {name: value for name, value in meta.items() if name not in _OF_VERIFIED}
-    beside = run.beside if verified else ()
+    companions = run.companions if verified else ()
     # A run as its file says it, so that it is the same when that is read again.
     data = {"schema": SCHEMA, "meta": meta, "results": _records(results.values())}
     if verified:
-        data |= {"beside": _records(beside), "verified": True}
+        data |= {"companions": _records(companions), "verified": True}
     text = json.dumps(data, sort_keys=True, allow_nan=False, separators=(",", ":")) + "\n"
     digest = hashlib.sha256(text.encode()).hexdigest()[:12]
     run = run_from_json(json.loads(text), file=file)

@@ -90,9 +90,11 @@ def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) 
     if run.meta.get("yardstick") != "textbook":
         what = "errors are not measured against the textbook models"
         _refuse(file, what, "meta.yardstick", _AGAIN)
-    told = run.meta.get("sandbox")
-    mode = (result.provenance.get("sandbox", told) for result in chain(run.results, run.beside))
-    if any(one != SANDBOX for one in (told, *mode)):
+    as_stated = run.meta.get("sandbox")
+    mode = (
+        result.provenance.get("sandbox", as_stated) for result in chain(run.results, run.companions)
+    )
+    if any(one != SANDBOX for one in (as_stated, *mode)):
         what = "the strategies ran without a sandbox"
         _refuse(file, what, "meta.sandbox", "a run with `--sandbox require`, or --unverified")
     cases = _own_cases(run, installed, file)
@@ -108,7 +110,7 @@ def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) 
             errors, right = stated.get(name, {}), known[name].reference
             _check_errors(errors, right, f"{key}.{name}", nominal="textbook", file=file)
     origins = run.meta["twins"]["again"]
-    for key, results in (("results", run.results), ("beside", run.beside)):
+    for key, results in (("results", run.results), ("companions", run.companions)):
         for number, result in enumerate(results):
             own = known[origins.get(result.case, result.case)]
             _check_result(result, own, file, f"{key}[{number}]")
@@ -122,12 +124,12 @@ def _refuse(file: Path, what: str, key: str, expected: str) -> NoReturn:
 def _own_cases(run: Run, installed: Installed, file: Path) -> dict[str, Case]:
     """Return the cases of a run as they are installed here, which they have to equal."""
     found = {}
-    for name, told in run.meta["cases"].items():
+    for name, as_stated in run.meta["cases"].items():
         case = installed.case(name)
         if case is None:
             what = f"no case {name!r} is installed here, so that nothing of it can be checked"
             _refuse(file, what, f"meta.cases.{name}", "a built-in case, or --unverified")
-        if case.digest != told["digest"]:
+        if case.digest != as_stated["digest"]:
             what = f"other files than those of the case {name!r} that is installed here"
             _refuse(file, what, f"meta.cases.{name}.digest", f"{case.digest}: {_AGAIN}")
         structure = (run.meta.get("structures") or {}).get(name)
@@ -147,22 +149,25 @@ def _own_twins(
     run: Run, cases: Sequence[Case], installed: Installed, file: Path
 ) -> dict[str, Case]:
     """Return the twins of a run, drawn again from its seed."""
-    told = run.meta.get("twins")
-    if not told or told["number"] < _FEWEST_TWINS:
+    as_stated = run.meta.get("twins")
+    if not as_stated or as_stated["number"] < _FEWEST_TWINS:
         what = f"it has no {_FEWEST_TWINS} twins, which would show who knows the cases"
         expected = f"a run with `--twins {_FEWEST_TWINS}` or more, or --unverified"
         _refuse(file, what, "meta.twins", expected)
-    drawn = {t.name: t for t in installed.twins(cases, told["number"], told["seed"])}
-    stated = {name: told["cases"].get(name, {}).get("digest") for name in told["of"]}
+    drawn = {t.name: t for t in installed.twins(cases, as_stated["number"], as_stated["seed"])}
+    stated = {name: as_stated["cases"].get(name, {}).get("digest") for name in as_stated["of"]}
     if {name: twin.digest for name, twin in drawn.items()} != stated:
-        what = f"these are not the twins that seed {told['seed']} draws"
+        what = f"these are not the twins that seed {as_stated['seed']} draws"
         _refuse(file, what, "meta.twins", _AGAIN)
     kinds = {name: list(twin.families) for name, twin in drawn.items()}
-    if told.get("kinds") != kinds:
+    if as_stated.get("kinds") != kinds:
         _refuse(file, "its twins are of other kinds", "meta.twins.kinds", _AGAIN)
-    if any(told["of"][name] != name.rpartition("~")[0] for name in drawn) or not told["again"]:
+    if (
+        any(as_stated["of"][name] != name.rpartition("~")[0] for name in drawn)
+        or not as_stated["again"]
+    ):
         _refuse(file, "they are of other cases, or nothing ran twice", "meta.twins", _AGAIN)
-    if not set(told["again"].values()) <= set(run.meta["cases"]):
+    if not set(as_stated["again"].values()) <= set(run.meta["cases"]):
         _refuse(file, "what ran twice is no case of the run", "meta.twins.again", _AGAIN)
     return dict(drawn)
 
@@ -170,7 +175,7 @@ def _own_twins(
 def _check_complete(run: Run, file: Path) -> None:
     """Check that every job is there, once: nobody leaves out what did not go well."""
     meta = run.meta
-    jobs = {(r.case, r.nominal, r.strategy, r.seed) for r in chain(run.results, run.beside)}
+    jobs = {(r.case, r.nominal, r.strategy, r.seed) for r in chain(run.results, run.companions)}
     starts = {name: meta["starts"].get(name, []) for name in meta["cases"]}
     starts |= {name: ["textbook"] for name in (*meta["twins"]["of"], *meta["twins"]["again"])}
     wanted = {
@@ -180,10 +185,10 @@ def _check_complete(run: Run, file: Path) -> None:
         for strategy in meta["strategies"]
         for seed in meta["seeds"]
     }
-    if jobs != wanted or len(jobs) < len(run.results) + len(run.beside):
+    if jobs != wanted or len(jobs) < len(run.results) + len(run.companions):
         what = f"{len(wanted - jobs)} jobs are missing, {len(jobs - wanted)} are of no plan"
         _refuse(file, what, "results", "all jobs of the run: go on with it by --resume")
-    keys = (result.key for result in chain(run.results, run.beside))
+    keys = (result.key for result in chain(run.results, run.companions))
     if plan_digest(keys) != meta.get("plan"):
         _refuse(file, "the jobs are not those that the run began with", "meta.plan", _AGAIN)
 
@@ -229,14 +234,14 @@ def _check_board(run: Run, board: object, file: Path) -> None:
     """Check the skills of the leaderboard that comes with a run, where one does."""
     if board is None:
         return
-    skills: dict[str, float] = dict(zip(*map(leaderboard(run).get, _TOLD), strict=True))
+    skills: dict[str, float] = dict(zip(*map(leaderboard(run).get, _STATED), strict=True))
     rows: Iterable[object] = board if isinstance(board, list) else [board]
     for number, row in enumerate(rows):
-        name, told = (row.get(key) if isinstance(row, dict) else None for key in _TOLD)
+        name, as_stated = (row.get(key) if isinstance(row, dict) else None for key in _STATED)
         own = skills.get(name) if isinstance(name, str) else None
-        if own is None or not isinstance(told, (int, float)) or not _near(told, own):
-            what = f"skill {told!r}, the results give {own!r}"[:200]
+        if own is None or not isinstance(as_stated, (int, float)) or not _near(as_stated, own):
+            what = f"skill {as_stated!r}, the results give {own!r}"[:200]
             _refuse(file, what, f"leaderboard[{number}].skill", "what its results give")
 
 
-_TOLD = "strategy", "skill"
+_STATED = "strategy", "skill"

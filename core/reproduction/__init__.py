@@ -1,1 +1,1 @@
-"""Published tables, cell by cell, beside what a careful re-run gives."""
+"""Published tables, cell by cell, next to what a careful re-run gives."""

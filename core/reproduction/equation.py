@@ -1,4 +1,4 @@
-"""Equations of a paper in MathML, each beside the function of ours that works by it."""
+"""Equations of a paper in MathML, each next to the function of ours that works by it."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class PrintedTable:
         table: as its cells have it, e.g. ``"4d"``.
         title: what it shows.
         grids: its parts, one below the other; cells that none has follow by their own rows.
-        chart: what belongs beside it.
+        chart: what belongs next to it.
     """
 
     table: str

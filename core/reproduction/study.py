@@ -15,7 +15,7 @@ from femubench.core.reproduction.ground import VERDICTS, Verdict
 from femubench.core.reproduction.printed_table import PrintedTable
 
 FIGURES = "figures"  # folder of the drawings beneath that of a report
-_TOLD = (
+_STATED = (
     *("paper", "table", "row", "column"),
     *("printed", "ours", "deviation_percent", "verdict", "note", "tried"),
 )
@@ -83,7 +83,7 @@ def verdict_counts(cells: Sequence[Cell]) -> dict[Verdict, int]:
 def cells_to_json(studies: Sequence[Study]) -> list[dict[str, Any]]:
     """Return all cells as plain data; None for what is missing."""
     return [
-        {name: getattr(cell, name) for name in _TOLD}
+        {name: getattr(cell, name) for name in _STATED}
         | ({} if math.isfinite(cell.ours or 0.0) else {"ours": None})
         for study in studies
         for cell in study.cells

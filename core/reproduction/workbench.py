@@ -20,12 +20,12 @@ class Workbench:
     Arguments:
         strategies: by name.
         cases: by name.
-        told: called after each update that had to be computed.
+        stated: called after each update that had to be computed.
     """
 
     strategies: Mapping[str, Strategy]
     cases: Mapping[str, Case]
-    told: Callable[[], None] = lambda: None
+    on_advance: Callable[[], None] = lambda: None
     _done: dict[tuple[str, str], UpdateResult] = field(default_factory=dict, repr=False)
 
     def update(self, case: str, words: str) -> UpdateResult:
@@ -47,5 +47,5 @@ class Workbench:
             result = strategy.update(found.model, found.used_measurement(0), rng)
             assert isinstance(result, UpdateResult), type(result)
             self._done[key] = result
-            self.told()
+            self.on_advance()
         return self._done[key]

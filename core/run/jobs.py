@@ -118,7 +118,7 @@ def pickle_strategy(thing: object) -> bytes:
 def seed_words(case: str, strategy: str, seed: int) -> tuple[int, ...]:
     """Return the seed of a job's random generator: the same on every machine and in any order.
 
-    The names go in as a hash, since a generator shows its seed to whoever holds it.
+    The names go in as a hash, since a generator shows its seed to anyone who holds it.
     """
     digest = hashlib.sha256("\0".join((str(seed), case, strategy)).encode()).digest()
     return tuple(int(word) for word in np.frombuffer(digest, dtype="<u4"))

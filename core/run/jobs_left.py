@@ -40,11 +40,11 @@ class JobsLeft:
         self._sizes = _Sizes()
         for result in known:
             self._sizes.add((result.case, result.strategy), result.seconds)
-        # What jobs take besides: processes to start, judging, and waiting for either.
-        self._besides = 0.0
+        # What jobs take as well: processes to start, judging, and waiting for either.
+        self._overhead = 0.0
         now = clock()
         self._running = [(pair, now) for pair in self._taken(workers)]
-        self._told = now, 0.0
+        self._stated = now, 0.0
 
     def _taken(self, count: int) -> list[Pair]:
         return [self._waiting.popleft() for _ in range(min(count, len(self._waiting)))]
@@ -56,20 +56,20 @@ class JobsLeft:
         alike = [job for job in self._running if job[0] == pair] or self._running
         if alike:
             self._running.remove(alike[0])
-            self._besides += max(now - alike[0][1] - result.seconds, 0.0)
+            self._overhead += max(now - alike[0][1] - result.seconds, 0.0)
         self._running += [(following, now) for following in self._taken(1)]
         self._done += 1
         rest = self._total - self._done
-        if now - self._told[0] >= _OFTEN or self._done <= _MANY or not rest:
-            self._told = now, self._seconds(now)
-        left = max(self._told[1] - (now - self._told[0]), 0.0)
+        if now - self._stated[0] >= _OFTEN or self._done <= _MANY or not rest:
+            self._stated = now, self._seconds(now)
+        left = max(self._stated[1] - (now - self._stated[0]), 0.0)
         return Advance(self._done, self._total, " ".join(pair), left, left / max(rest, 1))
 
     def _seconds(self, now: float) -> float:
         """Return the seconds until all are done."""
-        besides, sizes = self._besides / self._done, self._sizes.fit()
-        ahead = [max(sizes(pair) + besides - (now - begin), 0.0) for pair, begin in self._running]
-        later = sum(n * (sizes(pair) + besides) for pair, n in Counter(self._waiting).items())
+        overhead, sizes = self._overhead / self._done, self._sizes.fit()
+        ahead = [max(sizes(pair) + overhead - (now - begin), 0.0) for pair, begin in self._running]
+        later = sum(n * (sizes(pair) + overhead) for pair, n in Counter(self._waiting).items())
         return max((sum(ahead) + later) / self._workers, max(ahead, default=0.0))
 
 

@@ -25,7 +25,7 @@ _OWN = ("strategies", "effects", "faults")
 
 def own_plugins() -> Iterator[str]:
     """Load the plugins that come with femubench and yield the modules of what they offer."""
-    found = load_plugins(strangers=False)
+    found = load_plugins(third_parties=False)
     for kind in _OWN:
         offers = getattr(found, kind)
         for name in offers:

@@ -30,7 +30,7 @@ _OWN = "femubench"
 
 
 def job_key(case: Case, strategy: str, code: bytes, version: str, seed: int) -> str:
-    """Return the key of a job: equal keys have equal results, whoever computes them.
+    """Return the key of a job: equal keys have equal results, anyone who computes them.
 
     Arguments:
         case: its name and the digest of its files go in.
@@ -199,7 +199,7 @@ def run_meta(
     references: Mapping[str, Reference],
     seeds: Sequence[int],
     settings: Mapping[str, Any],
-    told: Mapping[str, Any],
+    stated: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return the meta data of a run: id, seeds, versions, machine, commit, cases, references.
 
@@ -207,7 +207,7 @@ def run_meta(
         settings: ``seed`` of the run's statistics, ``jobs``, ``timeout`` in s, ``memory`` in bytes,
             ``plan`` (digest of the keys of all jobs), ``request`` (what was asked for, so that the
             run can be continued and repeated).
-        told: what else is said of the cases, by case: ``starts``, ``classes``.
+        stated: what else is said of the cases, by case: ``starts``, ``classes``.
     """
     return {
         "run": new_run_id(),
@@ -229,7 +229,7 @@ def run_meta(
             *solver_note(),
         ],
         "cases": {case.name: {"title": case.title, "digest": case.digest} for case in cases},
-        **told,
+        **stated,
         "strategies": [strategy.name for strategy in strategies],
         "citations": {strategy.name: strategy.citation for strategy in strategies},
         "about": {s.name: known for s in strategies if (known := about_of(s))},

@@ -11,7 +11,7 @@ from typing import Any
 from femubench.core.drawing.prediction import keep_drawings
 from femubench.core.errors import InputError
 from femubench.core.garbage import pause_collection
-from femubench.core.pace import Advance, Told
+from femubench.core.pace import Advance, OnAdvance
 from femubench.core.run.jobs_left import JobsLeft
 from femubench.core.run.record_file import Record
 from femubench.core.run.schedule import Show
@@ -56,7 +56,7 @@ class Results:
         store: Store | None,
         run: str,
         progress: Progress | None,
-        report: Told | None = None,
+        report: OnAdvance | None = None,
     ) -> None:
         self._slots, self._store, self._run, self._progress = slots, store, run, progress
         self._report, self._left = report, JobsLeft((), (), 1)

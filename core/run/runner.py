@@ -15,7 +15,7 @@ from femubench.core.case.case import Case
 from femubench.core.child.limits import Limits
 from femubench.core.errors import InputError
 from femubench.core.files import make_folder
-from femubench.core.pace import Told
+from femubench.core.pace import OnAdvance
 from femubench.core.roles import Strategy
 from femubench.core.run.executor import Executor, open_executor
 from femubench.core.run.provenance import home_of, plan_digest, run_meta
@@ -48,7 +48,7 @@ class Receivers:
 
     store: Store | None = None
     progress: Progress | None = None
-    advance: Told | None = None
+    advance: OnAdvance | None = None
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Plan:
         """Run the jobs, each in a process of its own; see `run_jobs`."""
         cases, strategies, options = self.cases, self.strategies, self.options
         starts, store = self.starts, receivers.store
-        _check_names(case=[*cases, *starts.beside.twins], strategy=strategies)
+        _check_names(case=[*cases, *starts.companions.twins], strategy=strategies)
         if store is not None:
             make_folder(store.folder)
         executor.admit(strategies, options.memory)
@@ -96,10 +96,10 @@ class Plan:
         }
         limits = self._limits(Limits(options.timeout, share, sandbox=executor.sandbox), store)
         with threadpool_limits(1), ExitStack() as stack:
-            references = starts.beside.add_repeated(self._solve_yardsticks())
+            references = starts.companions.add_repeated(self._solve_yardsticks())
             slots = self.slots
             asked |= {"request": dict(self.request), "plan": plan_digest(slots.keys)}
-            about = {**starts.about(cases), **starts.beside.about(references)}
+            about = {**starts.about(cases), **starts.companions.about(references)}
             yardsticks = {case.name: references[case.name] for case in cases}
             slots.meta = run_meta(cases, strategies, yardsticks, slots.seeds, asked, about)
             meta, known = begin_run(stack, store, slots.meta, options.overwrite, options.resume)
@@ -136,7 +136,7 @@ class Plan:
         """Return what the yardstick of every case gives, solved once for those that share it."""
         solved: dict[tuple[int, int, int], Reference] = {}
         found = {}
-        for case in map(self.starts.yardstick, (*self.cases, *self.starts.beside.twins)):
+        for case in map(self.starts.yardstick, (*self.cases, *self.starts.companions.twins)):
             same = id(case.model), id(case.measurement), id(case.modifications)
             if same not in solved:
                 solved[same] = reference_of(case)

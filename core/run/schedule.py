@@ -111,7 +111,7 @@ class _Bench:
         self.lonely: deque[_Task] = deque()
 
     def has_work(self, busy: int) -> bool:
-        """Tell whether there is something to start beside so many that run."""
+        """Tell whether there is something to start next to so many that run."""
         if not (self.waiting or self.answers):
             self.waiting.extend((index, b"") for index in islice(self._wanted, 1))
         return bool(self.waiting or self.answers or (self.lonely and not busy))
@@ -159,7 +159,7 @@ class _Bench:
         elif ending.how == "no-start" and self._again(task):
             return
         elif answer and ending.how == "died" and self._again(task):
-            return  # whoever ended the judge has only delayed its judgement
+            return  # anyone who ended the judge has only delayed its judgement
         elif answer:
             found = self._judgement(self._load.slots[index], ending)
             yield (

@@ -91,8 +91,8 @@ class Slot:
     @property
     def provenance(self) -> dict[str, Any]:
         """Return where its result comes from, in plain data."""
-        beside = (self.meta.get("twins") or {}).get("cases", {})
-        digest = {**beside, **self.meta["cases"]}[self.case.name]["digest"]
+        companions = (self.meta.get("twins") or {}).get("cases", {})
+        digest = {**companions, **self.meta["cases"]}[self.case.name]["digest"]
         found = provenance(self.meta, digest, self.version, self.seed)
         return {**found, **self.case.conditions(self.seed)}
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from femubench.core.case.case import Case
-from femubench.core.run.beside import NOTHING, Beside
+from femubench.core.run.companions import NOTHING, Companions
 from femubench.core.schema.results import NOMINALS, Nominal
 from femubench.core.schema.run_options import StartModels
 from femubench.core.twin.twins import again
@@ -23,13 +23,13 @@ class Starts:
             cases as given and measures against them.
         nominal: which of the two models strategies start from.
         classes: kinds of structure and truth by case.
-        beside: twins of the cases, and what is to run again.
+        next to: twins of the cases, and what is to run again.
     """
 
     textbook: Mapping[str, Case] | None = None
     nominal: StartModels = "both"
     classes: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    beside: Beside = NOTHING
+    companions: Companions = NOTHING
 
     def yardstick(self, case: Case) -> Case:
         """Return a case with the model that all errors are measured against."""
@@ -47,13 +47,13 @@ class Starts:
             yield drawn, case
 
     def of_all(self, cases: Sequence[Case]) -> Iterator[tuple[Nominal, Case]]:
-        """Yield what the jobs of a run start from; beside its cases, the model that ranks."""
+        """Yield what the jobs of a run start from; next to its cases, the model that ranks."""
         for case in cases:
             yield from self.of(case)
-        for twin in self.beside.twins:
+        for twin in self.companions.twins:
             yield next(self.of(twin))
-        if self.beside.repeated_case is not None:
-            nominal, case = next(self.of(self.beside.repeated_case))
+        if self.companions.repeated_case is not None:
+            nominal, case = next(self.of(self.companions.repeated_case))
             yield nominal, again(case)
 
     def about(self, cases: Sequence[Case]) -> dict[str, Any]:

@@ -65,7 +65,7 @@ def list_planned_jobs(meta: Mapping[str, Any]) -> dict[JobName, None]:
     """
     starts = meta.get("starts") or {}
     models = {case: starts.get(case, NOMINALS[:1]) for case in meta.get("cases") or {}}
-    # What runs beside the cases starts from the model that ranks.
+    # What runs next to the cases starts from the model that ranks.
     models |= {name: models.get(case, NOMINALS)[:1] for name, case in origins_of(meta).items()}
     return {
         (case, strategy, seed, nominal): None
@@ -156,7 +156,7 @@ class Store:
 
     @cached_property
     def exhibits(self) -> Exhibits:
-        """Return the shelf of pictures beside the records."""
+        """Return the shelf of pictures next to the records."""
         return Exhibits(self.folder)
 
     def begin(self, meta: Mapping[str, Any]) -> None:
@@ -214,7 +214,7 @@ class Store:
         others = origins_of(meta)
         everything = in_order_of_jobs(meta, results.values())
         listed = [result for result in everything if result.case not in others]
-        beside = tuple(result for result in everything if result.case in others)
+        companions = tuple(result for result in everything if result.case in others)
         check_extent(meta, tuple(listed), file=self.folder)
         known, missing = meta.get("notes"), note_missing_jobs(meta, everything)
         notes = [*(known if isinstance(known, list) else []), *notes_of(faults, self.folder)]
@@ -223,7 +223,7 @@ class Store:
         found = scores_and_ranks(listed, reference, meta.get("baseline"))
         for result, score, rank in zip(listed, *found, strict=True):
             rate(result, score, rank)
-        return Run({**meta, "notes": notes}, tuple(listed), beside)
+        return Run({**meta, "notes": notes}, tuple(listed), companions)
 
     @pause_collection()
     def by_key(self) -> dict[str, JobResult]:

@@ -226,7 +226,7 @@ class DiagnosisReport:
         causes: named effects; with ``ambiguous`` the members of the inseparable group, with
             ``unknown`` and ``not-confirmed`` a best guess, with ``none`` nothing.
         rivals: every other explanation worth a look, most probable first.
-        reason: why the members of a group cannot be told apart; empty without a group.
+        reason: why the members of a group cannot be distinguished; empty without a group.
         advice: measurements that would separate them, best first.
         smallest_visible: one row an effect.
         residuals: every datum.

@@ -28,7 +28,7 @@ class _RunRecord(Struct):
 
     meta: dict[str, Any]
     results: Annotated[list[Any], Meta(max_length=MOST_RESULTS)]
-    beside: Annotated[list[Any], Meta(max_length=MOST_RESULTS)] = []
+    companions: Annotated[list[Any], Meta(max_length=MOST_RESULTS)] = []
 
 
 class _Names(Struct):
@@ -251,8 +251,8 @@ def run_to_json(run: Run) -> dict[str, Any]:
         {**result_to_json(result), "structure": structures.get(result.case, result.case)}
         for result in run.results
     ]
-    beside = [result_to_json(result) for result in run.beside]
-    return {"meta": meta, "results": results, **({"beside": beside} if beside else {})}
+    companions = [result_to_json(result) for result in run.companions]
+    return {"meta": meta, "results": results, **({"companions": companions} if companions else {})}
 
 
 def run_from_json(data: object, *, file: Path | str | None = None) -> Run:
@@ -267,15 +267,15 @@ def run_from_json(data: object, *, file: Path | str | None = None) -> Run:
     """
     record = read_plain(_RunRecord, data, file=file)
     meta = meta_from_json(record.meta, file=file)
-    results, beside = (
+    results, companions = (
         tuple(
             result_from_json(item, file=file, key=f"{key}[{i}]")
             for i, item in enumerate(getattr(record, key))
         )
-        for key in ("results", "beside")
+        for key in ("results", "companions")
     )
     check_extent(meta, results, file=file)
-    return Run(meta, results, beside)
+    return Run(meta, results, companions)
 
 
 def meta_from_json(

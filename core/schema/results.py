@@ -178,13 +178,13 @@ class Run(Shown):
     Arguments:
         meta: run id, seed, versions, machine, git commit, start time; plain data.
         results: one entry a job.
-        beside: results on twins of the cases and of jobs that were run again, which are in no
+        next to: results on twins of the cases and of jobs that were run again, which are in no
             figure of the run; ``meta["twins"]`` tells what they belong to.
     """
 
     meta: Mapping[str, Any]
     results: tuple[JobResult, ...]
-    beside: tuple[JobResult, ...] = ()
+    companions: tuple[JobResult, ...] = ()
 
     @property
     def nominals(self) -> tuple[Nominal, ...]:

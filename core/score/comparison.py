@@ -241,7 +241,7 @@ def compare_runs(
         for row in rows
         if (value := row.values[t.metric]) is not None and value > t.most + _ROUNDING * abs(t.most)
     )
-    told = (t.metric for t in thresholds if all(row.values[t.metric] is None for row in rows))
+    stated = (t.metric for t in thresholds if all(row.values[t.metric] is None for row in rows))
     ran = list(dict.fromkeys(pair.strategy for pair in pairs))
     columns = [[pair.before for pair in pairs if pair.strategy == name] for name in ran]
     columns += [[pair.after for pair in pairs if pair.strategy == name] for name in ran]
@@ -261,13 +261,13 @@ def compare_runs(
         notes=tuple(dict.fromkeys((*_notes(before), *_notes(after)))),
         thresholds=tuple(thresholds),
         excesses=tuple(excesses),
-        untested=tuple(told),
+        untested=tuple(stated),
     )
 
 
 def _notes(run: Run) -> list[str]:
-    told = run.meta.get("notes")
-    return list(map(str, told)) if isinstance(told, (list, tuple)) else []
+    stated = run.meta.get("notes")
+    return list(map(str, stated)) if isinstance(stated, (list, tuple)) else []
 
 
 def _common_start(before: Run, after: Run) -> Nominal:
@@ -323,7 +323,7 @@ def _digest(run: Run, result: JobResult) -> str:
 
 
 def _safe(meta: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the meta data with nothing in place of what a stranger wrote for a table."""
+    """Return the meta data with nothing in place of what a third party wrote for a table."""
     return {
         name: value
         for name, value in meta.items()

@@ -90,7 +90,7 @@ def rank_items(
 ) -> list[tuple[int, _Item]]:
     """Return the items with their ranks, best first; equal ones share a rank: 1, 2, 2, 4.
 
-    Sorted scores are split where the gap to the next one exceeds 1e-6 of it, so that whoever is
+    Sorted scores are split where the gap to the next one exceeds 1e-6 of it, so that anyone who is
     tied with one of a group is tied with all of it.
 
     Arguments:

@@ -65,7 +65,7 @@ def unsteady(run: Run) -> dict[str, str]:
     origins = origins_of(run.meta, "again")
     first = _by_job(run) if origins else {}
     found: dict[str, str] = {}
-    for item in run.beside:
+    for item in run.companions:
         origin = origins.get(item.case)
         known = first.get((origin or "", item.strategy, item.seed, item.nominal))
         if known is None or item.strategy in found:
@@ -114,20 +114,20 @@ def _differences(old: JobResult, new: JobResult) -> Iterator[str]:
     if old.status != new.status:
         yield f"{old.status} then, {new.status} now"
         return
-    told = set()
+    stated = set()
     for block in dict.fromkeys((*old.blocks, *new.blocks)):
         first, second = (
             item.blocks[block].rms_percent if block in item.blocks else None for item in (old, new)
         )
         if first != second:
-            told.add(block)
+            stated.add(block)
             yield f"{block} rms {first} % then, {second} % now"
     for name in _COUNTS:
         if getattr(old, name) != getattr(new, name):
-            told.add(name)
+            stated.add(name)
             yield f"{name} {getattr(old, name)} then, {getattr(new, name)} now"
     before, after = _stable(old), _stable(new)
-    parts = [name for name in before if before[name] != after.get(name) and name not in told]
+    parts = [name for name in before if before[name] != after.get(name) and name not in stated]
     if parts:
         yield f"differs in {', '.join(parts)}"
 

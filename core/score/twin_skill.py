@@ -19,7 +19,7 @@ from femubench.core.score.counting import Weights, block_weights
 from femubench.core.score.ranking import score_in
 from femubench.core.score.statistics import evidence_of, structures_of
 
-# How many times the error of a case must be left on its twins: on half of the structures, besides a
+# How many times the error of a case must be left on its twins: on half of the structures, in addition to a
 # small p; and on every twin of a single case, where there is nothing to test.
 CLEAR, KNOWN = 1.1, 2.0
 # The latter on twins of a geometry of their own. There the ratio of an honest strategy's errors
@@ -113,19 +113,19 @@ def twin_skills(run: Run) -> dict[str, TwinSkill]:
 
 
 def _pairs(run: Run, weights: Weights) -> Iterator[tuple[str, _Pair]]:
-    """Yield the strategy and the scores of every result on a twin beside that on its case."""
-    origins, told = origins_of(run.meta, "of"), run.meta["twins"]["reference"]
+    """Yield the strategy and the scores of every result on a twin next to that on its case."""
+    origins, stated = origins_of(run.meta, "of"), run.meta["twins"]["reference"]
     first = {(item.strategy, item.case, item.seed): item for item in run.ranked}
     blocks = defaultdict(list)
     for case, block in weights:
         blocks[case].append(block)
-    for item in run.beside:
+    for item in run.companions:
         origin = origins.get(item.case, "")
         other = first.get((item.strategy, origin, item.seed))
         if other is None or _STOPPED & {item.status, other.status}:
             continue
         for block in blocks[origin]:
-            there = math.log(score_in(item, block, told[item.case]))
+            there = math.log(score_in(item, block, stated[item.case]))
             here = math.log(score_in(other, block, run.meta["reference"][origin]))
             yield item.strategy, _Pair(origin, block, item.case, there, here)
 
@@ -152,7 +152,7 @@ def _known(pairs: Iterable[_Pair], kinds: Mapping[str, Sequence[str]]) -> tuple[
     """Return the cases on which a strategy is good, and on each of their twins much worse.
 
     Arguments:
-        kinds: of the twins; similar ones where not told.
+        kinds: of the twins; similar ones where not stated.
     """
     changes: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     levels: dict[str, list[float]] = defaultdict(list)

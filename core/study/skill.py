@@ -72,7 +72,7 @@ def skill_by(run: Run, *axes: str) -> pd.DataFrame:
 
 
 def _figures(run: Run, arms: Sequence[_Arm], by_arm: dict[_Arm, list[JobResult]]) -> dict[str, Any]:
-    """Return the figures of a cell, whose jobs go as one strategy on cases that are told apart."""
+    """Return the figures of a cell, whose jobs go as one strategy on cases that are distinguished."""
     structures, reference = run.meta.get("structures") or {}, run.meta.get("reference") or {}
     names = {arm: f"{number}" for number, arm in enumerate(arms)}
     results = tuple(
@@ -88,11 +88,11 @@ def _figures(run: Run, arms: Sequence[_Arm], by_arm: dict[_Arm, list[JobResult]]
         "reference": {n: reference[arm[1]] for arm, n in names.items() if arm[1] in reference},
     }
     row = row_of(Run(meta, results), "cell")
-    told = {name: row[name] for name in ("skill", "skill_low", "skill_high", "ok", "unphysical")}
+    stated = {name: row[name] for name in ("skill", "skill_low", "skill_high", "ok", "unphysical")}
     failed = sum(result.status not in DONE for result in results)
     jobs = int(row["total"])
     return {
-        **told,
+        **stated,
         "failed": failed,
         "not_applicable": row["not_applicable"],
         "missing": jobs - len(results),

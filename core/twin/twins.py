@@ -106,12 +106,12 @@ def twin_of(
     if found is case:
         raise NotApplicable("; ".join(reasons) or "there is no family of structures")
     name = f"{case.name}{MARK}{number}"
-    told = f"twin {number} from seed {seed} of {case.name}: {found.digest}"
+    stated = f"twin {number} from seed {seed} of {case.name}: {found.digest}"
     renamed = replace(
         disguise_case(found, rng if number > 1 else None),
         name=name,
         title=f"{case.title} (twin {number})",
-        digest=hashlib.sha256(told.encode()).hexdigest(),
+        digest=hashlib.sha256(stated.encode()).hexdigest(),
         structure=case.structure or case.name,
     )
     own = {field.name: getattr(renamed, field.name) for field in fields(Case)}

@@ -185,11 +185,11 @@ def _shortest(rows: FloatArray, right: FloatArray, cutoff: float) -> tuple[Float
     """Return the shortest x of least squares without the singular values up to a cutoff, and rank.
 
     LAPACK's solver makes no singular vectors, which takes half the time, but measures the cutoff
-    by the largest singular value: one that is known is put beside the others.
+    by the largest singular value: one that is known is put next to the others.
     """
     largest = max(float(np.linalg.norm(rows)), 2.0 * cutoff)
-    beside = la.block_diag(rows, largest)
-    found = la.lstsq(beside, np.append(right, 0.0), cond=cutoff / largest, lapack_driver="gelsd")
+    adjacent = la.block_diag(rows, largest)
+    found = la.lstsq(adjacent, np.append(right, 0.0), cond=cutoff / largest, lapack_driver="gelsd")
     return np.asarray(found[0][:-1]), int(found[2]) - 1
 
 

@@ -272,7 +272,7 @@ def update_by_equation_error(
     """
     if len(family) > MOST_UNKNOWNS:
         raise NotApplicable(
-            f"{len(family)} unknowns: their rank is told from a dense matrix, whose work grows "
+            f"{len(family)} unknowns: their rank is distinguished from a dense matrix, whose work grows "
             f"with the cube, so that {MOST_UNKNOWNS} at most are solved for; "
             "parameters=members, sections or sets has fewer"
         )

@@ -2,7 +2,7 @@
 
 Usage: python generate.py. The decks are written at once; test.unv needs `ccx`: it is measured on
 another model than the job, with four times as many elements and a softer left joint, at points that
-lie up to 2 mm beside the nodes of the job, with noise.
+lie up to 2 mm next to the nodes of the job, with noise.
 """
 
 from __future__ import annotations

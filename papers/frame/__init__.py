@@ -103,7 +103,7 @@ def table_findings(bench: Workbench) -> tuple[str, ...]:
     theirs = read_printed(PAPER)["table2"]["nonzeros_rigid"]["modes"]
     return (
         f"{wrong} of {len(errors)} errors in table 1 do not follow from the frequencies "
-        "beside them.",
+        "next to them.",
         f"Kabe's method with rigid-body modes gives {kabe[3]:.1f} and {kabe[4]:.1f} Hz for modes "
         f"4 and 5 where the paper has {theirs[3]:.1f} and {theirs[4]:.1f}; with shapes of another "
         f"truth {other[3]:.1f} and {other[4]:.1f} Hz: what it predicts depends on the shapes of "

@@ -49,17 +49,17 @@ def finding(bench: Workbench) -> tuple[tuple[Extra, ...], tuple[Figure, ...], tu
     untuned = found | {f"solid model, E {SOLID_YOUNG / 1e9:.0f} GPa, ideal welds": solid}
     extras = (make_untuned_table(ladder, untuned), steps_table(ladder, shares))
     figures: tuple[Figure, ...] = (chain_bars(ladder), cause_bars(ladder, shares))
-    told = (
+    stated = (
         torsion_sentence(ladder),
         make_untuned_sentence(ladder, untuned),
         shares_sentence(shares),
         joints_sentence(ladder, shares, bench),
     )
-    return extras, figures, told + change_sentences(bench) + receptance_sentences(bench)
+    return extras, figures, stated + change_sentences(bench) + receptance_sentences(bench)
 
 
 def make_untuned_table(ladder: Ladder, untuned: dict[str, FloatArray]) -> Extra:
-    """Return the table of models without anything tuned, beside the test."""
+    """Return the table of models without anything tuned, next to the test."""
     modes = tuple(f"mode {i + 1}, Hz (error, %)" for i in range(len(ladder.measured)))
     rows = [("measured", *(f"{f:.1f}" for f in ladder.measured), "", "")]
     for name, found in untuned.items():

@@ -24,7 +24,7 @@ Role = Literal["measured", "predicted", "nominal"]
 METHODS = {"baruch": "Baruch", "kabe": "Kabe", "generic-ls": "generic elements"}
 _CANCELLED = 1e-6
 _ZERO = 0.5  # Hz: rigid-body modes come out below, the wrong ones of an update far above
-_BESIDE = np.array([0.0, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0])
+_NEXT_TO = np.array([0.0, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0])
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,8 @@ class Point:
     def grid(self) -> FloatArray:
         """Return frequencies in Hz, dense where the receptance bends."""
         special = np.concatenate([self.resonances, self.antiresonances])
-        beside = np.concatenate([-_BESIDE[:0:-1], _BESIDE]) * DAMPING
-        near = (special[:, None] * (1.0 + beside)).ravel()
+        adjacent = np.concatenate([-_NEXT_TO[:0:-1], _NEXT_TO]) * DAMPING
+        near = (special[:, None] * (1.0 + adjacent)).ravel()
         near = near[(near > LOWEST) & (near < HIGHEST)]
         return np.unique(np.concatenate([np.linspace(LOWEST, HIGHEST, 400), near]))
 
@@ -164,7 +164,7 @@ def _curve(label: str, point: Point, role: Role) -> Curve:
 
 
 def receptance_sentences(bench: Workbench) -> tuple[str, ...]:
-    """Return what the paper says of its figures 6 to 11, beside what comes out here.
+    """Return what the paper says of its figures 6 to 11, next to what comes out here.
 
     Arguments:
         bench: with the cases ``frame`` and ``frame-beam``.
@@ -208,14 +208,14 @@ def _before_sentence(bundle: Bundle) -> str:
     models = [bundle.updated[words] for words in METHODS]
     worst = max(abs(nearest(m.resonances, f) / f - 1.0) for m in models for f in used)
     wrong = [f for f in bundle.updated["kabe"].resonances if f < used[0] / 1.01]
-    told = (
+    stated = (
         "Figures 6 to 8: all three models follow the three used resonances, as in the paper, here "
         f"within {max(100.0 * worst, 0.01):.2f} %."
     )
     if not wrong:
-        return told
+        return stated
     return (
-        f"{told} Not said of figure 7: Kabe's model has resonances at {_listed(wrong)} Hz where "
+        f"{stated} Not said of figure 7: Kabe's model has resonances at {_listed(wrong)} Hz where "
         "the free structure has rigid-body modes."
     )
 

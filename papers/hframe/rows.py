@@ -20,7 +20,7 @@ FREE_EI = f"spring:{SPRINGS},{_DAMPING}"
 _TO_THE_LAST = "options.tolerance=1e-9,options.cost_tolerance=1e-12"
 
 
-_AS_TOLD = Ground(
+_AS_STATED = Ground(
     "independent",
     "with the strategy as the text has it on the recovered dimensions, which no update was fitted "
     "to; nothing is chosen for it",
@@ -37,10 +37,10 @@ class Setup:
     """
 
     words: str
-    ground: Ground = _AS_TOLD
+    ground: Ground = _AS_STATED
 
     @property
-    def told(self) -> Ground:
+    def stated(self) -> Ground:
         """Return the ground with the words that repeat it."""
         words = f"{self.ground.words}: bench run hframe -s '{self.words}'"
         return replace(self.ground, words=words)

@@ -32,7 +32,7 @@ _BY_RULE = Ground(
 )
 _ERROR = Ground(
     "input",
-    "by definition: the error of the printed frequency beside it; ours is computed from that and "
+    "by definition: the error of the printed frequency next to it; ours is computed from that and "
     "the measured one",
 )
 _RATIO = Ground(
@@ -62,7 +62,7 @@ def follows(frequency: float, measured: float) -> float:
 
 
 def is_misprinted(frequency: float, measured: float, error: float) -> bool:
-    """Return whether a printed error contradicts the printed frequency beside it."""
+    """Return whether a printed error contradicts the printed frequency next to it."""
     return abs(follows(frequency, measured) - error) > 0.5000001 * 10.0**-ERROR_DECIMALS
 
 
@@ -72,7 +72,7 @@ def _mode_cells(
     words = reading.start if column == "initial" else reading.words
     ours = frequencies(run(bench, words).model, USED)
     measured = bench.cases["hframe"].used_measurement(0).frequencies
-    ground = reading.ground if column == "initial" else reading.told
+    ground = reading.ground if column == "initial" else reading.stated
     hertz = Page("hframe", row.table, (ground,), "Hz", limit, decimals=2)
     for i, (f, f_m) in enumerate(zip(theirs[column], measured, strict=True)):
         yield hertz.cell(f"mode {i + 1}", column, f, float(ours[i]))
@@ -105,7 +105,7 @@ def _parameter_cells(bench: Workbench, row: Update, theirs: dict[str, Any]) -> I
         ground = _BY_RULE if symbol in RULED else _TAKEN
         page = Page("hframe", row.table, (ground,), unit, LIMIT, digits, rule)
         yield page.cell(symbol, "initial", first, _springs_by_rule(bench).get(symbol, before))
-        page = Page("hframe", row.table, (reading.told,), unit, LIMIT, digits, missed)
+        page = Page("hframe", row.table, (reading.stated,), unit, LIMIT, digits, missed)
         yield page.cell(symbol, "updated", last, after)
         ratio, own = theirs["ratios"][symbol], last / first
         # The three digits of the values, and half a digit of a ratio printed with three decimals.

@@ -76,11 +76,11 @@ class AxialPreload(FrameEffect):
         """
         structure = model.frame_structure
         units, kind, every = once_for(model, "preload units", lambda: _units(structure))
-        forces, beside = preload_forces(structure, place)
+        forces, adjacent = preload_forces(structure, place)
         operator = ElementOperator(structure, every, units, share=forces, kind=kind)
         terms = [Term("stiffness", operator)]
-        if beside is not None:
-            terms.append(sparse_term("stiffness", beside))
+        if adjacent is not None:
+            terms.append(sparse_term("stiffness", adjacent))
         return proportional(*terms)
 
 

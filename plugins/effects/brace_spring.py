@@ -44,7 +44,7 @@ class BraceSpring(FrameEffect):
         """Return the pairs of joints without a member between them, the nearest 300 at most.
 
         Joints that rigid links make one body are one joint, and of those that stand off members
-        by links, a straight run of members joins all that it passes: a brace beside it would be
+        by links, a straight run of members joins all that it passes: a brace next to it would be
         a stiffener of these members.
         """
         if model.structure is None or model.structure.frame.plane == "out-of-plane":

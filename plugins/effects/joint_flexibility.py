@@ -31,7 +31,7 @@ _MOST = 6
 class JointFlexibility(FrameEffect):
     """Let all joints turn on springs, as stiff as a multiple of the members that end there.
 
-    One multiple for all; ``:apart``, every joint type has a factor of its own besides, and the
+    One multiple for all; ``:apart``, every joint type has a factor of its own as well, and the
     factors scatter around 1. Members that pass through a joint are continuous there.
     """
 

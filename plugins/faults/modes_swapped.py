@@ -1,4 +1,4 @@
-"""Two modes whose frequencies stand beside each other's shapes."""
+"""Two modes whose frequencies stand next to each other's shapes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class ModesSwapped:
         return [
             Suspect(
                 f"mode:{one}+{two}",
-                f"modes {one} and {two} have each other's frequencies beside their shapes",
+                f"modes {one} and {two} have each other's frequencies next to their shapes",
                 partial(self._corrected, (one, two)),
             )
             for i, j in combinations(order, 2)

@@ -28,7 +28,7 @@ Labels = list[tuple[int, int]]
 
 
 class AbaqusReader(ProgramReader):
-    """Reads stiffness and mass of *MATRIX GENERATE, e.g. job_STIF2.mtx beside job_MASS2.mtx.
+    """Reads stiffness and mass of *MATRIX GENERATE, e.g. job_STIF2.mtx next to job_MASS2.mtx.
 
     Coordinates come from the input file: ``dofs = "job.inp"``.
     """
@@ -43,7 +43,7 @@ class AbaqusReader(ProgramReader):
 
     def read_model(self, path: Path) -> NoReturn:
         """Refuse: such a file has one matrix."""
-        raise InputError("one matrix is no model", file=path, expected="the mass beside it")
+        raise InputError("one matrix is no model", file=path, expected="the mass next to it")
 
     def read_pair(self, stiffness: Path, mass: Path) -> Model:
         """Return a model on the degrees of freedom that either has, without those held."""

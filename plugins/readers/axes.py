@@ -33,24 +33,24 @@ class System:
             local = np.array([*(radius * _circle(around)), z])
         elif self.kind == "S":
             radius, down, around = coordinates
-            z, beside = radius * _circle(down)
-            local = np.array([*(beside * _circle(around)), z])
+            z, adjacent = radius * _circle(down)
+            local = np.array([*(adjacent * _circle(around)), z])
         return np.asarray(self.origin + local @ self.axes)
 
     def axes_at(self, point: FloatArray) -> FloatArray:
         """Return the axes of displacements at a point (basic coordinates), as rows, (3, 3).
 
-        On the axis of a system that is not rectangular, the point counts as beside it along x.
+        On the axis of a system that is not rectangular, the point counts as next to it along x.
         """
         if self.kind == "R":
             return self.axes
         x, y, z = self.axes @ (point - self.origin)
-        beside = float(np.hypot(x, y))
-        c, s = (x / beside, y / beside) if beside > 0.0 else (1.0, 0.0)
+        adjacent = float(np.hypot(x, y))
+        c, s = (x / adjacent, y / adjacent) if adjacent > 0.0 else (1.0, 0.0)
         turned = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         if self.kind == "S":
-            radius = float(np.hypot(beside, z))
-            up, out = (z / radius, beside / radius) if radius > 0.0 else (1.0, 0.0)
+            radius = float(np.hypot(adjacent, z))
+            up, out = (z / radius, adjacent / radius) if radius > 0.0 else (1.0, 0.0)
             along, across, pole = turned
             turned = np.array([out * along + up * pole, up * along - out * pole, across])
         return np.asarray(turned @ self.axes)

@@ -27,9 +27,9 @@ _MOST_ROWS = 1_000_000
 
 
 class CalculixReader(ProgramReader):
-    """Reads the job of an input file: job.sti, job.mas and job.dof beside job.inp.
+    """Reads the job of an input file: job.sti, job.mas and job.dof next to job.inp.
 
-    Files job_NAME.sti beside them are groups: the part NAME of the stiffness.
+    Files job_NAME.sti next to them are groups: the part NAME of the stiffness.
     """
 
     name: str = "CalculiX"
@@ -55,7 +55,7 @@ class CalculixReader(ProgramReader):
         return matrix_model(mass, stiffness, numbers, along, xyz, groups)
 
     def model_files(self, path: Path) -> Sequence[Path]:
-        """Return the files of a job besides the one named; raises InputError."""
+        """Return the files of a job in addition to the one named; raises InputError."""
         job = [path.with_suffix(suffix) for suffix in (".inp", ".sti", ".mas", ".dof")]
         further = nodes.list_included(job[0])
         return tuple(f for f in (*job, *further, *_groups(path).values()) if f != path)
@@ -65,7 +65,7 @@ class CalculixReader(ProgramReader):
         return nodes.read_nodes(path.with_suffix(".inp"))
 
     def write_model(self, model: Model, path: Path, original: Path) -> None:
-        """Write .sti, .mas and .dof of an updated model beside each other, and its groups."""
+        """Write .sti, .mas and .dof of an updated model next to each other, and its groups."""
         geometry = model.geometry
         assert isinstance(geometry, MatrixGeometry)
         for suffix, matrix in ((".sti", model.stiffness), (".mas", model.mass)):

@@ -67,7 +67,7 @@ def _lines(path: Path, above: Path | None = None, depth: int = 0) -> Iterator[Li
         what = (
             "includes itself" if depth > _DEEPEST else "leads out of the folder of the input file"
         )
-        raise InputError(what, file=path, expected="files beside the input file")
+        raise InputError(what, file=path, expected="files next to the input file")
     if not found.is_file() or found.stat().st_size > _LARGEST:
         what = "is too large" if found.is_file() else "is not there"
         raise InputError(what, file=path, expected="a file of at most 256 MiB")

@@ -40,8 +40,8 @@ def open_broken(path: Path, what: str) -> Iterator[None]:
     except MemoryError:
         raise InputError("takes too much memory", file=path, expected=what) from None
     except Exception as error:
-        told = f"{type(error).__name__}: {error}"
-        raise InputError(f"cannot be read: {told}", file=path, expected=what) from None
+        stated = f"{type(error).__name__}: {error}"
+        raise InputError(f"cannot be read: {stated}", file=path, expected=what) from None
 
 
 class ProgramReader:

@@ -56,7 +56,7 @@ class Sparse(ParametricStrategy):
 
 
 def cross_validated_weight(slope: FloatArray, right: FloatArray) -> float:
-    """Return the l1 weight at which equations left out one by one are foretold best.
+    """Return the l1 weight at which equations left out one by one are predicted best.
 
     Arguments:
         slope, right: S (m, p) and b (m,).

@@ -1,4 +1,4 @@
-"""The papers' own columns, to stand beside ours."""
+"""The papers' own columns, to stand next to ours."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def compact_json(data: Any) -> str:  # noqa: ANN401 - JSON data of any form
     return json.dumps(data, allow_nan=False, separators=(",", ":"))
 
 
-def round_figures(value: Any, digits: int) -> Any:  # noqa: ANN401 - a number of a stranger's result
+def round_figures(value: Any, digits: int) -> Any:  # noqa: ANN401 - a number of a third party's result
     """Return a number with some significant digits; None where there is none."""
     value = clean(value)
     if isinstance(value, bool) or not isinstance(value, (int, float)):

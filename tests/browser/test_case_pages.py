@@ -15,7 +15,7 @@ from femubench.core.run.store import Store
 from femubench.reports.htmls import HtmlReporter
 from femubench.results import Run
 
-VIEW, TOLD = ".case-structure svg.case-view", ".case-structure .case-told"
+VIEW, TOLD = ".case-structure svg.case-view", ".case-structure .case-stated"
 PIXELS = f"document.querySelector('{VIEW}').innerHTML"
 
 
@@ -43,7 +43,7 @@ def drawn(page: Page) -> str:
     return found
 
 
-def told(page: Page) -> str:
+def stated(page: Page) -> str:
     return page.locator(TOLD).inner_text()
 
 
@@ -138,21 +138,21 @@ def test_more_of_the_table_on_request(shown: Callable[..., Page]) -> None:
 def test_modes_and_strategies_can_be_picked(shown: Callable[..., Page]) -> None:
     page = shown("frame-solid")
     page.get_by_label("Strategy", exact=True).select_option("unchanged")
-    first, text = drawn(page), told(page)
+    first, text = drawn(page), stated(page)
     assert text.startswith("Mode 1 (used): measured 231.41 Hz, unchanged 264.")
     mode = page.get_by_label("Mode", exact=True)
     mode.select_option(index=1)
     second = drawn(page)
     assert second != first
-    assert told(page).startswith("Mode 2 (used)")
+    assert stated(page).startswith("Mode 2 (used)")
     page.get_by_label("Strategy", exact=True).select_option("generic-ls")
     assert drawn(page) != second
-    assert "generic-ls" in told(page)
+    assert "generic-ls" in stated(page)
     # After a design change there are shapes as well.
     changed = page.locator("optgroup[label*='mass and spring at 6'] option").first
     mode.select_option(value=changed.get_attribute("value"))
-    assert "generic-ls 150.9" in told(page) or "generic-ls 151" in told(page)
-    assert re.search(r"MAC (0\.99|1\.0)", told(page))
+    assert "generic-ls 150.9" in stated(page) or "generic-ls 151" in stated(page)
+    assert re.search(r"MAC (0\.99|1\.0)", stated(page))
 
 
 def test_the_structure_is_turned_by_keys_and_mouse(shown: Callable[..., Page]) -> None:
@@ -167,10 +167,10 @@ def test_the_structure_is_turned_by_keys_and_mouse(shown: Callable[..., Page]) -
     page.keyboard.press("r")
     assert drawn(page) == seen[0]
     page.keyboard.press("n")
-    assert told(page).startswith("Mode 2 (used)")
+    assert stated(page).startswith("Mode 2 (used)")
     page.keyboard.press("p")
     page.keyboard.press("p")
-    assert not told(page).startswith(("Mode 1 ", "Mode 2 "))
+    assert not stated(page).startswith(("Mode 1 ", "Mode 2 "))
     page.keyboard.press("n")
     assert drawn(page) == seen[0]
     page.locator(VIEW).scroll_into_view_if_needed()
@@ -247,7 +247,7 @@ def test_the_nominal_model_is_shown_where_unchanged_did_not_run(
     for legend in page.locator("figure.chart", has_text="Receptance,").locator(".legend").all():
         assert legend.inner_text().split("\n") == ["measured", "local", "nominal model"]
     page.get_by_label("Strategy", exact=True).select_option("nominal model")
-    assert "nominal model 264.48 Hz" in told(page)
+    assert "nominal model 264.48 Hz" in stated(page)
     found.assert_quiet(path)
 
 
@@ -283,9 +283,9 @@ def test_changes_of_the_stiffness(shown: Callable[..., Page]) -> None:
     section = page.locator("section.case-section", has_text="Change of the stiffness").last
     page.get_by_label("Strategy A").select_option("generic-ls")
     assert section.locator("svg.case-map").first.locator(".found").count() == 28
-    told = section.locator(".case-told").first.inner_text()
-    assert told.startswith("Largest: k")
-    assert "colours end at" in told
+    stated = section.locator(".case-stated").first.inner_text()
+    assert stated.startswith("Largest: k")
+    assert "colours end at" in stated
     page.get_by_label("Strategy A").select_option("baruch")
     picture = section.locator(".plot").first
     picture.locator("svg.canvas").wait_for()

@@ -28,18 +28,20 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def hostile(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a site in which every text that a stranger gives is markup, or turned around."""
+    """Return a site in which every text that a third party gives is markup, or turned around."""
     names = (EVIL, TURNED, "n" * 60)
     cases = {c: {"title": EVIL, "digest": f"{k:064d}"} for k, c in enumerate(synthetic_cases())}
     own = {"summary": EVIL, "author": TURNED, "homepage": "https://a.b/c"}
     machine = {"platform": EVIL, "cpu": EVIL, "blas": TURNED}
-    told = {
+    stated = {
         "cases": cases,
         "about": dict.fromkeys(names, own),
         "machine": machine,
         "citations": {EVIL: EVIL},
     }
-    return synthetic_site(tmp_path_factory.mktemp("hostile"), 5, 4, names=names, kind=EVIL, **told)
+    return synthetic_site(
+        tmp_path_factory.mktemp("hostile"), 5, 4, names=names, kind=EVIL, **stated
+    )
 
 
 def synthetic_cases() -> list[str]:

@@ -299,7 +299,7 @@ class BadHistory(Good):
 
 @dataclass(frozen=True)
 class Secretive(Good):
-    """Have an option that nobody is told of."""
+    """Have an option that nobody is stated of."""
 
     cutoff: float = 1.0
 
@@ -362,7 +362,7 @@ class Worded(Spring):
     sizes = (Size(0.01, 0.1, Site.modal_stiffness, log=True),)
 
     def look(self, seen: Seen) -> Sequence[LookWarning]:
-        return [seen.warning(self.name, "It cannot be told by looking.", None)]
+        return [seen.warning(self.name, "It cannot be stated by looking.", None)]
 
     def in_half(self, values: Sequence[float]) -> Sequence[float]:
         return values

@@ -461,10 +461,10 @@ class NoStart(Confinement):
 
 
 @dataclass(frozen=True)
-class Told(Strategy):
+class OnAdvance(Strategy):
     """Leaves the model as it is, draws a number, and tells in a file that it was run."""
 
-    name: ClassVar[str] = "told"
+    name: ClassVar[str] = "stated"
     citation: ClassVar[str] = "none"
     file: str = ""
 

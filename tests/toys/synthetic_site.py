@@ -21,14 +21,14 @@ def synthetic_site(
     *,
     names: Sequence[str] = (),
     kind: str = "frame",
-    **told: Any,
+    **stated: Any,
 ) -> Path:
     """Publish two runs into a folder; the second has another version of the first two strategies.
 
     Arguments:
         strategies, scenarios, names: see `synthetic_run`.
         kind: class of every second case, and part of the name of the other version.
-        told: meta data instead of those that are made up.
+        stated: meta data instead of those that are made up.
     """
     run = synthetic_run(strategies, scenarios, names=names)
     cases = list(run.meta["cases"])
@@ -50,6 +50,6 @@ def synthetic_site(
             if number == 0 or result.strategy in meta["strategies"][:2]
         ]
         moment = {"run": f"run {number}", "started": f"2026-01-0{number + 1}T00:00:00Z"}
-        made = Run({**meta, **moment, **told}, tuple(results))
+        made = Run({**meta, **moment, **stated}, tuple(results))
         publish(folder, made, unverified=True, address="https://example.org/board")
     return folder

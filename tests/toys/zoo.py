@@ -184,7 +184,7 @@ def unpicklable_error(model: Model) -> None:
 
 
 class _Bomb:
-    """Runs a command in whoever unpickles it."""
+    """Runs a command in anyone who unpickles it."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return os.system, (f"touch {Path.home()}/{MARK}",)
@@ -230,7 +230,7 @@ def daemon(model: Model) -> None:
 
 
 @animal()
-def stranger(model: Model) -> None:
+def third_party(model: Model) -> None:
     """Leaves a process behind that has nothing of its environment."""
     if os.fork() == 0:
         os.setsid()

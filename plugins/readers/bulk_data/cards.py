@@ -298,9 +298,9 @@ def _split(text: str, file: Path, number: int) -> _Line:
 
 def _section(file: Path, line: int, text: str) -> InputError:
     """Return the error of a second section of bulk data, or of one of another kind."""
-    told = " ".join(text.split())[:40]
+    stated = " ".join(text.split())[:40]
     kind = "superelements are not read: " if "SUPER" in text.upper() else ""
-    return InputError(f"{kind}{told!r}", file=file, line=line, expected=_ONE_SECTION)
+    return InputError(f"{kind}{stated!r}", file=file, line=line, expected=_ONE_SECTION)
 
 
 def _check_language(text: str, file: Path, line: int) -> None:

@@ -59,7 +59,7 @@ class Systems:
             y = np.cross(z, towards_x)
             sizes = np.linalg.norm(z), np.linalg.norm(towards_x), np.linalg.norm(y)
             if not sizes[2] > 1e-9 * sizes[0] * sizes[1]:
-                expected = "a point on z, and one in x-z beside it"
+                expected = "a point on z, and one in x-z next to it"
                 raise card.error("the points lie on one line", expected)
             z, y = z / sizes[0], y / sizes[2]
             axes = np.array([np.cross(y, z), y, z])

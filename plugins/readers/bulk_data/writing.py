@@ -53,7 +53,7 @@ def write_cards(model: Model, path: Path, original: Path) -> None:
 
     Arguments:
         model: of the frame that the original describes, in the units of that.
-        path: the new file; what the original includes is written beside it.
+        path: the new file; what the original includes is written next to it.
         original: the file that the model comes from.
 
     Raises:
@@ -361,7 +361,7 @@ def real(value: float) -> str:
 
 
 def _write(deck: Deck, edits: _Changes, path: Path, original: Path) -> None:
-    """Write all files of a deck, those that it includes beside the main one."""
+    """Write all files of a deck, those that it includes next to the main one."""
     for file, lines in deck.lines.items():
         target = path if file == original else path.parent / file.relative_to(original.parent)
         changes = edits.get(file, {})

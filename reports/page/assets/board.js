@@ -20,7 +20,7 @@
     skill("skill_drawn", "From drawn", `skill of the start from the models as drawn, against the ${ranking.yardstick}s too`),
     skill("skill_tests", "On tests", "skill on tests alone, without computed truths"),
     data.strategies.some(({ twins }) => twins) && { key: "twins", title: "On twins", right: true, down: true, cell: (row) => cell(twinsOf(row)?.skill, (v) => (twinsOf(row) ? `${share(v)} (${share(twinsOf(row).original_skill)})` : number(v))),
-      hint: "skill on similar structures under other names, drawn when the run began; beside it, in brackets, on the cases that have such twins" },
+      hint: "skill on similar structures under other names, drawn when the run began; next to it, in brackets, on the cases that have such twins" },
     ...data.blocks.map((block, k) => figure(`${block}_percent`, `${bench.blockName(k)} rms, %`, `rms frequency error of the ${block === "used" ? "modes that were given; no part of the skill" : `${block} modes`}; median over the cases`, small, { block: k })),
     figure("coverage90", "In 90 %", "share of unseen modes in the 90 % interval that the strategy states", share),
     figure("crps_percent", "CRPS, %", "continuous ranked probability score of unseen modes in percent of the frequency, mean over the structures; the absolute error where no uncertainty is stated", small),
@@ -52,8 +52,8 @@
   function coverageCell(row) {
     const misses = d3.rollups(row.results.filter((r) => r.status !== "ok"), (own) => own.length, (r) => r.status);
     if (row.total > row.results.length) misses.push(["missing", row.total - row.results.length]);
-    const told = misses.map(([status, n]) => el("div", { class: status === "not-applicable" ? "soft" : "bad" }, `${n} ${bench.statusWord(status)}`));
-    return el("td", { class: "coverage", "data-ok": row.ok, "data-total": row.total, "data-sort": -row.ok - row.not_applicable / 1e6 }, `${row.ok} of ${row.total}`, told);
+    const stated = misses.map(([status, n]) => el("div", { class: status === "not-applicable" ? "soft" : "bad" }, `${n} ${bench.statusWord(status)}`));
+    return el("td", { class: "coverage", "data-ok": row.ok, "data-total": row.total, "data-sort": -row.ok - row.not_applicable / 1e6 }, `${row.ok} of ${row.total}`, stated);
   }
 
   // Return the scores of a strategy case by case.

@@ -55,11 +55,11 @@
   const frequencies = (item, entries, state) => {
     const [box, options] = [el("div"), { errors: false, mac: false, few: false }];
     const [fine, failed] = [entries.filter(({ ok }) => ok), entries.filter(({ ok }) => !ok)];
-    const beside = [[data.as_drawn[item.name] ?? {}, "from drawn"], [data.papers[item.name] ?? {}, "as printed"]];
+    const companions = [[data.as_drawn[item.name] ?? {}, "from drawn"], [data.papers[item.name] ?? {}, "as printed"]];
     const fill = () => {
       const shown = fine.filter((entry) => !options.few || twoOf(state).includes(entry) || entry.name === data.baseline)
         .map((entry) => ({ ...entry, mark: [entry === state.a && "A", entry === state.b && "B", entry.result.unphysical && "unphysical"].filter(Boolean).join(", ") }));
-      box.replaceChildren(...(shown.length ? bench.frequencies(shown, beside, options) : [note("No strategy gave a model.")]));
+      box.replaceChildren(...(shown.length ? bench.frequencies(shown, companions, options) : [note("No strategy gave a model.")]));
     };
     const flip = (label, name) => bench.tick(label, false, (on) => {
       options[name] = on;
@@ -111,24 +111,24 @@
       if (exhibit.difference) return matrix(exhibit.difference, `${name}: |K − K₀| between nodes, logarithmic`);
       if (exhibit.findings?.length) return note(`${name}: ${exhibit.findings.map(({ label }) => label).join("; ")}; these have no place on the drawing.`);
       if (exhibit.elements?.every((value) => value === 0)) return note(`${name}: no element was changed.`);
-      return note(stage.thinned ? `${name}: the model has too many elements to show the change of each.` : `${name}: the change cannot be told element by element.`);
+      return note(stage.thinned ? `${name}: the model has too many elements to show the change of each.` : `${name}: the change cannot be stated element by element.`);
     }));
   };
 
   const histories = (state) => {
-    const told = twoOf(state).filter(({ ok, detail }) => ok && detail.history.length > 1)
+    const stated = twoOf(state).filter(({ ok, detail }) => ok && detail.history.length > 1)
       .map((entry) => ({ ...entry, look: lookOf(entry, state), steps: entry.detail.history, first: entry.detail.history[0], named: new Set(entry.detail.parameters.map(({ name }) => name)) }));
-    if (!told.length) return note("No iterations were recorded.");
+    if (!stated.length) return note("No iterations were recorded.");
     const chart = (title, y, series) => bench.draw({ kind: "line", title, x: { label: "Iteration", unit: "1" }, y, series });
     const curve = ({ steps }, name, of, look) => ({ name, x: steps.map((row, i) => row.iteration ?? i), y: steps.map(of), ...look });
-    const keys = d3.union(...told.map(({ first, named }) => Object.keys(first).filter((key) => key !== "iteration" && !named.has(key))));
+    const keys = d3.union(...stated.map(({ first, named }) => Object.keys(first).filter((key) => key !== "iteration" && !named.has(key))));
     const plain = [...keys].slice(0, HISTORY_CHARTS).map((key) => {
-      const series = told.filter(({ first }) => key in first).map((entry) => curve(entry, entry.name, (row) => row[key] ?? null, entry.look));
+      const series = stated.filter(({ first }) => key in first).map((entry) => curve(entry, entry.name, (row) => row[key] ?? null, entry.look));
       const [low, high] = d3.extent(series.flatMap(({ y }) => y).filter((value) => value > 0));
       const label = key.replace(/_/g, " ");
       return chart(`${label}: ${series.map(({ name }) => name).join(", ")}`, { label, log: high / low > 50 }, series);
     });
-    const moving = told.map((entry) => {
+    const moving = stated.map((entry) => {
       const own = Object.keys(entry.first).filter((key) => entry.named.has(key) && entry.first[key]).slice(0, 8);
       return own.length > 0 && chart(`Parameters of ${entry.name}`, { label: "Value over start", unit: "1" }, own.map((key) => curve(entry, key, (row) => row[key] / entry.first[key])));
     });
@@ -145,7 +145,7 @@
       return root;
     }
     const find = (name) => entries.find((entry) => entry.name === name);
-    // The best whose model is a possible structure, beside the baseline.
+    // The best whose model is a possible structure, next to the baseline.
     const best = entries.find(({ ok, result }) => ok && !result.unphysical) ?? entries[0];
     const state = { a: best, b: [find(data.baseline), ...entries].find((entry) => entry && entry !== best) ?? best };
     const [table, refill] = frequencies(item, entries, state);

@@ -9,7 +9,7 @@
   const FAR = 4; // an axis leaves out what lies farther away than so many times the spread of the rest
   const HINT = "Point at the chart, or focus it and use the arrow keys, to read its values.";
   // Okabe and Ito's colours (the first follows the text's) with a dash pattern and a marker each, so
-  // that curves are told apart without colour.
+  // that curves are distinguished without colour.
   const LOOKS = [["blue", "", "circle"], ["vermilion", "7 3", "square"], ["green", "2 3", "triangle"], ["purple", "9 3 2 3", "diamond"],
     ["orange", "12 4", "times"], ["sky", "4 2 1 2 1 2", "plus"], ["ink", "1 2", "wye"], ["olive", "6 2 2 2 2 2", "asterisk"]];
   const ROLES = { measured: ["ink", "", "circle", 2.4], nominal: ["soft", "5 4", "square", 1.8] };
@@ -143,7 +143,7 @@
   }
 
   const ROUND = [[35, 325, 145, 215, 90, 270, 0, 180].map((angle) => (angle * Math.PI) / 180), [10, 16, 28, 42, 60, 86]];
-  // Return what writes texts beside points where nothing is in the way, with a line to the farther ones; those
+  // Return what writes texts next to points where nothing is in the way, with a line to the farther ones; those
   // that must stand have their first place at last.
   bench.writer = (layer, [left, top, right, bottom], points = []) => {
     const taken = points.map(({ px, py }) => [px - 5, py - 5, px + 5, py + 5]);

@@ -40,7 +40,7 @@ const bench = {};
     percent: (value, digits) => `${value < 0 ? "−" : "+"}${Math.abs(value).toFixed(digits)}`,
     plural: (n, one, many = `${one}s`) => `${count(n)} ${n === 1 ? one : many}`,
     shortened(text, width, end = false) {
-      // A place on a member, "name@0.25", is told from the next one by its end.
+      // A place on a member, "name@0.25", is distinguished from the next one by its end.
       const tail = end && text.includes("@") ? text.slice(text.lastIndexOf("@")) : "";
       if (text.length <= width) return text;
       return tail.length < width - 2 ? `${text.slice(0, width - tail.length - 1)}…${tail}` : `${text.slice(0, width - 1)}…`;

@@ -6,10 +6,10 @@
   const FLAT = { ...START, "out-of-plane": [0, 90], "in-plane": [0, 0] };
   const CYCLE = 2400; // ms of one period on the screen
   const REACH = 0.22; // of the radius of the structure, a reading of 1 at an amplitude of 1
-  const MOST_LABELS = 12; // of findings that are told in words on the drawing
+  const MOST_LABELS = 12; // of findings that are stated in words on the drawing
   const MANY = 100; // findings; more are drawn by colours while the view moves
   const MOST_BENT = 300; // nodes with smooth lines between them; those of more lie close enough
-  const LONGEST = 40; // letters beside a place
+  const LONGEST = 40; // letters next to a place
   const ROBUST = 3; // medians at which colours of changes end
   const BLOCKS = { used: "used", higher: "held out", modified: "modified, held out" };
   const HELP =
@@ -104,7 +104,7 @@
     return { shape, arrows, mac: scored?.mac ?? (mm * pp ? (mp * mp) / (mm * pp) : 0), scored };
   };
 
-  /** Return the modes that can be picked, every measured one and then what the model has besides, by their keys. */
+  /** Return the modes that can be picked, every measured one and then what the model has as well, by their keys. */
   const modesOf = (stage, entry) => {
     const own = entry?.exhibit?.modes ?? [];
     const partner = ({ mode, modification }) => own.find((item) => item.paired === mode && (item.modification ?? null) === (modification ?? null)) ?? null;
@@ -246,7 +246,7 @@
       const [marks, names] = [svg("g"), svg("g")];
       const write = bench.writer(names, [0, 0, width, height]);
       const large = d3.sort(found, ({ value }) => -Math.abs(value ?? Infinity));
-      const told = `Largest: ${large.slice(0, 3).map(({ label }) => label).join("; ")}.`;
+      const stated = `Largest: ${large.slice(0, 3).map(({ label }) => label).join("; ")}.`;
       drawFound(marks, write, found, end, project, false);
       for (const joint of stage.joints) write(joint.name, project(joint.xyz), { name: "soft" });
       const beyond = found.some((item) => isSized(item) && Math.abs(item.value) > 1.001 * end) ? ", and what lies beyond has that colour and its number" : "";
@@ -254,9 +254,9 @@
       const colours = found.some(isSized) ? ` Green is stiffer or more, purple softer or less; colours end at ${percent(end, "")}${beyond}${whose}.` : "";
       const rows = large.map(({ label, value }) => [label, bench.cell(value, (v) => (v === null ? "–" : (100 * v).toFixed(2)))]);
       return el("figure", { class: "case-figure" }, el("figcaption", {}, title),
-        svg("svg", { viewBox: `0 0 ${width} ${height}`, width, height, class: "case-map structure", role: "img", "aria-label": `${title}. ${told}` },
+        svg("svg", { viewBox: `0 0 ${width} ${height}`, width, height, class: "case-map structure", role: "img", "aria-label": `${title}. ${stated}` },
           svg("path", { class: "still", d: outline(chainsOf(stage), stage.nodes.map(project)) }), marks, names),
-        el("p", { class: "case-told" }, told, colours),
+        el("p", { class: "case-stated" }, stated, colours),
         bench.fold("Everything as a table", () => bench.scroll(bench.table(`Everything: ${title}`, ["What was found", "Change in %"], rows))));
     });
   };
@@ -272,7 +272,7 @@
     const [view, frame, chains] = [{ turn: start, zoom: 1, fit: 1 }, extent(stage.nodes), chainsOf(stage)];
     const layers = { still: svg("path", { class: "still" }), found: svg("g"), fixed: svg("g"), names: svg("g"), shape: svg("path", { class: "shape" }), arrows: svg("path", { class: "measured line" }) };
     const drawing = svg("svg", { class: "case-view structure", tabindex: "0", role: "application", "aria-roledescription": "structure view" }, Object.values(layers));
-    const told = el("p", { class: "case-told", role: "status" });
+    const stated = el("p", { class: "case-stated", role: "status" });
     const show = { joints: stage.plane !== "matrices", sensors: false, attachments: true, measured: true, found: true };
     let [entry, modes, at, now, amplitude, found] = [shown[0] ?? null, new Map(), null, { shape: null, arrows: null }, 1, []];
     let [size, flat, moving, settling] = [[0, 0], { nodes: [], ways: [], arrows: [] }, false, null];
@@ -309,7 +309,7 @@
       }, 250);
     };
     const describe = (text) => {
-      told.textContent = text;
+      stated.textContent = text;
       drawing.setAttribute("aria-label", `Structure in three dimensions. ${text}. ${play.playing ? "Playing" : "Paused"}. ${HELP}`);
     };
     const pickMode = (key) => {
@@ -350,7 +350,7 @@
     const toggle = () => {
       play.playing = !play.playing;
       playButton.textContent = play.playing ? "Pause" : "Play";
-      describe(told.textContent);
+      describe(stated.textContent);
       play.go();
       draw();
     };
@@ -384,7 +384,7 @@
     root.append(el("div", { class: "case-structure" },
       el("div", { class: "controls" }, el("label", {}, "Strategy ", strategyList), el("label", {}, "Mode ", modeList),
         el("span", { class: "controls" }, before, playButton, after), el("label", {}, "Amplitude ", slider)),
-      drawing, told,
+      drawing, stated,
       el("div", { class: "controls" }, el("span", { class: "controls", role: "group", "aria-label": "View" }, views), Object.keys(show).map(flip)),
       legend(), el("p", { class: "soft" }, HELP)));
     pick(shown[0]?.name);

@@ -1,4 +1,4 @@
-"""What runs beside the cases of a run: twins of them, and one job of every strategy again."""
+"""What runs next to the cases of a run: twins of them, and one job of every strategy again."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from femubench.core.twin.twins import AGAIN, Twin
 
 
 @dataclass(frozen=True)
-class Beside:
-    """Cases whose results are in no figure of a run, but beside it.
+class Companions:
+    """Cases whose results are in no figure of a run, but next to it.
 
     Arguments:
         twins: of the cases of the run.
@@ -57,10 +57,12 @@ class Beside:
         }
 
 
-NOTHING = Beside()
+NOTHING = Companions()
 
 
-def choose_beside(cases: Sequence[Case], twins: Sequence[Twin], number: int, seed: int) -> Beside:
+def choose_beside(
+    cases: Sequence[Case], twins: Sequence[Twin], number: int, seed: int
+) -> Companions:
     """Return twins, and the case with the smallest model to run again.
 
     Arguments:
@@ -68,4 +70,4 @@ def choose_beside(cases: Sequence[Case], twins: Sequence[Twin], number: int, see
         twins: of them.
         number, seed: of twins of each case, and what they were drawn from.
     """
-    return Beside(twins, min(cases, key=lambda case: case.model.size), seed, number)
+    return Companions(twins, min(cases, key=lambda case: case.model.size), seed, number)
