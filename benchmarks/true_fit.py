@@ -1,4 +1,4 @@
-"""The fit of what truly is there next to what a search found: faults of search, not of inference."""
+"""The fit of what truly is there and of what a search found: faults of search, not of inference."""
 
 from __future__ import annotations
 

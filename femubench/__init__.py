@@ -1,7 +1,7 @@
 """femubench: which finite element model updating strategies hold up.
 
 What a user calls is a name of this module; what an author of a strategy, an effect or a report
-needs in addition to is in `femubench.fem`, `.modal`, `.update`, `.effect`, `.diagnosis`, `.results`,
+needs as well is in `femubench.fem`, `.modal`, `.update`, `.effect`, `.diagnosis`, `.results`,
 `.reproduction`. Names are imported on first use, so that ``import femubench`` costs nothing.
 
 The example of every function starts from these lines:

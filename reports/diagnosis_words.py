@@ -113,8 +113,8 @@ def weight(row: Data) -> str:
     """Return what data and prior say for the first explanation against another one."""
     against = "no cause at all" if row["against"] == "nothing" else plain(row["against"])
     return (
-        f"Against {against}, the data add {format_signed(row['data'])} to the logarithm of the odds, "
-        f"the prior {format_signed(row['prior'])}."
+        f"Against {against}, the data add {format_signed(row['data'])} to the logarithm of the "
+        f"odds, the prior {format_signed(row['prior'])}."
     )
 
 

@@ -1,4 +1,4 @@
-"""What the reports say about a run in addition to the leaderboard: failures, design changes, header."""
+"""What the reports say of a run apart from the leaderboard: failures, design changes, header."""
 
 from __future__ import annotations
 
@@ -198,7 +198,8 @@ def _how_sure(name: str, tiers: Sequence[Sequence[str]], count: int) -> Iterator
         yield "No other strategy is shown to differ from it: all are in tier 1."
     elif companions:
         below = f"{count - 1 - len(companions)} of {count} are below"
-        yield f"Next to it in tier 1, not shown to differ from it: {first_of(companions, 4)}; {below}."
+        first = first_of(companions, 4)
+        yield f"Next to it in tier 1, not shown to differ from it: {first}; {below}."
 
 
 def notes_of(run: Run) -> list[str]:

@@ -223,7 +223,7 @@ def errors_of(exact: FloatArray, meshes: tuple[int, ...], **case: object) -> lis
     found = []
     for n in meshes:
         elastic = solve_modes(beam(n, **case)).elastic.natural_frequencies  # type: ignore[arg-type]
-        # Bending is distinguished from axial motion by its frequency: the rod's first lies far above.
+        # Bending differs from axial motion by its frequency: the rod's first lies far above.
         found.append(np.abs(elastic[: len(exact)] / exact - 1.0))
     return found
 

@@ -1,4 +1,4 @@
-"""A zoo of hostile strategies next to good ones: each is stated by its status, and harms no other."""
+"""A zoo of hostile strategies next to good ones: each has its status, and harms no other."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def chain(folder: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def universal(folder: Path, length: float = 1e3, count: int = 6, **nodes: np.ndarray) -> Path:
-    """Write a test of the chain, in mm unless stated, its axis along the test's y, 3 mm next to it."""
+    """Write a test of the chain, in mm unless stated, its axis along the test's y, 3 mm off."""
     hertz, shapes = chain(folder)
     zero, x = np.zeros(SPANS), 0.2 * np.arange(1.0, SPANS + 1.0)
     place = {"x": zero + 0.003 * length, "y": length * x, "z": zero} | nodes

@@ -158,7 +158,10 @@ EDITS: dict[str, tuple[Edit, str]] = {
         lambda d: d["companions"][0]["provenance"].update(sandbox="none"),
         "meta.sandbox",
     ),
-    "no twins": (lambda d: (d["meta"].pop("twins"), d.pop("companions")), "meta.twins: it has no 2 tw"),
+    "no twins": (
+        lambda d: (d["meta"].pop("twins"), d.pop("companions")),
+        "meta.twins: it has no 2 tw",
+    ),
     "no twins in meta": (lambda d: d["meta"].pop("twins"), "meta.twins: it has no 2 tw"),
     "results on twins": (lambda d: _without(d, case="suite/bracket~2"), "results: 2 jobs are"),
     "one twin": (lambda d: d["meta"]["twins"].update(number=1), "meta.twins: it has no 2 tw"),
@@ -200,7 +203,10 @@ EDITS: dict[str, tuple[Edit, str]] = {
         "start_percent: not the errors of the drawn model",
     ),
     "yardstick": (lambda d: d["meta"].update(yardstick="drawn"), "meta.yardstick"),
-    "a job twice": (lambda d: d["companions"].append(d["companions"][0]), "results: 0 jobs are missing"),
+    "a job twice": (
+        lambda d: d["companions"].append(d["companions"][0]),
+        "results: 0 jobs are missing",
+    ),
 }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Files of third parties: no way out of a case folder, no waiting, no code in data, limits on size."""
+"""Third-party files: no way out of a case folder, no waiting, no code in data, limits on size."""
 
 from __future__ import annotations
 

@@ -121,7 +121,7 @@ class Candidates:
 
     @property
     def drawn(self) -> list[str]:
-        """Return the effects to choose from: what tells more of one is not always stated from it."""
+        """Return the effects to choose from: what refines one is often like it."""
         return [n for n in self.places if getattr(self.effects[n], "refines", None) is None]
 
     @property

@@ -45,7 +45,7 @@ def publish(
     )
     if done.index["conflicts"]:
         click.echo(
-            f"bench: {count_noun(len(done.index['conflicts']), 'job')} with results that contradict "
-            "each other; they are flagged",
+            f"bench: {count_noun(len(done.index['conflicts']), 'job')} with results that "
+            "contradict each other; they are flagged",
             err=True,
         )

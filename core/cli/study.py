@@ -57,7 +57,8 @@ def study(ctx: click.Context, /, file: Path, dry_run: bool, **asked: object) -> 
 def _title(plan: StudyPlan) -> str:
     named = plan.axes.title or "study"
     cases = count_noun(len(plan.axes.values("case")), "case")
-    over = f"{count_noun(plan.cells, 'cell')} on {cases}, {count_noun(len(plan.options.all_seeds), 'seed')}"
+    seeds = count_noun(len(plan.options.all_seeds), "seed")
+    over = f"{count_noun(plan.cells, 'cell')} on {cases}, {seeds}"
     return f"{named}: {over}, {count_noun(plan.jobs, 'job')}"
 
 

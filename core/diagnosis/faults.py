@@ -53,7 +53,7 @@ def _parameters(charge: Charge) -> list[CauseParameter]:
 
 
 def with_faults(sentence: str, repaired: Sequence[Cause], loose: Sequence[Cause]) -> str:
-    """Return the sentence of a verdict with the faults that were corrected before it, or only stated."""
+    """Return the sentence of a verdict with the faults that were corrected or only stated."""
     if repaired:
         sentence = (
             f"{_describe(repaired)}. With that corrected: {sentence[0].lower()}{sentence[1:]}"

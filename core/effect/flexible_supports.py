@@ -1,7 +1,7 @@
 """Supports that give: springs between a support and the ground, their motion condensed.
 
 A support takes dofs q out of the model. Released, they come back with stiffness K_qq, K_qu and mass
-M_qq, M_qu next to the free dofs u, and each hangs on a spring. They follow statically, q = -G K_qu u
+M_qq, M_qu to the free dofs u, and each hangs on a spring. They follow statically, q = -G K_qu u
 with G = (K_qq + D)^-1 and D the springs' stiffnesses on the diagonal. What is left is of low rank:
 
     dK = -K_uq G K_qu ,   dM = -(M_uq G K_qu + its transpose) + K_uq G M_qq G K_qu

@@ -3,9 +3,9 @@
 A beam model gets much wrong of a real structure, but a sensor with the wrong sign is like nothing
 that it gets wrong. So suspects are tried on the model as drawn, with its own error as noise: first
 all of them at the scales of model error that suit the data as they are, then those that promise
-something at scales of their own. What is more probable than no fault is corrected, the physical causes
-are sought anew, and all is compared by the density of what was measured, as it was measured: where
-mending multiplies a datum, times that factor; where it widens a deviation, over that deviation.
+something at scales of their own. What is more probable than no fault is corrected, the causes are
+sought anew, and all is compared by the density of what was measured, as it was measured: where the
+correction multiplies a datum, times that factor; where it widens a deviation, over that deviation.
 
 Source: Kennedy & O'Hagan (2001) for the model error; Box & Tiao (1968) for a datum that is
 discounted.

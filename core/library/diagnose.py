@@ -94,8 +94,8 @@ def diagnosis_of(
 ) -> Diagnosis:
     """Return the diagnosis; see `diagnose`.
 
-    `stated` is called with how far it is, and how long the rest takes; `others` are the plugins of
-    third parties that are asked for; `decisions` are settings with other values than the standard ones.
+    `on_advance` is called with the progress and the time that is left; `others` are the third-party
+    plugins to use; `decisions` are settings with other values than the standard ones.
     """
     if budget is not None and not budget >= 0.0:
         raise InputError(f"budget = {budget!r}", expected="seconds >= 0")

@@ -39,7 +39,7 @@ def mode_shape(
 
     Arguments:
         source: a case, for the modes of its nominal model, or a model.
-        mode: numbers of elastic modes in ascending order, from 1; several are distinguished by line.
+        mode: numbers of elastic modes in ascending order, from 1; several differ by line.
         measured: whether the measured mode that pairs with the first one is drawn, as an arrow at
             every sensor; needs a case with shapes.
         scale: of the motion; 1 draws the largest one as 12 % of the structure's largest side.

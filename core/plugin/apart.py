@@ -1,7 +1,7 @@
-"""Questions to plugins of third parties, which are never imported here: plain data out, plain data in.
+"""Questions to third-party plugins, which are never imported here: plain data out, plain data in.
 
-The answers are what code of a third party wrote: their sizes are bounded, nothing in them is executed,
-and anyone who asks checks what they say.
+The answers are what third-party code wrote: their sizes are bounded, nothing in them is executed,
+and the caller checks what they say.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Import one plugin and collect what it offers, apart from all others.
 
 What is wrong with one thing that a plugin offers is recorded and touches nothing else. It runs in
-this process for what comes with femubench, and in processes of their own for plugins of third parties.
+this process for what comes with femubench, and in processes of their own for third-party plugins.
 """
 
 from __future__ import annotations
@@ -69,8 +69,8 @@ class Offers(UserDict[str, Any]):
     """What plugins offer of one kind, by name, in the order of the plugins.
 
     Asking for an entry that was offered by reference loads it, and so does asking for an effect, a
-    fault or a paper of a third party, which imports the third party's plugin here. Both raise PluginError
-    where that fails or where the entry does not fill its role.
+    fault or a paper of a third party, which imports its plugin here. Both raise PluginError where
+    that fails or where the entry does not fill its role.
     """
 
     def __getitem__(self, name: str) -> Any:  # noqa: ANN401 - as the kind has it

@@ -19,7 +19,7 @@ from femubench.core.score.counting import Weights, block_weights
 from femubench.core.score.ranking import score_in
 from femubench.core.score.statistics import evidence_of, structures_of
 
-# How many times the error of a case must be left on its twins: on half of the structures, in addition to a
+# How many times the error of a case must be left on its twins: on half of the structures, with a
 # small p; and on every twin of a single case, where there is nothing to test.
 CLEAR, KNOWN = 1.1, 2.0
 # The latter on twins of a geometry of their own. There the ratio of an honest strategy's errors

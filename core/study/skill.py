@@ -72,7 +72,7 @@ def skill_by(run: Run, *axes: str) -> pd.DataFrame:
 
 
 def _figures(run: Run, arms: Sequence[_Arm], by_arm: dict[_Arm, list[JobResult]]) -> dict[str, Any]:
-    """Return the figures of a cell, whose jobs go as one strategy on cases that are distinguished."""
+    """Return the figures of a cell, whose jobs go as one strategy on distinct cases."""
     structures, reference = run.meta.get("structures") or {}, run.meta.get("reference") or {}
     names = {arm: f"{number}" for number, arm in enumerate(arms)}
     results = tuple(

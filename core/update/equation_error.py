@@ -272,9 +272,9 @@ def update_by_equation_error(
     """
     if len(family) > MOST_UNKNOWNS:
         raise NotApplicable(
-            f"{len(family)} unknowns: their rank is distinguished from a dense matrix, whose work grows "
+            f"{len(family)} unknowns: their rank comes from a dense matrix, whose work grows "
             f"with the cube, so that {MOST_UNKNOWNS} at most are solved for; "
-            "parameters=members, sections or sets has fewer"
+            "changes=members, sections or sets has fewer"
         )
     rigid = rigid_modes_of(model)
     if keep_rigid and rigid.shape[1] == 0:

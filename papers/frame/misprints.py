@@ -84,8 +84,8 @@ def _torsional_mass(bench: Workbench) -> tuple[str, ...]:
         "m0 rg / 420, m0 rg / 840",
         f"{_TORSION_FACTOR:g} times that: m0 rg / 3, m0 rg / 6",
         "a rod's consistent mass; frequencies "
-        f"{format_frequencies(strain_modes(bench, 'unchanged'))} Hz with it, {format_frequencies(printed_way)} Hz "
-        "as printed",
+        f"{format_frequencies(strain_modes(bench, 'unchanged'))} Hz with it, "
+        f"{format_frequencies(printed_way)} Hz as printed",
     )
 
 

@@ -43,8 +43,9 @@ def kabe_reason(bench: Workbench) -> str:
     return (
         f"{ranks[0]} of {entries} unknowns are determined above a cutoff of 0.03, {ranks[1]} above "
         f"0.00001; the text gives no cutoff, and it decides: rigid-body modes at "
-        f"{format_frequencies(rigid_modes(bench, high))} Hz and modes 4, 5 at {format_frequencies(higher)} Hz with the "
-        f"first, first eight modes at {format_frequencies(worse)} Hz with the second ({low})"
+        f"{format_frequencies(rigid_modes(bench, high))} Hz and modes 4, 5 at "
+        f"{format_frequencies(higher)} Hz with the first, first eight modes at "
+        f"{format_frequencies(worse)} Hz with the second ({low})"
     )
 
 
@@ -76,15 +77,17 @@ def farthest(bench: Workbench, words: str, values: Sequence[float]) -> float:
 def explain_higher_modes(bench: Workbench, words: str) -> Ground:
     """Return what the higher modes of the least squares solution rest on."""
     used, tied = strain_modes(bench, words)[:3], "generic-adjusted:expansion=force"
+    adjusted, exact, motion = (
+        format_frequencies(strain_modes(bench, other)[3:])
+        for other in (tied, "generic-ls", "generic-ls:orthogonality=false")
+    )
     return Ground(
         "searched",
         f"shapes expanded by (15), where the text has (16)-(17) ({words}), one of {TRIED} readings "
         f"of this column that were tried, after about {EXPLORED} with random choices "
         f"(docs/reproduce.md): it has modes 1-3 at {format_frequencies(used)} Hz, but the adjusted "
-        f"solution at {format_frequencies(strain_modes(bench, tied)[3:])} Hz; with (16)-(17) modes 4, 5 are "
-        f"{format_frequencies(strain_modes(bench, 'generic-ls')[3:])} Hz, from the equations of motion alone "
-        f"{format_frequencies(strain_modes(bench, 'generic-ls:orthogonality=false')[3:])} Hz; {TWIN_SHAPES}; "
-        f"{beam_shapes(bench, words)}",
+        f"solution at {adjusted} Hz; with (16)-(17) modes 4, 5 are {exact} Hz, from the equations "
+        f"of motion alone {motion} Hz; {TWIN_SHAPES}; {beam_shapes(bench, words)}",
         TRIED,
     )
 

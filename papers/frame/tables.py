@@ -39,7 +39,7 @@ _BY_ELEMENTS = Ground(
 )
 _COLUMNS = Ground(
     "input",
-    "by definition: the error of the two printed frequencies next to it; ours is computed from them",
+    "by definition: the error of the two frequencies next to it; ours is computed from them",
 )
 
 

@@ -173,7 +173,7 @@ def _misprints(bench: Workbench) -> Extra:
         "Misprints",
         ("where", "printed", "elsewhere in print"),
         tuple(rows),
-        "The errors contradict the frequencies printed next to them. For a_V the text and the table "
+        "The errors contradict the frequencies printed next to them. For a_V text and table "
         "have different units; the frequencies hardly depend on it.",
     )
 
