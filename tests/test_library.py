@@ -202,7 +202,7 @@ class TestEveryCommandOfTheReadme:
         monkeypatch.setattr(
             femubench.papers, "study", lambda paper, _: reproduction_toys.study(paper)
         )
-        monkeypatch.setattr("femubench.core.plot.figure.drawn", reproduction_toys.drawn)
+        monkeypatch.setattr("femubench.core.plot.figure.render_figure", reproduction_toys.drawn)
         call("reproduce", "hframe", "-q", "-o", "theirs")
         studies = femubench.reproduce("hframe", output="ours")
         names = [p.relative_to("theirs") for p in Path("theirs").rglob("*") if p.is_file()]

@@ -57,7 +57,7 @@ def papers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Papers:
     stand_in = Papers()
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(femubench.papers, "study", stand_in.study)
-    monkeypatch.setattr("femubench.core.plot.figure.drawn", stand_in.drawn)
+    monkeypatch.setattr("femubench.core.plot.figure.render_figure", stand_in.drawn)
     return stand_in
 
 

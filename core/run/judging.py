@@ -42,7 +42,7 @@ class Dossier:
     exhibited: bool = False
 
 
-class Judgement(Struct):
+class JudgeAnswer(Struct):
     """The result of a job, and its exhibit where one was wanted."""
 
     result: JobResult
@@ -63,7 +63,7 @@ def run_judge(verdict: Dossier, case: Case, reference: Reference) -> bytes:
     job = verdict.strategy, verdict.seed, verdict.nominal
     result = judge_outcome(case, reference, job, outcome)
     exhibit = _exhibit(case, outcome, result) if verdict.exhibited else None
-    return encode(Judgement(result, exhibit))
+    return encode(JudgeAnswer(result, exhibit))
 
 
 def _exhibit(case: Case, outcome: JobOutcome, result: JobResult) -> dict[str, Any] | None:

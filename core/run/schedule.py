@@ -18,7 +18,7 @@ from femubench.core.child.workers import Workers
 from femubench.core.errors import InputError
 from femubench.core.run.answers import AnswerError, read_report
 from femubench.core.run.jobs import JobOutcome
-from femubench.core.run.judging import Dossier, Judgement, judge_outcome, run_strategy
+from femubench.core.run.judging import Dossier, JudgeAnswer, judge_outcome, run_strategy
 from femubench.core.run.slots import Slot, Start, first_seed
 from femubench.core.run.standing_judge import Judges
 from femubench.core.schema.results import JobResult, Status
@@ -184,7 +184,7 @@ class _Bench:
         if ending.how != "answer":
             return JobOutcome("failed", f"its model could not be judged: {ending.reason}")
         try:
-            found = read_plain(Judgement, json.loads(ending.answer))
+            found = read_plain(JudgeAnswer, json.loads(ending.answer))
         except InputError as error:
             return JobOutcome("failed", f"its result is out of bounds: {error}")
         if self._load.show is not None and found.exhibit is not None:
