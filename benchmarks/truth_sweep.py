@@ -244,7 +244,7 @@ class Scored:
         truth: of the case.
         said: one of `OUTCOMES`.
         sure: whether the verdict states a probability of at least `SURE`.
-        next to: what was said of the structure next to faults of data and input.
+        companions: what was said of the structure next to faults of data and input.
         stated: probabilities of names and places.
         deviations: of sizes that were found, from the true ones, in stated deviations.
         fits: whether the answer fits worse than the truth, and whether by a fault of the search;

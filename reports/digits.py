@@ -46,7 +46,7 @@ class Digits:
         """Return our figure, with one digit more; a count stays one.
 
         Arguments:
-            next to: the printed figure, which decides whether a power of ten is written.
+            adjacent: the printed figure, which decides whether a power of ten is written.
         """
         if value is None or not math.isfinite(value):
             return NOTHING

@@ -150,7 +150,7 @@ class BeamProperties:
         """Return one element of every kind, (c,), and the kind of each element, (n,).
 
         Arguments:
-            next to: further numbers that are equal within a kind, (n,) each.
+            adjacent: further numbers that are equal within a kind, (n,) each.
         """
         table = np.column_stack([*(getattr(self, f.name) for f in fields(self)), *adjacent])
         table = table / np.maximum(np.abs(table).max(axis=0, initial=0.0), 1e-300)

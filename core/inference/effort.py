@@ -49,7 +49,7 @@ class Effort:
 
     Arguments:
         budget: seconds from now on for the search for several causes; None for no end.
-        stated: called when a piece begins or ends.
+        on_advance: called when a piece begins or ends.
         clock: seconds from any time on.
     """
 

@@ -58,7 +58,7 @@ class Inquiry:
 
     Arguments:
         examination: of what is left.
-        corrected: the faults.
+        repaired: the faults.
         loose: deviations that are stated far too large. That hides causes and makes none, so they
             are stated and stay.
     """
@@ -175,7 +175,7 @@ def _density(now: _Drawn, charge: Charge, gain: float, repaired: Examination) ->
 
     Arguments:
         gain: under model error alone, with the prior, in nats above no fault.
-        corrected: the examination without the fault.
+        repaired: the examination without the fault.
     """
     prior = now.prior(charge)
     return _with_causes(repaired, now.log_density + gain - prior, now.measurement) + prior

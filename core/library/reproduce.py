@@ -67,7 +67,7 @@ def studies_of(
     """Return the studies of papers; see `reproduce`.
 
     Arguments:
-        stated: called after each update with how many are computed, of how many.
+        on_advance: called after each update with how many are computed, of how many.
         clock: seconds from any time on.
     """
     found = []

@@ -68,7 +68,7 @@ def submit(
         baseline: the result file of an earlier run; without one nothing is compared.
         fail: what counts as worse, as in `compare`.
         tell: is given a line at the start of every step.
-        stated: how far the run is, and how long the rest takes.
+        on_advance: how far the run is, and how long the rest takes.
 
     Raises:
         InputError: for an unknown name, a faulty case or baseline, or no job in common with it.

@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from femubench.core.schema.results import Run
 
 # What answers a question in a process of its own.
-_VARY = "femubench.core.plugin.describing:varied"
+_VARY = "femubench.core.plugin.describing:describe_variant"
 _FOLDER = "femubench.core.plugin.describing:folder"
-_RENDER = "femubench.core.library.report:written_apart"
+_RENDER = "femubench.core.library.report:write_apart"
 _MAKING = 3600.0  # s that a case or a report may take to be made
 _LARGEST_REPORT = 256 * 2**20  # bytes
 _LONGEST_DOC = 20_000  # characters
@@ -92,7 +92,7 @@ class ForeignStrategy(StatedOptions):
 
     Arguments:
         handle: by which it is imported.
-        stated: its description, plain data as JSON.
+        description: its description, plain data as JSON.
         chosen: options that are not the usual ones, likewise.
     """
 

@@ -33,7 +33,7 @@ from femubench.core.roles import Effect, Fault, Paper, Reader, Reporter, Scenari
 from femubench.core.source_files import stamps
 from femubench.core.version import __version__
 
-DESCRIBE = "femubench.core.plugin.describing:described"
+DESCRIBE = "femubench.core.plugin.describing:describe_plugin"
 _LONGEST_MESSAGE = 2000  # characters
 _MOST_FAULTS = 50  # of one plugin that are stated
 
@@ -88,7 +88,7 @@ def load_plugins(
         points: the entry points; by default all of the group ``femubench`` that are installed,
             and those of the clone that femubench is imported from where it is not installed.
         extra: further plugins by name, already imported.
-        third parties: whether plugins that did not come with femubench are described.
+        third_parties: whether plugins that did not come with femubench are described.
     """
     installed = tuple(entry_points(group=PROJECT) if points is None else points)
     sources = _installed(installed)

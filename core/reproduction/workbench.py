@@ -20,7 +20,7 @@ class Workbench:
     Arguments:
         strategies: by name.
         cases: by name.
-        stated: called after each update that had to be computed.
+        on_advance: called after each update that had to be computed.
     """
 
     strategies: Mapping[str, Strategy]

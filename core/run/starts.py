@@ -23,7 +23,7 @@ class Starts:
             cases as given and measures against them.
         nominal: which of the two models strategies start from.
         classes: kinds of structure and truth by case.
-        next to: twins of the cases, and what is to run again.
+        companions: twins of the cases, and what is to run again.
     """
 
     textbook: Mapping[str, Case] | None = None

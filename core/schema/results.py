@@ -178,7 +178,7 @@ class Run(Shown):
     Arguments:
         meta: run id, seed, versions, machine, git commit, start time; plain data.
         results: one entry a job.
-        next to: results on twins of the cases and of jobs that were run again, which are in no
+        companions: results on twins of the cases and of jobs that were run again, which are in no
             figure of the run; ``meta["twins"]`` tells what they belong to.
     """
 
