@@ -86,8 +86,8 @@ def test_same_text_in_another_process() -> None:
     here = "\n".join(render_figure(figure) for figure in (MATRIX, BARS))
     code = (
         "import sys, numpy as np; from femubench.reproduction import Bars, MatrixImage;"
-        "from femubench.core.plot.figure import drawn;"
-        f"array = np.array; print(drawn({MATRIX!r}) + chr(10) + drawn({BARS!r}), end='')"
+        "from femubench.core.plot.figure import render_figure;"
+        f"array = np.array; print(render_figure({MATRIX!r}) + chr(10) + render_figure({BARS!r}), end='')"
     )
     found = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, encoding="utf-8"

@@ -33,7 +33,7 @@ OURS = ("youngs-modulus", "density", "torsion-constant")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Install the package of the third party, as pip would."""
     folder = tmp_path_factory.mktemp("site")
-    install_metadata(folder, "third_parties", {"third_parties": "stranger_effects"})
+    install_metadata(folder, "newcomers", {"newcomers": "stranger_effects"})
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
         draw.registered_effects.cache_clear()
@@ -42,7 +42,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 def known(*names: str) -> list[Effect]:
-    return [effect for effect in list_effects("third_parties") if effect.name in names]
+    return [effect for effect in list_effects("newcomers") if effect.name in names]
 
 
 @pytest.fixture(scope="module")
@@ -85,10 +85,10 @@ def test_it_is_a_parameter_of_every_strategy_that_fits_changes(name: str) -> Non
         shapes=shapes,
         shape_std=np.full(shapes.shape, 0.01 * np.abs(shapes).max()),
     )
-    strategy = femubench.strategies[name](changes="strangers/stiff-skin")
+    strategy = femubench.strategies[name](changes="newcomers/stiff-skin")
     if name == "bayesian-sampling":  # which knows that models are off by themselves
         strategy = femubench.strategies[name](
-            changes="strangers/stiff-skin", discrepancy_median=1e-4, discrepancy_spread=0.1
+            changes="newcomers/stiff-skin", discrepancy_median=1e-4, discrepancy_spread=0.1
         )
     result = strategy.update(case.model, exact, np.random.default_rng(0))
     (skin,) = result.parameters
@@ -180,8 +180,8 @@ class TaskOfSkin(SweepCase):
 def test_without_being_named_it_is_neither_drawn_nor_looked_for() -> None:
     assert not {Skin.name, Bare.name, Plain.name} & {e.name for e in list_effects()}
     assert not {Skin.name, Bare.name, Plain.name} & set(draw.registered_effects())
-    with pytest.raises(InputError, match="no plugin 'third party'; did you mean 'third parties'"):
-        list_effects("third party")
+    with pytest.raises(InputError, match="no plugin 'newcomer'; did you mean 'newcomers'"):
+        list_effects("newcomer")
 
 
 def test_the_sweep_judges_what_is_said_of_it() -> None:

@@ -189,7 +189,7 @@ def stiffness_by_place(model: Any, family: Any, x: Any) -> Any:
     key = [(*np.round(xyz, 9).tolist(), d) for xyz, d in
            zip(model.dofs.xyz, model.dofs.direction, strict=True)]  # fmt: skip
     order = sorted(range(model.size), key=lambda i: key[i])
-    return family.changed(model, x).stiffness.toarray()[np.ix_(order, order)]
+    return family.change_model(model, x).stiffness.toarray()[np.ix_(order, order)]
 
 
 @pytest.mark.parametrize("plane", ["out-of-plane", "in-plane", "3d"])
@@ -276,7 +276,7 @@ def test_families_with_cores_keep_rigid_modes_for_any_parameters(plane: Any) -> 
     rigid = rigid_modes_of(model)
     assert rigid.shape[1] == (6 if plane == "3d" else 3)
     for family in all_families(model.frame_structure):
-        changed = family.changed(model, RNG.standard_normal(len(family)))
+        changed = family.change_model(model, RNG.standard_normal(len(family)))
         scale = np.abs(changed.stiffness) @ np.abs(rigid)
         assert np.abs(changed.stiffness @ rigid).max() < 1e-12 * scale.max()
 
@@ -375,7 +375,7 @@ def test_a_truth_of_the_family_is_found_from_shapes_at_all_dofs(
         x = x.reshape(28, 2)[:, [0, 0, 0, 1]].ravel()
     else:
         x = 0.1 * RNG.uniform(-1, 1, len(family))
-    truth = family.changed(NOMINAL, x)
+    truth = family.change_model(NOMINAL, x)
     a, b, _ = equations(NOMINAL, family, exact_modes(truth, 5), orthogonality=orthogonality)
     found = solve_least_change(a, b, family, None)
     assert found.rank == len(family)
@@ -582,7 +582,7 @@ def test_cores_stay_positive_where_plain_least_squares_is_indefinite() -> None:
         held = solve_least_change(a, b, family, None)
         assert smallest_core_eigenvalue(family, free.x) < -0.1
         assert smallest_core_eigenvalue(family, held.x) >= FLOOR * (1 - 1e-9)
-        assert lowest_scaled_eigenvalue(family.changed(NOMINAL, held.x)) > -1e-12
+        assert lowest_scaled_eigenvalue(family.change_model(NOMINAL, held.x)) > -1e-12
         assert free.residual <= held.residual
 
 

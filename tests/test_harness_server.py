@@ -40,6 +40,7 @@ def test_workers_start_with_what_comes_along_and_with_nothing_of_strangers() -> 
     assert not third_parties & modules
 
 
+@pytest.mark.slow(20)  # servers of other tests are reaped here
 def test_a_server_of_an_older_source_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     with workers.Workers[int](1).open():
         first = server.fork_server()

@@ -36,9 +36,9 @@ GOOD = (toys.Unchanged(), toys.Softer(), toys.Grounded())
 MEMORY = 400 * MIB
 
 
-def small(seconds: float | None, memory: int | None) -> Limits:
+def small(seconds: float | None, memory: int | None, **others: Any) -> Limits:
     """The same limits, and small ones on what is printed and handed back."""
-    return Limits(seconds, memory, output=4 * MIB, answer=16 * MIB)
+    return Limits(seconds, memory, output=4 * MIB, answer=16 * MIB, **others)
 
 
 @pytest.fixture(scope="module", params=["namespaces", "none"])

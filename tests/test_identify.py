@@ -67,7 +67,7 @@ def test_reciprocity_and_quantity_change_nothing(small: Any, found: Identificati
     jw = (2j * np.pi * small.measured.frequencies)[:, None, None]
     turned = replace(
         small.measured, values=small.measured.values / jw, quantity="mobility"
-    ).turned()
+    ).transpose()
     other = identify(turned)
     assert other.sensors.labels == small.measured.responses.labels
     assert len(other) == len(found)

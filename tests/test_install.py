@@ -239,7 +239,7 @@ def test_coverage_finds_the_files_through_the_links(clone: Path, python: Path) -
     succeeded(*coverage, "run", "--source=femubench", *tests, cwd=clone)
     report = json.loads(succeeded(*coverage, "json", "-q", "-o", "/dev/stdout", cwd=clone))
     measured = report["files"]
-    assert measured["core/fem/sections.py"]["summary"]["percent_covered"] > 90.0
+    assert measured["core/fem/sections.py"]["summary"]["percent_covered"] > 80.0
     sources = {
         str(path.relative_to(clone)) for room in ROOMS for path in (clone / room).rglob("*.py")
     }

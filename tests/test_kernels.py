@@ -33,14 +33,14 @@ SCRIPT = """
 import json, sys
 import numpy as np
 from femubench import diagnose, read_case
-from femubench.core.modal.eigen import counted_evaluations
+from femubench.core.modal.eigen import count_evaluations
 from femubench.plugins.strategies.factors import Global
 from femubench.scenarios import HERE
 
 out = {}
 for name in sys.argv[1:]:
     case = read_case(HERE / name)
-    with counted_evaluations() as counter:
+    with count_evaluations() as counter:
         used = case.measurement.select(case.used)
         result = Global().update(case.model, used, np.random.default_rng(0))
     out[name] = counter.count, [p.after for p in result.parameters]

@@ -336,7 +336,7 @@ def extend_by(model: Model, explanation: Explanation, x: FloatArray | None = Non
         x: coordinates of the causes, taken within their bounds, (p,); None for the fitted ones.
 
     Examples:
-        >>> diagnosis.extended_by(model, examination.best).size == model.size
+        >>> diagnosis.extend_by(model, examination.best).size == model.size
         True
     """
     if x is not None:

@@ -52,7 +52,7 @@ def find_directed_point(source: Frame | Model, place: str) -> tuple[Place, str]:
         ModelError: when there is no such point, or the direction is missing.
 
     Examples:
-        >>> effect.directed_point(frame, "J1")[1]
+        >>> effect.find_directed_point(frame, "J1")[1]
         'z'
     """
     frame: Frame | None
@@ -75,7 +75,7 @@ def list_directed_places(model: Model, points: Sequence[str]) -> tuple[str, ...]
         points: words of `point_places`.
 
     Examples:
-        >>> effect.directed_places(model, ["J1", "rung-middle@0.5"])
+        >>> effect.list_directed_places(model, ["J1", "rung-middle@0.5"])
         ('J1', 'rung-middle@0.5')
     """
     structure = model.structure

@@ -152,7 +152,7 @@ def soften_ends(
         arm: its length as a multiple of `end_arm`.
 
     Examples:
-        >>> softer = effect.softened_ends(frame, {"rung-middle@J5": {"ry": 1e4}})
+        >>> softer = effect.soften_ends(frame, {"rung-middle@J5": {"ry": 1e4}})
         >>> dict(softer.joint_springs[0].stiffness)
         {'ry': 10000.0}
     """

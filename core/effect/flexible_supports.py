@@ -45,7 +45,7 @@ def soften_supports(frame: Frame, series: Mapping[Held, float]) -> Frame:
     Examples:
         >>> spring = fem.GroundSpring(fem.Place(joint="J1"), "z", 1e4)
         >>> held = frame.with_attachments((), (spring,))
-        >>> effect.softened_supports(held, {("J1", "z"): 1e4}).springs[0].stiffness
+        >>> effect.soften_supports(held, {("J1", "z"): 1e4}).springs[0].stiffness
         5000.0
     """
     given = {held: value for held, value in series.items() if np.isfinite(value)}

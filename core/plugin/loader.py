@@ -207,7 +207,7 @@ def list_effects(*plugins: str) -> tuple[Effect, ...]:
         UnknownNameError: for another name.
 
     Examples:
-        >>> torsion.name in [one.name for one in diagnosis.registered_effects()]
+        >>> torsion.name in [one.name for one in diagnosis.list_effects()]
         True
     """
     return tuple(_registered("effects", plugins))

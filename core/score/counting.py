@@ -18,7 +18,7 @@ def choose_blocks(blocks: Iterable[str]) -> tuple[str, ...]:
     """Return the blocks of a case that count: the unseen ones, all where it holds nothing back.
 
     Examples:
-        >>> results.counted_blocks(["used", "higher"])
+        >>> results.choose_blocks(["used", "higher"])
         ('higher',)
     """
     listed = tuple(blocks)

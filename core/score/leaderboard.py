@@ -191,7 +191,7 @@ def find_basis(run: Run) -> str:
     """Return on what the skill of a run is measured: ``unseen`` data, or the ``given`` modes.
 
     Examples:
-        >>> results.scored_on(run)
+        >>> results.find_basis(run)
         'unseen'
     """
     errors = run.meta.get("reference") or {}

@@ -99,7 +99,7 @@ def rank_items(
 
     Examples:
         >>> skills = {"b": 1.0, "a": 1.0, "c": 2.0}
-        >>> results.ranked(skills, lambda name: ((), skills[name], name))
+        >>> results.rank_items(skills, lambda name: ((), skills[name], name))
         [(1, 'a'), (1, 'b'), (3, 'c')]
     """
     keyed = sorted(((*key(item), item) for item in items), key=lambda entry: entry[:3])

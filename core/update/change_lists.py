@@ -270,7 +270,7 @@ def select_determined(levels: Sequence[Sequence[Change]], count: int) -> list[Ch
 
     Examples:
         >>> levels = [[update.scale_all_stiffness(structure)], [joint, joint]]
-        >>> [len(update.carried_by(levels, count)) for count in (1, 2, 3)]
+        >>> [len(update.select_determined(levels, count)) for count in (1, 2, 3)]
         [1, 1, 3]
     """
     taken: list[Change] = []

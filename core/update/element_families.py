@@ -341,7 +341,7 @@ def tie_unknowns(family: ElementFamily, parts: Mapping[str, tuple[str, ...]]) ->
 
     Examples:
         >>> parts = update.element_sets(structure, "members")
-        >>> len(update.tied(update.physical_family(structure), parts))
+        >>> len(update.tie_unknowns(update.physical_family(structure), parts))
         14
     """
     part_of = {label: name for name, labels in parts.items() for label in labels}

@@ -404,7 +404,7 @@ def fit_bounded(space: ModalSpace, start: FloatArray, largest: float) -> tuple[F
     Examples:
         >>> sections = update.parameterise(model, "sections")
         >>> space = update.modal_space(sections, measurement, shape_weight=0.0)
-        >>> x, cost = update.bounded_fit(space, np.zeros(1), 3.0)
+        >>> x, cost = update.fit_bounded(space, np.zeros(1), 3.0)
         >>> cost < space.fit(np.zeros(1)).cost
         True
     """

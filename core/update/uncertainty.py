@@ -59,7 +59,7 @@ class Uncertainty:
         Examples:
             >>> def make(q):
             ...     return fem.Model.of(structure.with_values([stiffness], np.exp(q)))
-            >>> len(update.Uncertainty.drawn(make, np.zeros(1), np.array([[0.01]])).samples)
+            >>> len(update.Uncertainty.draw(make, np.zeros(1), np.array([[0.01]])).samples)
             16
         """
         root = _root(np.asarray(covariance, dtype=float), len(mean))

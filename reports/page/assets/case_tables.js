@@ -14,7 +14,7 @@
     return bench.cell(hz, () => [mode && hz === null ? "none" : bench.hertz(hz), under(error), under(mac && mode?.mac && `MAC ${mode.mac.toFixed(3)}`)]);
   };
 
-  /** Return the rows of a strategy: its own and those of `next to` ([Hz by strategy and mode, where they come from]). */
+  /** Return the rows of a strategy: its own and those of `companions` ([Hz by strategy and mode, where they come from]). */
   const rowsOf = ({ name, mark, detail, result }, groups, companions, options) => {
     const own = new Map(detail.modes.map((mode) => [keyOf(mode), mode]));
     // What an eigenvalue solution leaves of an exact fit says nothing.
