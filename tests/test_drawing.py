@@ -87,7 +87,8 @@ def test_same_text_in_another_process() -> None:
     code = (
         "import sys, numpy as np; from femubench.reproduction import Bars, MatrixImage;"
         "from femubench.core.plot.figure import render_figure;"
-        f"array = np.array; print(render_figure({MATRIX!r}) + chr(10) + render_figure({BARS!r}), end='')"
+        f"array = np.array; print(render_figure({MATRIX!r}), render_figure({BARS!r}), "
+        "sep=chr(10), end='')"
     )
     found = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, encoding="utf-8"

@@ -13,11 +13,11 @@ import hashlib
 import json
 import secrets
 import zlib
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+import msgspec
+from msgspec import Meta, Struct
 
 from femubench.core.challenge.truth import Truth
 from femubench.core.challenge.truth_file import GivenTruth
@@ -27,17 +27,12 @@ from femubench.core.files import MIB, read_text
 SEALED_FILE = "truth.sealed"
 _FORMAT = "femubench-sealed-1"
 # What was drawn here, and what was given from outside.
-_TRUTHS: dict[str, TypeAdapter[Any]] = {
-    "truth": TypeAdapter(Truth),
-    "given": TypeAdapter(GivenTruth),
-}
+_TRUTHS: dict[str, type[Truth | GivenTruth]] = {"truth": Truth, "given": GivenTruth}
 
 
-class _Seal(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-    format: str = Field(max_length=40)
-    commitment: str = Field(pattern=r"^[0-9a-f]{64}$")
+class _Seal(Struct, frozen=True, forbid_unknown_fields=True):
+    format: Annotated[str, Meta(max_length=40)]
+    commitment: Annotated[str, Meta(pattern=r"^[0-9a-f]{64}$")]
     sealed: str
 
 
@@ -51,7 +46,7 @@ def seal(truth: Truth | GivenTruth, nonce: str | None = None) -> tuple[str, str]
     """
     key = "given" if isinstance(truth, GivenTruth) else "truth"
     content = json.dumps(
-        {"nonce": nonce or secrets.token_hex(16), key: asdict(truth)}, sort_keys=True
+        {"nonce": nonce or secrets.token_hex(16), key: msgspec.to_builtins(truth)}, sort_keys=True
     ).encode()
     commitment = hashlib.sha256(content).hexdigest()
     text = base64.b64encode(zlib.compress(content, 9)).decode()
@@ -71,20 +66,20 @@ def unseal(text: str, file: Path | None = None) -> tuple[Truth | GivenTruth, str
     """
     wanted = "a file that `bench challenge new` wrote"
     try:
-        content = _Seal.model_validate_json(text)
+        content = msgspec.json.decode(text, type=_Seal)
         if content.format != _FORMAT:
             raise InputError(f"format {content.format!r}", file=file, expected=repr(_FORMAT))
         unpacking = zlib.decompressobj()
         raw = unpacking.decompress(base64.b64decode(content.sealed, validate=True), MIB)
-    except (ValidationError, binascii.Error, zlib.error, ValueError):
+    except (msgspec.DecodeError, binascii.Error, zlib.error, ValueError):
         raise InputError("not a sealed truth", file=file, expected=wanted) from None
     if hashlib.sha256(raw).hexdigest() != content.commitment:
         raise InputError("changed since it was sealed", file=file, expected=wanted)
     try:
         stated = json.loads(raw)
         (key,) = stated.keys() & _TRUTHS.keys()
-        truth: Truth | GivenTruth = _TRUTHS[key].validate_python(stated[key])
-    except (ValidationError, ValueError, AttributeError, TypeError, RecursionError):
+        truth: Truth | GivenTruth = msgspec.convert(stated[key], _TRUTHS[key])
+    except (msgspec.ValidationError, ValueError, AttributeError, TypeError, RecursionError):
         raise InputError("not a sealed truth", file=file, expected=wanted) from None
     return truth, content.commitment
 

@@ -213,7 +213,7 @@ class Gain:
     cross_validated_percent: tuple[Number, Number] | None = None
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(frozen=True, kw_only=True, slots=True, repr=False)
 class DiagnosisReport:
     """What is missing in a model, where, how sure, and what it gains: all that JSON has of it.
 
