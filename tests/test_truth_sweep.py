@@ -338,7 +338,7 @@ def test_a_fault_is_judged_by_the_faults_that_are_named(same: sweep.Same) -> Non
         ("other place", "none", record("named", ("sensors-swapped@sensor:1Z+5Z", "data"))),
     ]
     for outcome, companions, found in cases:
-        assert (sweep.outcome(swapped, found, same), sweep.companions(found)) == (
+        assert (sweep.outcome(swapped, found, same), sweep.describe_structure(found)) == (
             outcome,
             companions,
         )

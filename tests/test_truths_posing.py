@@ -60,7 +60,7 @@ def test_a_truth_is_read_as_it_was_written(tmp_path: Path) -> None:
         (
             'place = "J5"',
             'place = "J5"\nwhere = "J5"',
-            "cause[0]: Object contains unknown field `where`",
+            "cause[0].where: unknown key",
         ),
         (
             '["joint-rotation@T"]',

@@ -30,7 +30,7 @@ TRUTHS = Path(__file__).parents[1] / "truths"
 # What turns solids into cases knows the project; what makes the solids does not.
 POSING = {
     *("opensees_cases.py", "posing.py", "faults.py", "defect_cases.py"),
-    *("published.py", "stretch_file.py", "tables.py", "__main__.py"),
+    *("published.py", "stretch_file.py", "tables.py", "truth_text.py", "__main__.py"),
 }
 
 

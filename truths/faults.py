@@ -178,7 +178,7 @@ def _modes_swapped(structure: Structure, option: Option, rng: np.random.Generato
     for column in ("frequency", "frequency_std", "damping"):
         if column in one:
             one[column], two[column] = two[column], one[column]
-    what = f"modes {option[0]} and {option[1]} have each other's frequencies next to their shapes"
+    what = f"modes {option[0]} and {option[1]} have each other's frequencies"
     cause = TrueCause(what, "modes-swapped", f"mode:{option[0]}+{option[1]}")
     return Draft({structure.modes_file: _written(rows)}, cause)
 

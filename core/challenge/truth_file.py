@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -29,7 +29,8 @@ def is_held(name: str) -> bool:
     return hashlib.sha256(name.encode()).digest()[0] % 2 == 1
 
 
-class TrueCause(Struct, frozen=True, forbid_unknown_fields=True):
+@dataclass(frozen=True, slots=True)
+class TrueCause:
     """One thing that is wrong.
 
     Arguments:
@@ -149,6 +150,9 @@ def read_truth(folder: Path) -> KnownCase:
     except tomllib.TOMLDecodeError as error:
         raise InputError(str(error), file=file, expected="valid TOML") from None
     table = read_plain(_TruthTable, content, file=file)
+    for number, cause in enumerate(content.get("cause", ())):
+        if more := sorted(cause.keys() - {field.name for field in fields(TrueCause)}):
+            raise InputError("unknown key", file=file, key=f"cause[{number}].{more[0]}")
     kind, half = table.kind, is_held(folder.name)
     if kind not in KINDS:
         expected = f"one of {', '.join(KINDS)}"

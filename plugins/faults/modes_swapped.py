@@ -27,7 +27,7 @@ class ModesSwapped:
         return [
             Suspect(
                 f"mode:{one}+{two}",
-                f"modes {one} and {two} have each other's frequencies next to their shapes",
+                f"modes {one} and {two} have each other's frequencies",
                 partial(self._corrected, (one, two)),
             )
             for i, j in combinations(order, 2)
