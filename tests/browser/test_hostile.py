@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from synthetic_run import synthetic_run
 
-from femubench.core.schema.records import finite
+from femubench.core.schema.records import to_plain
 from femubench.reports.htmls import HtmlReporter
 from femubench.results import Run, run_to_json
 
@@ -72,7 +72,7 @@ def test_markup_in_the_compared_page_and_the_site_is_text(
     view: Callable[..., Any], command: Callable[..., str], tmp_path: Path
 ) -> None:
     data = tmp_path / "run.json"
-    data.write_text(json.dumps(finite(run_to_json(hostile()))), encoding="utf-8")
+    data.write_text(json.dumps(to_plain(run_to_json(hostile()))), encoding="utf-8")
     compared = tmp_path / "compared.html"
     command("compare", data, data, "-f", "html", "-o", compared)
     opened = view(compared)
