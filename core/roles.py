@@ -290,7 +290,7 @@ class Reporter(Protocol):
     (``render_diagnosis(data)``, ``diagnosis_lines(data)``), a comparison
     (``render_comparison(data)``), papers (``render_studies(studies, drawings)``), identified modes
     (``render_modes(found, source)``), a list (``render_list(title, lines)``), a leaderboard
-    (``render_site(index)``), and what has to be known of a run in addition to (``notes(run)``).
+    (``render_site(index)``), and what else has to be known of a run (``notes(run)``).
 
     Attributes:
         name: the word after ``bench report --format``.
@@ -429,7 +429,7 @@ class Effect(Protocol):
 class Fault(Protocol):
     """Something that is wrong with the data, or with what was typed in; no cause of physics.
 
-    A diagnosis weighs every suspect next to the physical causes, on the same data.
+    A diagnosis weighs every suspect against the physical causes, on the same data.
     """
 
     @property

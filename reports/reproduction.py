@@ -45,7 +45,7 @@ _VERDICTS: dict[Verdict, tuple[str, str, str, str, str]] = {
     "input": ("=", "input", "input", "input", "a count, a definition or a figure that the paper "
         "was given: its agreement shows nothing but care in copying"),
     "cannot-be-checked": ("·", "unseen", "cannot be checked", "cannot be checked",
-        "needs mode shapes that are not in print: ours stands next to it for comparison alone"),
+        "needs mode shapes that are not in print: ours is given for comparison alone"),
     "misprint": ("!", "misprint", "misprint", "misprinted",
         "other printed figures of the same paper contradict it"),
     "does-not-follow": ("✗", "no", "does not follow", "do not follow",

@@ -45,7 +45,7 @@ Key = tuple[str, str, str]  # table, row and column of a cell
 
 
 def reproduction_html(studies: Sequence[Study], drawings: Mapping[str, str]) -> str:
-    """Return studies as one HTML document that needs nothing in addition to itself.
+    """Return studies as one HTML document that needs no other file.
 
     Arguments:
         drawings: SVG of every figure by its name.

@@ -27,7 +27,7 @@ _PICTURE = (
 
 
 def study_html(run: Run) -> str:
-    """Return a study as one HTML document that needs nothing in addition to itself."""
+    """Return a study as one HTML document that needs no other file."""
     from femubench.reports.html import to_html
 
     title = title_of(run)

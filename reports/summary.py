@@ -133,7 +133,7 @@ def lead(run: Run) -> str:
     ]
     if len(run.nominals) > 1:
         stated.append(
-            "Ranks are from the textbook models; next to it the start from the drawn ones."
+            "Ranks are from the textbook models; the start from the drawn ones stands next to it."
         )
     elif run.meta.get("yardstick") == "textbook":
         start = "as drawn" if run.nominals[0] == "drawn" else "of the textbooks"

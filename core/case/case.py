@@ -77,7 +77,7 @@ class Case(Shown):
         reference: modes of the same structure as it was, which the causes sought are not in.
         reference_used: labels of those that a diagnosis is given; the others serve its proof.
         model_error: factor on the widths of what a beam model gets wrong; 0 turns it off. None is
-            1 next to a reference, which says much of it, and 0 without.
+            1 with a reference, which says much of it, and 0 without.
         beam_share: how probable it is, before any datum, that the structure behaves like a beam
             model with ordinary scatter.
         structure: the physical structure, which several cases may share; empty for one that no

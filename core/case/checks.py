@@ -68,7 +68,7 @@ def check_frame(model: FrameSpec) -> None:
         path: KeyPath = ("joint_springs", i)
         _check_directions(tuple(spring.stiffness), model.plane, (*path, "stiffness"))
         if spring.arm_factor is not None and spring.arm == 0.0:
-            raise BadKey((*path, "arm_factor"), "there is no arm", "arm > 0 next to arm_factor")
+            raise BadKey((*path, "arm_factor"), "there is no arm", "arm > 0 with arm_factor")
     for i, support in enumerate(model.supports):
         _check_directions(support.fixed, model.plane, ("supports", i, "fixed"))
     members = {member.name: member.elements for member in model.members}

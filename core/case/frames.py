@@ -52,7 +52,7 @@ _NEEDED: dict[Plane, tuple[str, ...]] = {
 
 
 def section_of(spec: SectionSpec, plane: Plane, beam: BeamTheory) -> Section:
-    """Return the section of a table, numbers next to a shape taking the place of the shape's.
+    """Return the section of a table, numbers given with a shape taking the place of the shape's.
 
     Raises:
         BadKey: where a size or a constant is missing or does not belong there.

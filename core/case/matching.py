@@ -1,4 +1,4 @@
-"""The sensors of a test next to the structure: units, axes, and the nearest place of each."""
+"""The sensors of a test on the structure: units, axes, and the nearest place of each."""
 
 from __future__ import annotations
 
@@ -104,11 +104,11 @@ def size_of(points: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class Placement:
-    """Coordinates of a test next to the structure.
+    """Coordinates of a test and those of the structure.
 
     Arguments:
         site: the structure.
-        alignment: how the test lies next to it.
+        alignment: how the test lies to it.
         every: all coordinates of the test as they were given, finite, (k, 3).
     """
 
@@ -173,7 +173,7 @@ class Placement:
         raise Misfit(what, f"at most {self.limit:.3g} m {tolerance}{self._advice()}")
 
     def check_span(self, matches: Sequence[Match], file: str) -> tuple[str, ...]:
-        """Return what to say of sensors that lie close together next to the size of the structure.
+        """Return what to say of sensors that are close together for the size of the structure.
 
         Raises:
             Misfit: when they are moved, and lie closer together than they may be moved.
@@ -244,7 +244,7 @@ def match_sensors(
         read: what the plugin read.
         file: for messages.
         site: the structure.
-        alignment: how the test lies next to it; the unit is detected where it has none.
+        alignment: how the test lies to it; the unit is detected where it has none.
         wanted: labels with a shape; None for all.
 
     Raises:

@@ -225,7 +225,7 @@ def model_of_matrices(spec: MatricesSpec, files: CaseFiles, readers: Sequence[Re
 def with_groups(
     model: Model, specs: Sequence[GroupSpec], files: CaseFiles, readers: Sequence[Reader]
 ) -> Model:
-    """Return a model from files with the groups of `[[model.groups]]` next to its own.
+    """Return a model from files with the groups of `[[model.groups]]` in addition to its own.
 
     Raises:
         BadKey: with a path below `model`.

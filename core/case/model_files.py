@@ -166,7 +166,7 @@ def _read(paths: ModelFiles, readers: Sequence[Reader]) -> Model:
         return matrix_model(mass, stiffness)
     if not hasattr(reader, "read_model"):
         known = [s for r in readers if hasattr(r, "read_model") for s in r.suffixes]
-        expected = f"{', '.join(known)}; or one with the stiffness, next to one with the mass"
+        expected = f"{', '.join(known)}; or one with the stiffness and one with the mass"
         raise InputError(
             "no model is read from this kind of file", file=paths.model, expected=expected
         )
@@ -188,7 +188,7 @@ def _a_model(found: object, file: Path) -> Model:
 
 
 def _labelled(model: Model, paths: ModelFiles, readers: Sequence[Reader]) -> Model:
-    """Return the model with the labels and places that a file in addition to gives."""
+    """Return the model with the labels and places that another file gives."""
     geometry = model.geometry
     assert isinstance(geometry, MatrixGeometry)
     if paths.dofs is not None:

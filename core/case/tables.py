@@ -1,4 +1,4 @@
-"""Read the CSV files of a case: rows and cells, stated with file and line when they are wrong."""
+"""Read the CSV files of a case: rows and cells, with file and line in every error."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Complex(NamedTuple):
 
 @dataclass(frozen=True)
 class CsvRow:
-    """One row of a table; cells are found by column and stated with file and line when wrong."""
+    """One row of a table; cells are found by column; errors name file and line."""
 
     file: Path
     line: int

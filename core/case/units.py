@@ -26,7 +26,7 @@ NEWTONS: dict[LengthUnit, float] = {
 def in_si(model: Model, unit: LengthUnit) -> Model:
     """Return a model in SI that was read in other units.
 
-    The force is N (or lbf next to in and ft) and the time s, so that the mass is N s2 / unit: with
+    The force is N (or lbf with in and ft) and the time s, so that the mass is N s2 / unit: with
     mm this is the system of tonnes and MPa. With T, 1 / unit for translations and 1 for
     rotations, and the energy e = force times unit in J, K is e T K T and M e T M T.
 

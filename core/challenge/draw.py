@@ -163,7 +163,7 @@ class Candidates:
         return self.causes(self.cause(effect or str(self.rng.choice(self.drawn))))
 
     def pair(self, effect: str | None) -> Candidate:
-        """Return a truth with two effects, either of which shows next to the other.
+        """Return a truth with two effects, either of which shows when the other is known.
 
         Raises:
             ModelError: when it does not, or both sit at one place.

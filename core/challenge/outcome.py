@@ -123,7 +123,7 @@ def outcome(truth: KnownCase, record: Record, same: Same) -> str:
 
 
 def describe_structure(record: Record) -> str:
-    """Return what is said of the structure next to the faults of data and input."""
+    """Return what is said of the structure apart from faults of data and input."""
     verdict = str(record["verdict"])
     if verdict not in ("named", "ambiguous"):
         return verdict.replace("-", " ")

@@ -20,7 +20,7 @@ Parts = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True)
 class SizeError:
-    """A size that was answered next to the true one.
+    """An answered size and the true one.
 
     Arguments:
         effect, name, unit: of the parameter.
@@ -80,7 +80,7 @@ def judge_answer(truth: Truth, answer: Answer, delta_chi2: Sequence[float]) -> J
     Arguments:
         truth: what is hidden.
         answer: what is said.
-        delta_chi2: by how much every true cause lowers chi-square next to the others, one a
+        delta_chi2: by how much every true cause lowers chi-square given the others, one a
             cause; for a cause outside the catalogue by how much it raises it.
     """
     if truth.outside:

@@ -1,7 +1,7 @@
 """Seal a truth so that nobody sees it by accident, and so that nobody can change it unnoticed.
 
 The seal hides from a casual look and commits the one who drew the case: the sha256 of nonce and
-truth can be stated to everyone. It is no cryptography against a determined reader: the truth is in
+truth can be published. It is no cryptography against a determined reader: the truth is in
 the file, merely compressed and encoded.
 """
 

@@ -22,7 +22,7 @@ from femubench.core.roles import Effect
 
 
 def delta_chi2(case: Case, truth: Truth, effects: Mapping[str, FrameEffect]) -> tuple[float, ...]:
-    """Return by how much each true cause lowers chi-square next to the others.
+    """Return by how much each true cause lowers chi-square when the others are known.
 
     The causes are fitted to the used data where they truly sit, in the metric of the diagnosis:
     the scatter of the elements is part of the noise. For a cause outside the catalogue, return

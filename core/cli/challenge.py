@@ -47,7 +47,7 @@ def challenge() -> None:
     help="Pose one of the truths in this folder, drawn by the seed, in place of drawing one.",
 )  # fmt: skip
 @click.option(
-    "--reference", is_flag=True, help="With --truths: with the healthy structure next to it."
+    "--reference", is_flag=True, help="With --truths: with the healthy structure as reference."
 )
 @_truth("Where the sealed truth goes; FOLDER/truth.sealed by default.")
 @click.pass_context
@@ -70,7 +70,7 @@ def new(
         raise click.UsageError("--reference goes with --truths")
     for name in ("kind", "structure", "hidden", "scatter") if truths is not None else ():
         if ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            raise click.UsageError(f"--{name} says nothing next to --truths")
+            raise click.UsageError(f"--{name} has no effect with --truths")
     made = blind(
         folder,
         seed,

@@ -73,7 +73,7 @@ def compare(
     """Compare run B with run A; exit with 1 if B is worse.
 
     A and B are run ids in the store, their first letters, or files that run --json wrote. With
-    --of X --with Y strategy Y of B is set next to strategy X of A, or both are taken from A.
+    --of X --with Y strategy Y of B is compared with strategy X of A, or both are taken from A.
     """
     from femubench.core.library.compare import compare as side_by_side
     from femubench.core.library.report import rendering

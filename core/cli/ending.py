@@ -62,7 +62,7 @@ def telling(
         added, dropped: words that make the command go on with the run, see `resuming`.
 
     Raises:
-        click.exceptions.Exit: with the exit code, when all is stated.
+        click.exceptions.Exit: with the exit code, when all is printed.
     """
     try:
         yield
@@ -87,7 +87,7 @@ def _shown(store: Store, run: str, screen: Reporter | None) -> int | None:
     """Show what there is of a run; return how many of its jobs are done, None where unknown."""
     from femubench.core.library.report import render_report, text_of
 
-    # What keeps the store from being read is stated by what ended the run.
+    # What keeps the store from being read is in the message of what ended the run.
     with suppress(FemubenchError, OSError):
         found = store.load(run)
         if screen is not None and found.results:

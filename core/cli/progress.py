@@ -18,7 +18,7 @@ _WIDE, _BAR = 32, 14  # characters
 
 @contextmanager
 def progress(what: str = "", *, quiet: bool = False) -> Iterator[OnAdvance | None]:
-    """Give the function that is stated how far something is; None where stderr is no terminal.
+    """Give the function that takes how far something is; None where stderr is no terminal.
 
     A line with a bar, pieces done of how many, the time gone by and the time left, which takes
     itself away. No time is shown as left while none is known.

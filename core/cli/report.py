@@ -82,7 +82,7 @@ def report(
         ]
         kept = store_in(store)
         found = read_run(run, kept)
-        # What was left out is stated on stderr where a report has no room for it.
+        # What was left out is printed on stderr where a report has no room for it.
         silent = any(writer.name not in _TELLING for writer in writers)
         for note in way_of("terminal", "notes")(found) if silent else ():
             click.echo(f"bench: {note}", err=True)

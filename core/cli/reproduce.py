@@ -42,7 +42,7 @@ def reproduce(
 ) -> None:
     """Recompute the tables of the papers, cell by cell.
 
-    Each printed figure stands next to ours, with a verdict and its reason: it agrees independently,
+    Each printed figure stands next to ours with a verdict and its reason: it agrees independently,
     under a convention, after a search or after a fit; it is input, a misprint or cannot be checked;
     or it does not follow from the text. Without a paper, both.
     """

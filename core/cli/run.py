@@ -85,7 +85,7 @@ def _checked(ctx: click.Context, cases: Iterable[str], strategies: Iterable[str]
     case_folders(cases, plugins.scenarios)
     for name in _FIXED if ctx.params["locked"] is not None else ():
         if options.is_given(ctx, name):
-            raise InputError(f"--locked repeats a run as it was; {name} cannot be given next to it")
+            raise InputError(f"--locked repeats a run as it was; {name} cannot be given with it")
     return plugins
 
 

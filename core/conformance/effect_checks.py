@@ -212,7 +212,7 @@ def inputs(effect: Effect) -> Verdict:
     "effect", "worded", "Sizes, hints, wording and looks are of use, where it brings any."
 )
 def check_words(effect: Effect) -> Verdict:
-    """Read what is optional, and look at every model next to its measurement."""
+    """Read what is optional, and look at every model with its measurement."""
     hints = _hints(effect)
     if hints:
         return fail_check(hints)

@@ -102,7 +102,7 @@ def mostly_common(posterior: Posterior, group: Sequence[Key]) -> bool:
 
     What all names of the group share must be the first name as a whole, or rest on textbook
     physics, and carry most of what is explained, and all but few of them must be the first name
-    with more next to it, or with one cause for another that acts alike: what is left of a real
+    with more in addition, or with one cause for another that acts alike: what is left of a real
     structure then goes by any name.
     """
     common = set(group[0]).intersection(*group[1:])
@@ -184,7 +184,7 @@ def fits_as_well(posterior: Posterior, best: Explanation, key: Key) -> bool:
 def places_of(posterior: Posterior, explanation: Explanation, part: int) -> dict[str, float]:
     """Return where one cause of an explanation sits, most probable place first.
 
-    All explanations of the same name count, whatever is next to the cause; where the effect is in
+    All explanations of the same name count, whatever comes with the cause; where the effect is in
     them several times, what sits where the others of it sit here is left to those. A place is one
     however many values the effect has there.
 

@@ -58,7 +58,7 @@ def soften_supports(frame: Frame, series: Mapping[Held, float]) -> Frame:
     springs = [GroundSpring(point_of(frame, word), d, k) for (word, d), k in freed.items()]
     for spring in frame.springs:
         held = str(point_of(frame, str(spring.at))), spring.direction.lstrip("+-")
-        # A spring next to a support is at rest, and acts where that gives.
+        # A spring parallel to a support is at rest, and acts where that gives.
         other = np.inf if held in freed else given.get(held, np.inf)
         softer = spring.stiffness / (1.0 + spring.stiffness / other) if other else 0.0
         springs.append(replace(spring, stiffness=softer))

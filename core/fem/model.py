@@ -95,7 +95,7 @@ def total_change(parts: Sequence[LowRank | None]) -> LowRank | None:
 
 
 class Geometry(Protocol):
-    """What a model needs to know of its structure in addition to the matrices."""
+    """What a model needs to know of its structure apart from the matrices."""
 
     def observe(self, sensors: Sensors) -> SparseArray:
         """Return sensor readings from dofs, sparse (n_sensors, n)."""

@@ -304,7 +304,7 @@ def preload_stiffness(structure: MeshedFrame, member: str, force: float) -> Spar
 
 
 def preload_forces(structure: MeshedFrame, member: str) -> tuple[FloatArray, SparseArray | None]:
-    """Return the internal forces of a preload of 1 N, and its stiffness next to the elements.
+    """Return the internal forces of a preload of 1 N, and its stiffness apart from the elements.
 
     With `unit_preload_matrices`, they are the `preload_stiffness` with fewer numbers.
 
@@ -320,8 +320,8 @@ def preload_forces(structure: MeshedFrame, member: str) -> tuple[FloatArray, Spa
         ModelError: as for `preload_stiffness`.
 
     Examples:
-        >>> forces, next to = fem.preload_forces(structure, "rung-middle")
-        >>> forces.shape[1], next to
+        >>> forces, adjacent = fem.preload_forces(structure, "rung-middle")
+        >>> forces.shape[1], adjacent
         (6, None)
     """
     state = statics_of(structure).state(member)

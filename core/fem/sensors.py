@@ -109,7 +109,7 @@ class Sensors:
 
 @dataclass(frozen=True)
 class Outline:
-    """What a file of a test says of it in addition to modes.
+    """What a file of a test says apart from modes.
 
     Arguments:
         title: in a few words; empty where there is none.

@@ -7,7 +7,7 @@ import sys
 
 
 def give_back() -> None:
-    """Return what is free to the system, where the C library can be stated so.
+    """Return what is free to the system, where the C library can do so.
 
     Source: malloc_trim(3) of the GNU C library.
     """

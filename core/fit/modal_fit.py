@@ -30,7 +30,7 @@ _CLOSE = 1e-3
 
 @dataclass(frozen=True)
 class Problem:
-    """What a fit needs in addition to the hypotheses.
+    """What a fit needs apart from the hypotheses.
 
     Arguments:
         model: that the hypotheses extend.

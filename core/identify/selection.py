@@ -60,7 +60,7 @@ def least_gain(weights: FloatArray) -> float:
 
 
 def select(lines: Lines, candidates: AnyArray, weights: FloatArray, chosen: AnyArray) -> IntArray:
-    """Return the candidates that are modes in addition to the chosen ones, the strongest first.
+    """Return the candidates that are modes apart from the chosen ones, the strongest first.
 
     Arguments:
         lines: the data.
@@ -80,7 +80,7 @@ def select(lines: Lines, candidates: AnyArray, weights: FloatArray, chosen: AnyA
 
 
 def find_needed(lines: Lines, poles: AnyArray, weights: FloatArray) -> BoolArray:
-    """Tell which modes the data need next to all others, (n,); at most one is not, the weakest.
+    """Tell which modes the data need with all others, (n,); at most one is not, the weakest.
 
     Arguments:
         lines: the data.

@@ -124,7 +124,7 @@ class Examination:
         takes the structure for a beam model.
 
         Arguments:
-            explained: explanations, and the residuals of used and unseen modes next to each, (n,).
+            explained: explanations, and the residuals of used and unseen modes under each, (n,).
             data: used modes, then unseen ones.
             reference: used and unseen modes of the structure as it was.
         """
@@ -275,7 +275,7 @@ def is_innate(hypothesis: Hypothesis) -> bool:
 
 
 def before_of(problem: Problem, reference: Measurement) -> State:
-    """Return the nominal model next to the reference.
+    """Return the nominal model compared with the reference.
 
     Raises:
         NotApplicable: when its sensors are others, or a frequency has no deviation.
@@ -289,7 +289,7 @@ def before_of(problem: Problem, reference: Measurement) -> State:
 def search_explanations(
     problem: Problem, error: Inadequacy, effects: Sequence[Effect], pairs: bool, effort: Effort
 ) -> list[Explanation]:
-    """Return explanations next to a model error, each with scales of its own where it matters.
+    """Return explanations under a model error, each with scales of its own where it matters.
 
     Scales that leave room for no cause hide it, those of a good explanation do not: what leads is
     sought with its own.
@@ -374,7 +374,7 @@ def beam_noise(
     Arguments:
         basis: of the nominal model.
         slopes: sensitivities of the data to the scatter, (n_data, n_scatter).
-        before: the nominal model next to the reference, if there is one.
+        before: the nominal model compared with the reference, if any.
         tolerance: standard deviation of the scatter.
         weight: ln of the probability.
     """

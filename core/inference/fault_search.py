@@ -1,4 +1,4 @@
-"""Faults of the data and of what was typed in, weighed next to physical causes on the same data.
+"""Faults of the data and of what was typed in, weighed against physical causes on the same data.
 
 A beam model gets much wrong of a real structure, but a sensor with the wrong sign is like nothing
 that it gets wrong. So suspects are tried on the model as drawn, with its own error as noise: first
@@ -74,7 +74,7 @@ def inquire(
     faults: Iterable[Fault],
     terms: Terms,
 ) -> Inquiry:
-    """Weigh explanations of data by physical causes, and by faults next to them.
+    """Weigh explanations of data by physical causes and by faults.
 
     Arguments:
         model: the nominal model.
@@ -193,7 +193,7 @@ def _with_causes(seen: Examination, plain: float, measured: Measurement) -> floa
 
 
 class _Drawn:
-    """A model as drawn next to its data, what a beam model gets wrong as noise.
+    """A model as drawn and its data, what a beam model gets wrong as noise.
 
     Arguments:
         model, measurement: with the faults corrected that were found before.

@@ -183,7 +183,7 @@ def screen(
 def likely(
     screened: Sequence[Screened], still: FloatArray, state: State, least: float
 ) -> list[Projection]:
-    """Return the hypotheses that promise most next to causes, were what they do to add up.
+    """Return the hypotheses that promise most with causes, were what they do to add up.
 
     It does not, but nearly enough to tell what is not worth an eigensolution.
 

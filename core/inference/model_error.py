@@ -472,7 +472,7 @@ class Inadequacy:
             scales: of an explanation.
             slopes: sensitivities of all data to each class, (N, p_k).
             earlier: which data are of the reference, (N,).
-            raw: residuals of all data next to the explanation, (N,).
+            raw: residuals of all data under the explanation, (N,).
             unseen: rows, (u,).
         """
         tau, unshared = self._variances(scales)

@@ -374,7 +374,7 @@ def _best(explanations: Sequence[Explanation]) -> Explanation:
 
 
 def worthwhile(found: Found, seed: Explanation, least: float) -> Problem:
-    """Return the data with those hypotheses alone that may be worth something next to a seed.
+    """Return the data with those hypotheses alone that may be worth something together with a seed.
 
     Arguments:
         found: the atlas without the seed.

@@ -149,7 +149,7 @@ class Settings:
         20.0, "Bayes factor", "which the data must add: strong evidence (Kass & Raftery 1995)"
     )
     nearly_all: float = _decision(
-        0.95, "probability", "covered by the places that are stated; more than that leaves no doubt"
+        0.95, "probability", "covered by the stated places; more than that leaves no doubt"
     )
     adequate_p: float = _decision(
         0.05, "probability", "what is left, were it noise: above it nothing more is sought"
@@ -221,7 +221,7 @@ class Settings:
         0.005, "of a frequency", "change by physics that a model leaves out that is worth one"
     )
     notable_deviations: float = _decision(
-        2.0, "deviations", "the same next to the measurement; a resonance so close hides"
+        2.0, "deviations", "the same against the measurement; a resonance so close hides"
     )
     unequal_elements: float = _decision(
         20.0, "ratio of lengths", "of neighbours, above which a mesh is ill made"
@@ -283,7 +283,7 @@ class Settings:
         20.0, "of the cost", "so far behind the best a fit is not brought to its end"
     )
     seeds: int = _cost(6, "causes", "about which pairs are sought where no single one suffices")
-    partners: int = _cost(8, "causes", "fitted next to a seed, or carried on from other scales")
+    partners: int = _cost(8, "causes", "fitted with a seed, or carried on from other scales")
     promise_share: float = _cost(
         0.3, "of the chi-square to earn", "which a partner must promise, were effects to add up"
     )
@@ -320,7 +320,7 @@ class Settings:
         1.5, "prior deviations", "between neighbours on a grid, above which modes change places"
     )
     large_shortlist: int = _cost(
-        240, "hypotheses", "of a large model in its coordinates; a quarter next to a seed"
+        240, "hypotheses", "of a large model in its coordinates; a quarter with a seed"
     )
     large_sizes: tuple[float, ...] = _cost(
         (0.12, 0.5, 1.3, 2.6), "prior deviations", "at which each of them is tried"

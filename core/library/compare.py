@@ -34,7 +34,7 @@ def compare(
     fail: Iterable[str | Threshold] = (),
     store: Store | str | PathLike[str] | None = None,
 ) -> Comparison:
-    """Set run B next to run A; `Comparison.worse` tells whether B is worse.
+    """Compare run B with run A; `Comparison.worse` tells whether B is worse.
 
     Arguments:
         before, after: runs, files that ``bench run --json`` wrote, or run ids in the store; with

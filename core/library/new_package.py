@@ -85,7 +85,7 @@ def write_package(name: str, kind: str, output: Path, plugins: Plugins) -> tuple
 
 
 def trial_of(name: str, plugins: Plugins) -> str:
-    """Return the command that runs a strategy next to the baseline on the first scenario."""
+    """Return the command that runs a strategy and the baseline on the first scenario."""
     scenario = next(iter(plugins.scenarios), "")
     others = [s.name for s in plugins.strategies.values() if getattr(s, "baseline", False)]
     return " ".join(["bench", "run", scenario, *(f"-s {word}" for word in (name, *others))])

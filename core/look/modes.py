@@ -29,7 +29,7 @@ Changes = tuple[tuple[int, float], ...]
 
 @dataclass(frozen=True)
 class Seen:
-    """A model next to its measurement.
+    """A model and its measurement.
 
     Arguments:
         model: any model.
@@ -91,7 +91,7 @@ class Seen:
 
     @property
     def large(self) -> bool:
-        """Tell whether the model is too large for another one to be solved next to it."""
+        """Tell whether the model is too large for another one to be solved as well."""
         return self.model.size > SOLVED_LIMIT
 
     def notable(self, effect: str, what: str, changes: FloatArray | None) -> list[LookWarning]:

@@ -1,4 +1,4 @@
-"""Whether the measurement makes sense next to the model: deviations, sensors, missed modes."""
+"""Whether the measurement makes sense for the model: deviations, sensors, missed modes."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from femubench.core.typing import FloatArray
 
 @dataclass(frozen=True)
 class ModalCorrelation:
-    """Measured modes next to the modes of a model.
+    """Measured modes and the modes of a model.
 
     Arguments:
         model: any model.

@@ -244,7 +244,7 @@ class ForeignReader:
     Arguments:
         handle: by which it is imported.
         suffixes: of the files that it reads.
-        ways: what it offers next to the two methods of every reader.
+        ways: what it offers apart from the two methods of every reader.
         doc: what it says of itself.
     """
 
@@ -284,7 +284,7 @@ class ForeignReporter:
     Arguments:
         handle: by which it is imported.
         suffix: of its files.
-        ways: what it offers next to `render`.
+        ways: what it offers apart from `render`.
         doc: what it says of itself.
     """
 

@@ -35,7 +35,7 @@ from femubench.core.version import __version__
 
 DESCRIBE = "femubench.core.plugin.describing:describe_plugin"
 _LONGEST_MESSAGE = 2000  # characters
-_MOST_FAULTS = 50  # of one plugin that are stated
+_MOST_FAULTS = 50  # of one plugin that are reported
 
 
 @dataclass(frozen=True)

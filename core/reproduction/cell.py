@@ -1,4 +1,4 @@
-"""One printed cell next to our value of it, and the verdict."""
+"""One printed cell, our value of it, and the verdict."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ class Ground:
 
     Arguments:
         verdict: what an agreement on this ground alone is worth, or one of `FAULTS`.
-        words: the reason, as a reader is stated it.
+        words: the reason, as a reader sees it.
         tried: number of readings that were tried before this one; of ``searched`` alone.
 
     Raises:
@@ -41,7 +41,7 @@ class Ground:
     tried: int | None = None
 
     def __post_init__(self) -> None:
-        """Check what a reader is stated."""
+        """Check what a reader sees."""
         if not self.words.strip():
             raise InputError(f"ground {self.verdict!r}: no words (expected the reason)")
         known = self.tried is not None and self.tried > 0

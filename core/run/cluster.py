@@ -345,7 +345,7 @@ def _no_script() -> Iterator[None]:
 
 
 def _local(count: int) -> Cluster:
-    """Start a scheduler in this process and workers next to it, which listen to this machine alone.
+    """Start a scheduler in this process and workers, which listen to this machine alone.
 
     Arguments:
         count: number of workers.

@@ -1,4 +1,4 @@
-"""What runs next to the cases of a run: twins of them, and one job of every strategy again."""
+"""What runs along with the cases of a run: twins of them, and one job of every strategy again."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from femubench.core.twin.twins import AGAIN, Twin
 
 @dataclass(frozen=True)
 class Companions:
-    """Cases whose results are in no figure of a run, but next to it.
+    """Cases whose results are in no figure of a run, but checks of it.
 
     Arguments:
         twins: of the cases of the run.

@@ -111,7 +111,7 @@ class _Bench:
         self.lonely: deque[_Task] = deque()
 
     def has_work(self, busy: int) -> bool:
-        """Tell whether there is something to start next to so many that run."""
+        """Tell whether there is something to start while so many run."""
         if not (self.waiting or self.answers):
             self.waiting.extend((index, b"") for index in islice(self._wanted, 1))
         return bool(self.waiting or self.answers or (self.lonely and not busy))

@@ -47,7 +47,7 @@ class Starts:
             yield drawn, case
 
     def of_all(self, cases: Sequence[Case]) -> Iterator[tuple[Nominal, Case]]:
-        """Yield what the jobs of a run start from; next to its cases, the model that ranks."""
+        """Yield what the jobs of a run start from; for its companions, the model that ranks."""
         for case in cases:
             yield from self.of(case)
         for twin in self.companions.twins:

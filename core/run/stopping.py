@@ -55,9 +55,9 @@ def interrupts_kept() -> Iterator[None]:
 
 @contextmanager
 def stopping() -> Iterator[Stopping]:
-    """Let the first Ctrl-C be stated by what is yielded, while the block runs.
+    """Let the first Ctrl-C be known from what is yielded, while the block runs.
 
-    Where somebody else takes Ctrl-C, or in a thread, which is never stated of it, nothing changes.
+    Where somebody else takes Ctrl-C, or in a thread, which never hears of it, nothing changes.
 
     Raises:
         KeyboardInterrupt: at the end of the block, where jobs were left out.

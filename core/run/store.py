@@ -65,7 +65,7 @@ def list_planned_jobs(meta: Mapping[str, Any]) -> dict[JobName, None]:
     """
     starts = meta.get("starts") or {}
     models = {case: starts.get(case, NOMINALS[:1]) for case in meta.get("cases") or {}}
-    # What runs next to the cases starts from the model that ranks.
+    # What runs along with the cases starts from the model that ranks.
     models |= {name: models.get(case, NOMINALS)[:1] for name, case in origins_of(meta).items()}
     return {
         (case, strategy, seed, nominal): None
@@ -156,7 +156,7 @@ class Store:
 
     @cached_property
     def exhibits(self) -> Exhibits:
-        """Return the shelf of pictures next to the records."""
+        """Return the shelf of pictures that belong to the records."""
         return Exhibits(self.folder)
 
     def begin(self, meta: Mapping[str, Any]) -> None:

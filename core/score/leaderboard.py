@@ -52,7 +52,7 @@ class _Grid:
 
     Arguments:
         cases: of the run.
-        weights: how much a block counts next to the others of its structure.
+        weights: how much a block counts among those of its structure.
         seeds: of the run.
         structures: by case; one that is not named is a structure of its own.
         reference: rms error of the nominal model in percent by case and block.

@@ -21,7 +21,7 @@ class Spread:
     Arguments:
         model: the updated one.
         samples: models that are as probable as each other, on the same dofs.
-        discrepancy_std: relative standard deviation of a frequency next to the samples.
+        discrepancy_std: relative standard deviation of a frequency beyond the samples.
     """
 
     model: Model

@@ -113,7 +113,7 @@ def twin_skills(run: Run) -> dict[str, TwinSkill]:
 
 
 def _pairs(run: Run, weights: Weights) -> Iterator[tuple[str, _Pair]]:
-    """Yield the strategy and the scores of every result on a twin next to that on its case."""
+    """Yield the strategy and the scores of every result on a twin and on its case."""
     origins, stated = origins_of(run.meta, "of"), run.meta["twins"]["reference"]
     first = {(item.strategy, item.case, item.seed): item for item in run.ranked}
     blocks = defaultdict(list)

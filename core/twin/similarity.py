@@ -118,7 +118,7 @@ def similar_case(case: Case, by: Similarity) -> Case:
         modifications=changes,
         reference=None if reference is None else _measurement(reference, by),
         band=None if low_high is None else (by.frequency * low_high[0], by.frequency * low_high[1]),
-        # What is drawn of a test, and stated of its files, is of the structure that it was.
+        # What is drawn of a test, and said of its files, is of the structure that it was.
         notes=(),
         matches=(),
         lines=None,

@@ -126,7 +126,7 @@ def stretch_case(
         ),
         measurement=test.measure(case.measurement, 0),
         modifications=changes,
-        # What is stated of the files is of the structure that it was.
+        # What is said of the files is of the structure that it was.
         notes=(),
         matches=(),
         lines=None,

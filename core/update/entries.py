@@ -185,7 +185,7 @@ def _shortest(rows: FloatArray, right: FloatArray, cutoff: float) -> tuple[Float
     """Return the shortest x of least squares without the singular values up to a cutoff, and rank.
 
     LAPACK's solver makes no singular vectors, which takes half the time, but measures the cutoff
-    by the largest singular value: one that is known is put next to the others.
+    by the largest singular value: one that is known is added to the others.
     """
     largest = max(float(np.linalg.norm(rows)), 2.0 * cutoff)
     adjacent = la.block_diag(rows, largest)

@@ -8,7 +8,7 @@ import scipy.linalg as la
 from femubench.core.typing import FloatArray
 
 _POINTS = 200
-_LEAST = 1e-3  # weight, relative to the largest singular value: less is not stated by any data
+_LEAST = 1e-3  # weight, relative to the largest singular value: less is not determined by any data
 _ZERO = 1e-12
 
 

@@ -79,7 +79,7 @@ class ModalSpace:
         parts: V' K_j V of the factors on stiffness, (p_factors, r, r).
         terms: V' A_t V of the terms of effects, (n_terms, r, r).
         readings: of the shapes at the sensors, (n_sensors, r).
-        shape_weight: of a shape error of 1 (MAC of 0) next to a frequency error of 1 (100 %); 0 to
+        shape_weight: of a shape error of 1 (MAC of 0) against a frequency error of 1 (100 %); 0 to
             leave shapes out.
     """
 
@@ -257,7 +257,7 @@ class ModalSpace:
             fit: the fit there.
             wanted: where a linear problem has its optimum, (p,).
             squares, sizes: what the sums of squares and of absolute values of x / spread
-                weigh in the penalty, next to the sum of squares of the residual.
+                weigh in the penalty, against the sum of squares of the residual.
         """
 
         def penalty(point: FloatArray) -> float:

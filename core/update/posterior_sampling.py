@@ -1,4 +1,4 @@
-"""Bayesian updating by sampling, with a model discrepancy that is inferred next to the parameters.
+"""Bayesian updating by sampling, with a model discrepancy that is inferred with the parameters.
 
 ln of a measured frequency is that of the model plus normal errors: of the measurement, whose
 standard deviation is known; of the model, whose is not, for what no model of the kind can follow;

@@ -114,7 +114,7 @@ def check_used_modes(model: Model, shapes: FloatArray, eigenvalues: FloatArray) 
     """Return the residuals of the used modes if the model has these modes.
 
     They are allowed 1e-8, or what rounding makes of K phi and of the eigenvalue where a mesh is
-    so fine, or a part so stiff, that neither can be stated as closely as that.
+    so fine, or a part so stiff, that neither can be computed as closely as that.
 
     Arguments:
         model: the updated model.

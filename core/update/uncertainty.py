@@ -24,7 +24,7 @@ class Uncertainty:
     Arguments:
         samples: models on the dofs of the updated one, each as probable as the others; 64 at most.
         discrepancy_std: relative standard deviation of a natural frequency by what no model of
-            the kind can follow, next to the samples.
+            the kind can follow, apart from the samples.
 
     Source: Kennedy & O'Hagan (2001), J. R. Stat. Soc. B 63, 425-464, for the two parts.
     """

@@ -59,7 +59,7 @@ def finding(bench: Workbench) -> tuple[tuple[Extra, ...], tuple[Figure, ...], tu
 
 
 def make_untuned_table(ladder: Ladder, untuned: dict[str, FloatArray]) -> Extra:
-    """Return the table of models without anything tuned, next to the test."""
+    """Return the table of models without anything tuned, against the test."""
     modes = tuple(f"mode {i + 1}, Hz (error, %)" for i in range(len(ladder.measured)))
     rows = [("measured", *(f"{f:.1f}" for f in ladder.measured), "", "")]
     for name, found in untuned.items():

@@ -154,7 +154,7 @@ def holds(bench: Workbench, case: str, sentence: Sentence) -> tuple[bool, str]:
 
 
 def verdicts(bench: Workbench) -> Extra:
-    """Return the paper's sentences on the design change next to what the models here do."""
+    """Return the paper's sentences on the design change and what the models here do."""
     rows = []
     for sentence in SENTENCES:
         row = [sentence.text]

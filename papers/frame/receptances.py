@@ -164,7 +164,7 @@ def _curve(label: str, point: Point, role: Role) -> Curve:
 
 
 def receptance_sentences(bench: Workbench) -> tuple[str, ...]:
-    """Return what the paper says of its figures 6 to 11, next to what comes out here.
+    """Return what the paper says of its figures 6 to 11, and what comes out here.
 
     Arguments:
         bench: with the cases ``frame`` and ``frame-beam``.

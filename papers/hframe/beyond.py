@@ -28,7 +28,7 @@ _LONG, _EVERY = 16, 10  # tables of iterations
 
 @dataclass(frozen=True)
 class ModelComparison:
-    """Models next to each other on all in-plane modes that were measured.
+    """Models compared on all in-plane modes that were measured.
 
     Arguments:
         what: from a short name to what the model is, from as built to the best physical one.
@@ -46,7 +46,7 @@ class ModelComparison:
 
 
 def compare(bench: Workbench) -> ModelComparison:
-    """Return every row of table 4 next to the model as built and the physical ones."""
+    """Return every row of table 4 with the model as built and the physical ones."""
     case = bench.cases["hframe"]
     diagnosed, physical = run(bench, DIAGNOSED), physical_model(case)
     found = {BUILT: ("mesh C with accelerometers, nothing updated", case.model)}

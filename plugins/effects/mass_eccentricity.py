@@ -1,4 +1,4 @@
-"""A member whose mass lies next to its axis: a rail, a cable tray, a thicker wall on one side."""
+"""A member whose mass lies off its axis: a rail, a cable tray, a thicker wall on one side."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class MassEccentricity(FrameEffect):
     """
 
     name: ClassVar[str] = "mass-eccentricity"
-    summary: ClassVar[str] = "a member's mass lies next to its axis"
+    summary: ClassVar[str] = "a member's mass lies off its axis"
     sizes: ClassVar[Sequence[Size]] = (Size(0.05, 0.25, Site.width, signed=True),)
 
     def places(self, model: Model) -> Sequence[str]:

@@ -1,4 +1,4 @@
-"""A mass next to the axis of its member: a clamp, an instrument on a bracket, a motor on top."""
+"""A mass off the axis of its member: a clamp, an instrument on a bracket, a motor on top."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class MassOffset(FrameEffect):
     """
 
     name: ClassVar[str] = "mass-offset"
-    summary: ClassVar[str] = "a mass sits next to the axis of its member"
+    summary: ClassVar[str] = "a mass sits off the axis of its member"
     refines: ClassVar[str | None] = "added-mass"
     sizes: ClassVar[Sequence[Size]] = (
         Size(0.005, 0.08, Site.mass),

@@ -35,7 +35,7 @@ class Temperature(FrameEffect):
 
     Unless the temperature is read, no measurement tells this from another modulus; with several
     materials the ratio of their coefficients does, if barely. ``all:x``, the temperature changes
-    evenly along a global axis, as next to a wall, in the sun or from a warm machine.
+    evenly along a global axis, as close to a wall, in the sun or from a warm machine.
     """
 
     name: ClassVar[str] = "temperature"

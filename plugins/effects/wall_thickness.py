@@ -57,7 +57,7 @@ class WallThickness(FrameEffect):
     """Make the wall of tubes thicker or thinner, the outside as it is.
 
     Area, second moments, torsion and polar constants and shear coefficients change together, each
-    as that of the shape; constants that were given next to the shape change by the same factor.
+    as that of the shape; constants that were given with the shape change by the same factor.
     """
 
     name: ClassVar[str] = "wall-thickness"

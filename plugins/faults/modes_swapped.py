@@ -1,4 +1,4 @@
-"""Two modes whose frequencies stand next to each other's shapes."""
+"""Two modes of which each has the other's frequency."""
 
 from __future__ import annotations
 

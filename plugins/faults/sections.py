@@ -32,7 +32,7 @@ def sizes_of(section: Section) -> dict[str, float]:
 
 
 def resize_section(section: Section, sizes: Mapping[str, float]) -> Section | None:
-    """Return a section with other sizes, and what was typed in next to its shape as it was.
+    """Return a section with other sizes, and what was typed in apart from its shape as it was.
 
     None for one without a shape, or with a wall too thick for the sizes. A square or round one
     has one size.

@@ -43,7 +43,7 @@ class AbaqusReader(ProgramReader):
 
     def read_model(self, path: Path) -> NoReturn:
         """Refuse: such a file has one matrix."""
-        raise InputError("one matrix is no model", file=path, expected="the mass next to it")
+        raise InputError("one matrix is no model", file=path, expected="a file with the mass too")
 
     def read_pair(self, stiffness: Path, mass: Path) -> Model:
         """Return a model on the degrees of freedom that either has, without those held."""

@@ -152,7 +152,7 @@ def _systems(path: Path, datasets: Sequence[Dataset]) -> dict[int, System]:
             own = _system(path, 18, int(label), int(dataset["cs_type"][i]), origin, rows)
             outer = systems.get(int(dataset["ref_cs_num"][i]))
             if outer is None or outer.kind == "C":
-                what = f"coordinate system {int(label)} is stated in one that is not there"
+                what = f"coordinate system {int(label)} is given in one that is not there"
                 raise InputError(what, file=path, key="dataset 18", expected="cartesian axes")
             systems[int(label)] = System(outer.point(own.origin), own.axes @ outer.axes, own.kind)
     return systems

@@ -58,7 +58,7 @@ class CmaEs(ParametricStrategy):
         evaluations: at most.
         largest: bound of a factor; the least is its inverse.
         spread: standard deviation of the first generation in ln(factor).
-        shape_weight: of a MAC of 0 next to a frequency that is 100 % off; 0 for frequencies alone.
+        shape_weight: of a MAC of 0 against a frequency that is 100 % off; 0 for frequencies alone.
         basis: shapes in the reduced basis.
 
     The author's are the method and every setting of its package but those above, which are ours.

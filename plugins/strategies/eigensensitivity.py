@@ -30,7 +30,7 @@ class Eigensensitivity(ParametricStrategy):
 
     Arguments:
         changes: as of `ParametricStrategy`.
-        shape_weight: of a MAC of 0 next to a frequency that is 100 % off; 0 for frequencies alone.
+        shape_weight: of a MAC of 0 against a frequency that is 100 % off; 0 for frequencies alone.
 
     The authors' are the sensitivities (Fox & Kapoor), the damped least squares of Natke and
     Friswell & Mottershead, and the corner as the weight; ours are logarithms, the whole change

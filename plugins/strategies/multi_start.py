@@ -27,9 +27,9 @@ class MultiStart(ParametricStrategy):
 
     Arguments:
         changes: as of `ParametricStrategy`.
-        starts: number of starts from a Latin hypercube, next to the nominal model.
+        starts: number of starts from a Latin hypercube, apart from the nominal model.
         largest: bound of a factor; the least is its inverse.
-        shape_weight: of a MAC of 0 next to a frequency that is 100 % off; 0 for frequencies alone.
+        shape_weight: of a MAC of 0 against a frequency that is 100 % off; 0 for frequencies alone.
         basis: shapes in the reduced basis of the search.
 
     The authors' are the Latin hypercube (McKay, Beckman & Conover) and the trust-region

@@ -1,4 +1,4 @@
-"""The posterior of the parameters by sampling, next to what no model of the kind can follow."""
+"""The posterior of the parameters by sampling, with what no model of the kind can follow."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ class Spring(SensitivityStrategy):
     Arguments:
         variant: ``joints`` for table 4(d); ``global`` for table 4(c), where EI and rho A of all
             members are updated and the springs stay as they are.
-        free_stiffness: whether the global stiffness factor is free next to the springs; table 4(d)
+        free_stiffness: whether the global stiffness factor is free with the springs; table 4(d)
             prints 1.000 for it, which needs it fixed.
         arm: length of the arm in m; None for half the depth of the crossing member.
         arm_factor: rigidity of the arm in that of the member; None for a rigid arm.

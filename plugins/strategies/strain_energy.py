@@ -37,7 +37,7 @@ class StrainEnergy(ParametricStrategy):
         changes: as of `ParametricStrategy`.
         above: standard deviations above the mean index from which a member is named; one is named
             in any case, and no more than there are frequencies.
-        shape_weight: of a MAC of 0 next to a frequency that is 100 % off, in the fit.
+        shape_weight: of a MAC of 0 against a frequency that is 100 % off, in the fit.
 
     The authors' are ratio and index, between an undamaged and a damaged state; here the nominal
     model is the first. Ours are the expansion (least force residual, all readings met), how many

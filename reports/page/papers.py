@@ -1,4 +1,4 @@
-"""The papers' own columns, to stand next to ours."""
+"""The papers' own columns, for comparison with ours."""
 
 from __future__ import annotations
 

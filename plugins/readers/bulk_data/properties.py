@@ -119,7 +119,7 @@ def bar_of(card: Card, materials: Mapping[int, Card]) -> Bar:
     if of.nsm and not bar.rho * of.A + of.nsm > 0.0:
         raise card.error("the bar has no mass", "RHO A + NSM > 0", "NSM")
     if of.shape is not None and abs(G / (E / (2.0 * (1.0 + nu))) - 1.0) > _SAME:
-        expected = "G = E / 2(1 + NU) next to a shape"
+        expected = "G = E / 2(1 + NU) with a shape"
         raise material.error("G does not belong to E and NU", expected, "G")
     return bar
 

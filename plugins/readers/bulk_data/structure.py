@@ -555,7 +555,7 @@ class BulkFrame:
             found.append("properties are those of their cards, not of the design variables")
         if lumped:
             what = "half of their mass at either end, which no factor on density changes"
-            found.append(f"{len(lumped)} CROD next to bars: {what}")
+            found.append(f"{len(lumped)} CROD parallel to bars: {what}")
         if twisting:
             found.append("J of PROD is left out: a joint of rods alone takes up no twist")
         cards = [card for card in self._cards("PARAM") if card.text(1) == "COUPMASS"]
@@ -606,14 +606,14 @@ def _factors(bars: dict[str, Bar]) -> Iterator[Factor]:
     """Return what makes members differ from material times section.
 
     Mass without stiffness (NSM) adds to the translations alone; a bar without shear coefficients
-    bends as Euler's and Bernoulli's beam, also next to others.
+    bends as Euler's and Bernoulli's beam, also among others.
     """
     timoshenko = any(bar.has_shear for bar in bars.values())
     groups: dict[tuple[str, float], list[str]] = {}
     for name, bar in bars.items():
         if bar.of.nsm:
             if not bar.rho > 0.0:
-                expected = "a MAT1 with RHO > 0 next to NSM"
+                expected = "a MAT1 with RHO > 0 with NSM"
                 raise bar.card.error("mass of a bar without density", expected, "NSM")
             groups.setdefault(("rhoA", 1.0 + bar.of.nsm / (bar.rho * bar.of.A)), []).append(name)
         if timoshenko and not bar.has_shear:
