@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import psutil
 import pytest
 from click.testing import CliRunner
 
@@ -310,11 +311,14 @@ def test_no_namespace_and_no_process_is_left_when_a_worker_is_killed() -> None:
 
 
 def _namespaces() -> set[str]:
-    """Return the namespaces of processes that some process is in."""
+    """Return the namespaces that processes are in, but those of tests that run at the same time."""
+    own = psutil.Process()
+    rest = [other for other in own.parents()[0].children() if other != own]
+    others = {str(p.pid) for other in rest for p in (other, *other.children(recursive=True))}
 
     def found() -> Iterator[str]:
         for name in os.listdir("/proc"):
-            if name.isdigit():
+            if name.isdigit() and name not in others:
                 with suppress(OSError):
                     yield os.readlink(f"/proc/{name}/ns/pid")
 
@@ -359,10 +363,10 @@ def test_a_strategy_from_a_folder_on_the_path_runs(
     project = tmp_path / "project"
     project.mkdir()
     code = "from harness_toys import Unchanged\n\n\nclass Mine(Unchanged):\n    name = 'mine'\n"
-    (project / "my_strategy.py").write_text(code)
+    (project / "own_strategy.py").write_text(code)
     monkeypatch.syspath_prepend(str(project))
-    import my_strategy  # type: ignore[import-not-found]
+    import own_strategy  # type: ignore[import-not-found]
 
     executor = LocalProcesses(1, "require")
-    run = run_jobs([toys.tiny_case()], [my_strategy.Mine()], executor=executor)
+    run = run_jobs([toys.tiny_case()], [own_strategy.Mine()], executor=executor)
     assert [result.status for result in run.results] == ["ok"]

@@ -57,7 +57,7 @@ def pairs(jobs: Iterable[JobResult]) -> Iterator[tuple[str, str]]:
     return ((job.case, job.strategy) for job in jobs)
 
 
-@pytest.mark.parametrize("as well", [0.0, 3.0])
+@pytest.mark.parametrize("overhead", [0.0, 3.0])
 @pytest.mark.parametrize("workers", [1, 2, 4])
 def test_steady_jobs(clock: Clock, workers: int, overhead: float) -> None:
     """Right from the first round of all workers on."""

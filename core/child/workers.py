@@ -257,6 +257,10 @@ def call_apart(
         seconds: that it may take.
         memory: bytes that it may take, libraries and answer among them.
         module: of femubench, which is loaded once for all calls.
+
+    Examples:
+        >>> fem.call_apart(str.encode, "beam", 60.0, 2**31, "femubench.fem").answer
+        b'beam'
     """
     limits = Limits(seconds, memory, answer=memory, sandbox="processes")
     return run_apart({0: (function, argument)}, limits, 1, module)[0]

@@ -77,7 +77,13 @@ def list_planned_jobs(meta: Mapping[str, Any]) -> dict[JobName, None]:
 
 
 def note_missing_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> str | None:
-    """Return a line that says which jobs of a run have no result; None where all have one."""
+    """Return a line that says which jobs of a run have no result; None where all have one.
+
+    Examples:
+        >>> meta = {"cases": {"frame": {}}, "strategies": ["local"], "seeds": [0]}
+        >>> results.note_missing_jobs(meta, ())
+        '1 of 1 jobs are missing and score as failures: frame local seed 0 drawn'
+    """
     plan = list_planned_jobs(meta)
     there = {(r.case, r.strategy, r.seed, r.nominal) for r in results}
     missing = [job for job in plan if job not in there]
