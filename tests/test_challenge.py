@@ -634,7 +634,7 @@ def test_the_command_poses_truths_from_outside(outside: Path, tmp_path: Path) ->
     assert "hidden: a loose joint: joint-rotation at J1" in done.output
     assert "wrong: none; hidden is a loose joint" in done.output
     for words, expected in (
-        ([*new, "--kind", "A"], "--kind says nothing next to --truths"),
+        ([*new, "--kind", "A"], "--kind has no effect with --truths"),
         (["challenge", "new", "--seed", "1", "--reference"], "--reference goes with --truths"),
         ([*new[:-1], str(tmp_path / "none")], "no folder with truth.toml"),
     ):

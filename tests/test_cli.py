@@ -401,7 +401,7 @@ class TestGoingOn:
     def test_wrong_words(self, invoke: Invoke, tmp_path: Path) -> None:
         case = put_case(tmp_path / "case")
         for words, expected in (
-            (("run", case, "--locked", "2026"), "cases cannot be given next to it"),
+            (("run", case, "--locked", "2026"), "cases cannot be given with it"),
             (("run", "--locked", "2026"), "no results"),
             (("run", "--locked", "2026", "--overwrite", "missing"), "overwrite cannot be given"),
             (("run", case, "--seed", 2**63), "not in the range"),

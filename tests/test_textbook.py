@@ -157,7 +157,7 @@ def test_the_screen_says_where_all_start_from(tmp_path: Path) -> None:
     assert "All start from the models of the textbooks." in " ".join(shown.output.split())
     locked = CliRunner().invoke(bench, ["run", "--locked", "x", "--nominal", "textbook"])
     assert locked.exit_code == 2
-    assert "nominal cannot be given next to it" in locked.output
+    assert "nominal cannot be given with it" in locked.output
 
 
 def test_who_is_not_applicable_scores_as_who_leaves_the_model_as_it_is(tmp_path: Path) -> None:
