@@ -80,9 +80,9 @@ def note_missing_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> 
     """Return a line that says which jobs of a run have no result; None where all have one.
 
     Examples:
-        >>> meta = {"cases": {"frame": {}}, "strategies": ["local"], "seeds": [0]}
+        >>> meta = {"cases": {"rod": {}}, "strategies": ["mine"], "seeds": [0]}
         >>> results.note_missing_jobs(meta, ())
-        '1 of 1 jobs are missing and score as failures: frame local seed 0 drawn'
+        '1 of 1 jobs are missing and score as failures: rod mine seed 0 drawn'
     """
     plan = list_planned_jobs(meta)
     there = {(r.case, r.strategy, r.seed, r.nominal) for r in results}
