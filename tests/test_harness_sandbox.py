@@ -16,7 +16,6 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
-import psutil
 import pytest
 from click.testing import CliRunner
 
@@ -311,16 +310,12 @@ def test_no_namespace_and_no_process_is_left_when_a_worker_is_killed() -> None:
 
 
 def _namespaces() -> set[str]:
-    """Return the namespaces that processes are in, but those of tests that run at the same time."""
-    own = psutil.Process()
-    rest = [other for other in own.parents()[0].children() if other != own]
-    others = {str(p.pid) for other in rest for p in (other, *other.children(recursive=True))}
+    """Return the namespaces of processes that some process is in."""
 
     def found() -> Iterator[str]:
-        for name in os.listdir("/proc"):
-            if name.isdigit() and name not in others:
-                with suppress(OSError):
-                    yield os.readlink(f"/proc/{name}/ns/pid")
+        for process in zoo.own_processes():
+            with suppress(OSError):
+                yield os.readlink(f"/proc/{process.pid}/ns/pid")
 
     return set(found())
 

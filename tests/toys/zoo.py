@@ -13,10 +13,11 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.measurement import Measurement
 from femubench.core.run import answers
 from femubench.core.update.strategy import Strategy, UpdateResult
+
+if TYPE_CHECKING:
+    import psutil
 
 MARK = "femubench-zoo-animal"
 _SLEEPER = [sys.executable, "-c", f"import time; time.sleep(900)  # {MARK}"]
@@ -649,15 +653,28 @@ def _objects() -> set[str]:
 _BEFORE = _objects()
 
 
+def own_processes() -> list[psutil.Process]:
+    """Return the processes of this machine, but those of tests that run at the same time."""
+    import psutil
+
+    every, own = list(psutil.process_iter()), psutil.Process()
+    runner = own.parent()
+    others = [p for p in runner.children() if p != own] if runner is not None else []
+    # What starts after the list was made is not in it; what has ended says nothing more.
+    theirs = {p for other in others for p in (other, *other.children(recursive=True))}
+    return [process for process in every if process not in theirs]
+
+
 def leftovers() -> Iterator[str]:
     """Return processes and files that the zoo has left on this machine."""
     import tempfile
 
     import psutil
 
-    for process in psutil.process_iter(["cmdline"]):
-        if any(MARK in word for word in process.info["cmdline"] or ()):
-            yield f"process {process.pid}"
+    for process in own_processes():
+        with suppress(psutil.Error):
+            if any(MARK in word for word in process.cmdline()):
+                yield f"process {process.pid}"
     yield from sorted(_objects() - _BEFORE)
     for folder in (Path(tempfile.gettempdir()), Path.cwd(), Path.home()):
         yield from (str(path) for path in folder.glob(f"*{MARK}*"))
