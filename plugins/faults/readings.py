@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import combinations
@@ -24,20 +24,7 @@ class SensorGain:
 
     def suspects(self, model: Model, measurement: Measurement) -> Sequence[Suspect]:
         """Return every sensor that was read."""
-        return [
-            Suspect(
-                f"sensor:{label}",
-                f"sensor {label} reads with a wrong gain",
-                partial(self._corrected, label),
-                _GAIN,
-            )
-            for label in _read_sensors(measurement)
-        ]
-
-    def _corrected(
-        self, label: str, model: Model, measurement: Measurement, value: float
-    ) -> Corrected:
-        return model, multiply_readings(measurement, label, 1.0 / value)
+        return _suspect_each(measurement, "reads with a wrong gain", _correct_gain, _GAIN)
 
 
 class SensorSign:
@@ -48,19 +35,7 @@ class SensorSign:
 
     def suspects(self, model: Model, measurement: Measurement) -> Sequence[Suspect]:
         """Return every sensor that was read."""
-        return [
-            Suspect(
-                f"sensor:{label}",
-                f"sensor {label} reads with the wrong sign",
-                partial(self._corrected, label),
-            )
-            for label in _read_sensors(measurement)
-        ]
-
-    def _corrected(
-        self, label: str, model: Model, measurement: Measurement, value: float
-    ) -> Corrected:
-        return model, multiply_readings(measurement, label, -1.0)
+        return _suspect_each(measurement, "reads with the wrong sign", _correct_sign)
 
 
 class SensorsSwapped:
@@ -84,6 +59,27 @@ class SensorsSwapped:
         self, labels: tuple[str, str], model: Model, measurement: Measurement, value: float
     ) -> Corrected:
         return model, swap_readings(measurement, labels)
+
+
+def _suspect_each(
+    measurement: Measurement,
+    wrong: str,
+    correct: Callable[[str, Model, Measurement, float], Corrected],
+    parameter: Parameter | None = None,
+) -> list[Suspect]:
+    """Return the same suspicion of every sensor that was read."""
+    return [
+        Suspect(f"sensor:{label}", f"sensor {label} {wrong}", partial(correct, label), parameter)
+        for label in _read_sensors(measurement)
+    ]
+
+
+def _correct_gain(label: str, model: Model, measurement: Measurement, value: float) -> Corrected:
+    return model, multiply_readings(measurement, label, 1.0 / value)
+
+
+def _correct_sign(label: str, model: Model, measurement: Measurement, value: float) -> Corrected:
+    return model, multiply_readings(measurement, label, -1.0)
 
 
 def _read_sensors(measurement: Measurement) -> tuple[str, ...]:
