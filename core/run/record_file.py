@@ -340,12 +340,13 @@ def find_faults(file: Path) -> list[InputError]:
             record.result() if record.kind == "result" else record.meta()
         except InputError as fault:
             faults.append(fault)
-    with suppress(*_DAMAGE), closing(_connect(file)) as connection:
-        if (wrong := _check_tree(connection)) and not faults:
-            faults.append(InputError(f"damaged: {wrong}", file=file))
-    content = read_bytes(file, LARGEST)
-    digest = int.from_bytes(content[_DIGEST], "big")
-    same = content[_CHANGES] == content[_VALID_FOR] and digest in (0, _digest_of(content))
-    if not same and not faults:
-        faults.append(InputError("damaged where no record is", file=file))
+    if not faults:
+        with suppress(*_DAMAGE), closing(_connect(file)) as connection:
+            if wrong := _check_tree(connection):
+                faults.append(InputError(f"damaged: {wrong}", file=file))
+    if not faults:
+        content = read_bytes(file, LARGEST)
+        digest = int.from_bytes(content[_DIGEST], "big")
+        if content[_CHANGES] != content[_VALID_FOR] or digest not in (0, _digest_of(content)):
+            faults.append(InputError("damaged where no record is", file=file))
     return sorted(faults, key=lambda fault: fault.line or 0)
