@@ -364,8 +364,6 @@ CODE = {"pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib", "marsha
         "yaml", "ruamel", "jsonpickle", "dbm"}  # fmt: skip
 CALLS = {"eval", "exec", "compile", "__import__", "read_pickle", "allow_pickle", "read_hdf",
          "loadmat", "literal_eval", "execfile", "run_path"}  # fmt: skip
-# Code that comes from installed plugins or our own package by name, never from a data file.
-IMPORTERS = {"core/cli/main.py", "core/plugin/loader.py"}
 
 
 def _without_pickle(call: ast.Call) -> bool:

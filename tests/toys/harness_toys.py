@@ -142,21 +142,6 @@ class Grounded(Strategy):
         return UpdateResult(replace(model, stiffness_change=change), 1)
 
 
-class Buckled(Strategy):
-    """Takes so much stiffness away that eigenvalues turn negative."""
-
-    name = "buckled"
-    citation = "none"
-
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
-        basis = np.zeros((model.size, 1))
-        basis[model.dofs.direction.index("z")] = 1.0
-        change = LowRank(basis, np.array([[-1.0e4]]))
-        return UpdateResult(replace(model, stiffness_change=change), 1)
-
-
 class Failing(Strategy):
     name = "failing"
     citation = "none"
