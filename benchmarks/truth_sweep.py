@@ -141,10 +141,10 @@ def diagnosed(task: Task, key: tuple[str, str]) -> Record:
         target = Path(scratch, "case")
         pose(task.folder, target, task.reference, suite=task.suite)
         try:
-            with warnings.catch_warnings(record=True) as as_stated, limited(task.seconds):
+            with warnings.catch_warnings(record=True) as caught, limited(task.seconds):
                 warnings.simplefilter("default")
                 diagnosis = diagnose(read_case(target))
-            record["warnings"] = sorted({str(warning.message)[:80] for warning in as_stated})
+            record["warnings"] = sorted({str(warning.message)[:80] for warning in caught})
             record |= record_of(Answer.of(diagnosis))
             record["chi2"] = list(diagnosis.chi2)
             record["adequacy_p"] = diagnosis.adequacy_p

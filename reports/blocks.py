@@ -159,12 +159,12 @@ class Passage:
 
     Arguments:
         level: 2 for a chapter, 3 for a part of one.
-        area: where HTML has it: ``first`` under the heading, ``companions`` it, or in its turn.
+        area: where HTML has it: ``first`` under the heading, ``aside`` next to it, or in its turn.
         look: what HTML styles it by.
     """
 
     title: str
     blocks: Sequence[Block]
     level: int = 2
-    area: Literal["", "first", "companions"] = ""
+    area: Literal["", "first", "aside"] = ""
     look: str = ""

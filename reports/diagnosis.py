@@ -94,10 +94,10 @@ def _sections(data: Data, *, page: bool = False) -> list[Passage]:
     found = (
         Passage("", [said, Items(_tiles(data), look="tiles")], area="first"),
         Passage(words.CAUSES.get(verdict, ""), [*_cards(data), *textbook], area="first"),
-        Passage("", [_map(data)] if page else [], area="companions"),
-        Passage(words.FAULTS, _cards(data, faults=True), area="companions"),
+        Passage("", [_map(data)] if page else [], area="aside"),
+        Passage(words.FAULTS, _cards(data, faults=True), area="aside"),
         Passage("The stated scatter does not fit what is left", [Items(warned)] * bool(warned),
-                area="companions", look="notes"),
+                area="aside", look="notes"),
         Passage(next_title, [*([reason] if reason else []), *_advice(data)]),
         Passage(gain_title, _gain(data)),
         Passage("How well it fits", list(_fit(data, page=page))),

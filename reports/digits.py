@@ -42,16 +42,16 @@ class Digits:
         """Return a figure as the paper has it."""
         return self._text(value, unit, 0, power=not _fits(value))
 
-    def ours(self, value: float | None, unit: str = "", *, adjacent: float = 0.0) -> str:
+    def ours(self, value: float | None, unit: str = "", *, printed: float = 0.0) -> str:
         """Return our figure, with one digit more; a count stays one.
 
         Arguments:
-            adjacent: the printed figure, which decides whether a power of ten is written.
+            printed: the printed figure, which decides whether a power of ten is written.
         """
         if value is None or not math.isfinite(value):
             return NOTHING
         count = not unit and self.decimals == 0 and float(value).is_integer()
-        power = not _fits(adjacent) or abs(value) >= _MOST
+        power = not _fits(printed) or abs(value) >= _MOST
         return self._text(value, unit, 0 if count else 1, power=power)
 
     def _text(self, value: float, unit: str, more: int, *, power: bool) -> str:

@@ -160,7 +160,7 @@ def cells_in_words(cells: Sequence[Cell], words: Words) -> Iterator[Block]:
             cell.column,
             *([cell.unit] if several else []),
             digits[cell.unit].format(cell.printed, cell.unit),
-            digits[cell.unit].ours(cell.ours, cell.unit, adjacent=cell.printed),
+            digits[cell.unit].ours(cell.ours, cell.unit, printed=cell.printed),
             off(cell.deviation_percent, cell.unit),
             f"{words[cell.verdict]} {marks.get(cell.note, '')}".rstrip(),
         ]

@@ -189,16 +189,16 @@ def finding(
 
 def _how_sure(name: str, tiers: Sequence[Sequence[str]], count: int) -> Iterator[str]:
     """Return how many of the strategies are not shown to differ from the best."""
-    companions = [plain(other) for other in (tiers or ((),))[0] if plain(other) != name]
+    peers = [plain(other) for other in (tiers or ((),))[0] if plain(other) != name]
     if count > 1 and not tiers:
         yield "Whether the others differ from it is not tested."
-    elif count > 1 and not companions:
+    elif count > 1 and not peers:
         yield "It is alone in tier 1: all others are shown to be worse."
-    elif len(companions) == count - 1 > 0:
+    elif len(peers) == count - 1 > 0:
         yield "No other strategy is shown to differ from it: all are in tier 1."
-    elif companions:
-        below = f"{count - 1 - len(companions)} of {count} are below"
-        first = first_of(companions, 4)
+    elif peers:
+        below = f"{count - 1 - len(peers)} of {count} are below"
+        first = first_of(peers, 4)
         yield f"Next to it in tier 1, not shown to differ from it: {first}; {below}."
 
 

@@ -91,15 +91,15 @@ class TestDigits:
     def test_powers_of_ten_do_not_lengthen_the_others(self) -> None:
         digits = Digits.of([0.02, -0.0283, 3.12e-6])
         assert digits.format(3.12e-6) == "3.12e-6"
-        assert digits.ours(3.1204e-6, adjacent=3.12e-6) == "3.120e-6"
+        assert digits.ours(3.1204e-6, printed=3.12e-6) == "3.120e-6"
         assert digits.format(0.02) == "0.0200"
-        assert digits.ours(-0.02849, adjacent=-0.0283) == "-0.02849"
-        assert digits.ours(1.5e-7, adjacent=0.02) == "0.00000"
-        assert digits.ours(4.128e9, adjacent=0.02) == "4.128e9"
+        assert digits.ours(-0.02849, printed=-0.0283) == "-0.02849"
+        assert digits.ours(1.5e-7, printed=0.02) == "0.00000"
+        assert digits.ours(4.128e9, printed=0.02) == "4.128e9"
 
     def test_last_digit_of_small_figures(self) -> None:
         digits = Digits.of([-0.0221, -0.0001])
-        assert (digits.format(-0.0001), digits.ours(0.000192, adjacent=-0.0001)) == (
+        assert (digits.format(-0.0001), digits.ours(0.000192, printed=-0.0001)) == (
             *("-0.0001", "0.00019"),
         )
 

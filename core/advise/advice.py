@@ -295,10 +295,10 @@ def _ranked(
         worth = size >= settings.worth_measuring
         if (worth and seen[option.kind] <= settings.of_a_kind) or not chosen:
             chosen.append(Advice(text, size))
-    adjacent: list[Advice] = []
+    level_advice: list[Advice] = []
     if level is not None and min(level.distances) >= settings.worth_measuring:
-        adjacent.append(Advice(level.text, min(level.distances)))
-    kept = [*chosen[: settings.advised - len(adjacent)], *adjacent]
+        level_advice.append(Advice(level.text, min(level.distances)))
+    kept = [*chosen[: settings.advised - len(level_advice)], *level_advice]
     return tuple(in_order(kept, lambda advice: -advice.separation))
 
 

@@ -125,7 +125,7 @@ class Candidates:
         return [n for n in self.places if getattr(self.effects[n], "refines", None) is None]
 
     @property
-    def third_parties(self) -> tuple[str, ...]:
+    def outsiders(self) -> tuple[str, ...]:
         """Return the causes outside the catalogue that the kind of data can show."""
         return tuple(key for key in OUTSIDE if self.kind != "C" or key not in SENSOR_FAULTS)
 
@@ -189,7 +189,7 @@ class Candidates:
             ModelError: when it does not show, or a single effect explains the data as well.
             IndexError: when the structure has no place for it.
         """
-        name = name or str(self.rng.choice(self.third_parties))
+        name = name or str(self.rng.choice(self.outsiders))
         count = len(self.specimen.points)
         found = OUTSIDE[name](self.nothing().frame, count, self.rng)
         drawn = Candidate(found.frame, outside=found.text, sensors=found.sensors)
@@ -326,7 +326,7 @@ def draw_case(
         specimen, kind, catalogue, scatter, np.random.default_rng(choice), elements
     )
     if hidden != "none":
-        known = tuple(candidates.third_parties if hidden == "outside" else candidates.places)
+        known = tuple(candidates.outsiders if hidden == "outside" else candidates.places)
         if effect is not None and effect not in known:
             what = f"{effect!r} cannot be hidden in {structure}"
             raise InputError(what, key="effect", expected=f"one of {', '.join(known)}")

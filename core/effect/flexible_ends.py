@@ -230,12 +230,12 @@ def flexible_ends_change(
             sprung.append(term)
             present.append((stiffness, column))
     rate, power_of, taken = np.array(rates).reshape(-1, 3).T
-    there, companions = np.array(present).reshape(-1, 2).T
+    there, columns = np.array(present).reshape(-1, 2).T
 
     def coefficients(values: FloatArray) -> FloatArray:
         arm = np.ones((len(values), len(arm_terms)))
         share = (rate / (rate + values[:, taken.astype(int)])) ** power_of
-        softer = -(there**2) / (there + values[:, companions.astype(int)])
+        softer = -(there**2) / (there + values[:, columns.astype(int)])
         return np.hstack([arm, share, softer])
 
     return Change((*arm_terms, *terms, *sprung), coefficients)

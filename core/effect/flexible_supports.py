@@ -89,7 +89,7 @@ def flexible_supports_change(model: Model, parts: Sequence[Sequence[Held]]) -> C
     }
     fixed = [(held, column) for held, column in listed if np.isinf(stiff[held])]
     condensed = _condensed(model, [held for held, _ in fixed], [column for _, column in fixed])
-    terms, present, companions = [], [], []
+    terms, present, columns = [], [], []
     for (word, direction), column in listed:
         row = point_motion(model, point_of(frame, word))[[DIRECTIONS.index(direction)]]
         for spring in frame.springs if np.isfinite(stiff[word, direction]) else ():
@@ -97,8 +97,8 @@ def flexible_supports_change(model: Model, parts: Sequence[Sequence[Held]]) -> C
             if same and spring.direction.lstrip("+-") == direction and spring.stiffness:
                 terms.append(Term("stiffness", RowOperator(row, np.eye(1))))
                 present.append(spring.stiffness)
-                companions.append(column)
-    own, taken = np.array(present), np.array(companions, dtype=np.int64)
+                columns.append(column)
+    own, taken = np.array(present), np.array(columns, dtype=np.int64)
 
     def coefficients(values: FloatArray) -> FloatArray:
         softer = -(own**2) / (own + values[:, taken])

@@ -146,13 +146,13 @@ class BeamProperties:
         """Return a batch in which one property is multiplied, one factor an element."""
         return replace(self, **{name: getattr(self, name) * factor})
 
-    def alike(self, *adjacent: FloatArray | IntArray) -> tuple[IntArray, IntArray]:
+    def alike(self, *further: FloatArray | IntArray) -> tuple[IntArray, IntArray]:
         """Return one element of every kind, (c,), and the kind of each element, (n,).
 
         Arguments:
-            adjacent: further numbers that are equal within a kind, (n,) each.
+            further: further numbers that are equal within a kind, (n,) each.
         """
-        table = np.column_stack([*(getattr(self, f.name) for f in fields(self)), *adjacent])
+        table = np.column_stack([*(getattr(self, f.name) for f in fields(self)), *further])
         table = table / np.maximum(np.abs(table).max(axis=0, initial=0.0), 1e-300)
         _, first, kind = np.unique(
             table.round(_DIGITS), axis=0, return_index=True, return_inverse=True

@@ -119,8 +119,8 @@ def _losses(found: Comparison) -> Iterator[str]:
     for item in whole or found.excesses:
         where = "" if item.scenario is None else f" on {item.scenario}"
         was = "lost results" if item.metric == "failures" else f"{item.metric}, as a ratio"
-        on_advance = f"{was}: {item.value:.3g}, allowed {item.most:g}"
-        yield f"{item.strategy} is worse than the baseline{where}: {on_advance}"
+        figures = f"{was}: {item.value:.3g}, allowed {item.most:g}"
+        yield f"{item.strategy} is worse than the baseline{where}: {figures}"
 
 
 def summary_of(found: SubmissionReview) -> str:

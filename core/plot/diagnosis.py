@@ -185,9 +185,9 @@ def residuals(
     _residual_axis(ax, dots, one_sided)
     ax.set_yticks(list(rows), [name_of(dot.name, 24) for dot in dots])
     ax.set_ylim(len(dots) - 0.4, -0.6)
-    adjacent = ax.secondary_yaxis("right")
-    adjacent.set_yticks(list(rows), [dot.text for dot in dots])
-    for side in (ax, adjacent):
+    right = ax.secondary_yaxis("right")
+    right.set_yticks(list(rows), [dot.text for dot in dots])
+    for side in (ax, right):
         side.tick_params(axis="y", length=0)
         side.spines[:].set_visible(False)
     ax.set_xlabel("standard deviations of the measurement")

@@ -137,10 +137,8 @@ class MatrixImage(Figure):
             ax.axhline(index + 0.5, color="black", linewidth=0.5)
             ax.axvline(index + 0.5, color="black", linewidth=0.5)
         ax.set(xlabel=self.column_label, ylabel=self.row_label)
-        adjacent = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
-        bar = figure_of(ax).colorbar(
-            image, cax=adjacent, extend="min", format=FuncFormatter(_power)
-        )
+        scale = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
+        bar = figure_of(ax).colorbar(image, cax=scale, extend="min", format=FuncFormatter(_power))
         bar.set_label(self.value_label)
 
 

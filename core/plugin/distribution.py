@@ -34,26 +34,26 @@ def about(name: str, doi: object = "") -> dict[str, str]:
 def _packaged(name: str) -> dict[str, str]:
     try:
         # A mapping to type checkers; in all versions of Python a message with `get`.
-        metadata_ = cast("Message", metadata.metadata(name))
+        fields = cast("Message", metadata.metadata(name))
     except (metadata.PackageNotFoundError, ValueError):
         return {}
     links: dict[str, str] = {}
-    for line in metadata_.get_all("Project-URL") or ():
+    for line in fields.get_all("Project-URL") or ():
         label, _, address = str(line).partition(",")
         links[re.sub(r"[\W_]", "", label).lower()] = address.strip()
-    addresses = [*map(links.get, _LABELS), metadata_.get("Home-page"), *links.values()]
-    authors = (metadata_.get("Author"), metadata_.get("Author-email"))
+    addresses = [*map(links.get, _LABELS), fields.get("Home-page"), *links.values()]
+    authors = (fields.get("Author"), fields.get("Author-email"))
     return {
         "homepage": next((str(url) for url in addresses if _fits(HOMEPAGE, url)), ""),
-        "summary": str(metadata_.get("Summary") or ""),
+        "summary": str(fields.get("Summary") or ""),
         "author": next((str(text) for text in authors if text), ""),
     }
 
 
-def select_known(metadata_: Mapping[str, object]) -> dict[str, str]:
+def select_known(about: Mapping[str, object]) -> dict[str, str]:
     """Return the part of a description that can be shown; an address is one of the web or none."""
     forms = {"homepage": HOMEPAGE, "doi": DOI, "summary": "", "author": ""}
-    lines = {name: harmless(str(metadata_.get(name) or ""))[:LONGEST_LINE] for name in forms}
+    lines = {name: harmless(str(about.get(name) or ""))[:LONGEST_LINE] for name in forms}
     return {name: text for name, text in lines.items() if text and _fits(forms[name], text)}
 
 

@@ -100,7 +100,7 @@ def load_plugins(
     found: dict[str, Offers] = {kind: Offers() for kind in CHECKS}
     loaded: list[LoadedPlugin] = []
     broken: list[BrokenPlugin] = []
-    description = _descriptions(
+    descriptions = _descriptions(
         [s.origin for s in sources if third_parties and s.origin is not None]
     )
     for source in sources:
@@ -109,7 +109,7 @@ def load_plugins(
             if offers is not None:
                 loaded.append(LoadedPlugin(source.name, source.distribution, offers))
         elif third_parties:
-            loaded += _believed(source.origin, description[source.origin], found, broken)
+            loaded += _believed(source.origin, descriptions[source.origin], found, broken)
     return Plugins(**found, loaded=tuple(loaded), broken=tuple(broken))
 
 
@@ -149,8 +149,7 @@ def _believed(
         return
     try:
         faults = [
-            _broken_as_stated(origin, item)
-            for item in of_type(description["broken"], list, "faults")
+            _broken_plugin(origin, item) for item in of_type(description["broken"], list, "faults")
         ]
         offered = {kind: of_type(description["offers"][kind], list, kind) for kind in found}
     except (KeyError, TypeError, PluginError) as fault:
@@ -187,7 +186,7 @@ def _wrong(origin: Origin, hook: str, message: str, trace: str = "") -> BrokenPl
     return BrokenPlugin(origin.plugin, origin.distribution, hook, clean, trace)
 
 
-def _broken_as_stated(origin: Origin, item: Any) -> BrokenPlugin:  # noqa: ANN401 - what a third party stated
+def _broken_plugin(origin: Origin, item: Any) -> BrokenPlugin:  # noqa: ANN401 - what a third party stated
     texts = [of_type(item[key], str, key) for key in ("hook", "message", "traceback")]
     trace = "".join(f"{_printable(line)}\n" for line in texts[2].splitlines())
     return _wrong(origin, harmless(texts[0])[:80], texts[1], trace)

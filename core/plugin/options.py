@@ -61,8 +61,8 @@ def with_options(base: Strategy, options: Mapping[str, object]) -> Strategy:
         InputError: for a value that it refuses.
     """
     if isinstance(base, StatedOptions):
-        description: Any = base
-        found: Strategy = description.with_options(options) if options else description
+        whole: Any = base
+        found: Strategy = whole.with_options(options) if options else whole
         return found
     changed = base
     for key, value in options.items():

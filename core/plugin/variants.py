@@ -98,12 +98,10 @@ def label_variant(strategy: Strategy, default: Strategy | None = None) -> Varian
         except TypeError:  # it has none
             default = strategy
     usual, present = _settings(default), _settings(strategy)
-    description = {
-        key: value for key, value in present.items() if usual.get(key, _UNKNOWN) != value
-    }
+    changed = {key: value for key, value in present.items() if usual.get(key, _UNKNOWN) != value}
     words = [
         f"{_shortest(key, usual)}={str(value).lower() if isinstance(value, bool) else str(value)}"
-        for key, value in description.items()
+        for key, value in changed.items()
     ]
     return Variant(strategy, strategy.name + (f":{','.join(words)}" if words else ""))
 

@@ -90,11 +90,10 @@ def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) 
     if run.meta.get("yardstick") != "textbook":
         what = "errors are not measured against the textbook models"
         _refuse(file, what, "meta.yardstick", _AGAIN)
-    as_stated = run.meta.get("sandbox")
-    mode = (
-        result.provenance.get("sandbox", as_stated) for result in chain(run.results, run.companions)
-    )
-    if any(one != SANDBOX for one in (as_stated, *mode)):
+    usual = run.meta.get("sandbox")
+    jobs = chain(run.results, run.companions)
+    each = (result.provenance.get("sandbox", usual) for result in jobs)
+    if any(one != SANDBOX for one in (usual, *each)):
         what = "the strategies ran without a sandbox"
         _refuse(file, what, "meta.sandbox", "a run with `--sandbox require`, or --unverified")
     cases = _own_cases(run, installed, file)
@@ -124,12 +123,12 @@ def _refuse(file: Path, what: str, key: str, expected: str) -> NoReturn:
 def _own_cases(run: Run, installed: Installed, file: Path) -> dict[str, Case]:
     """Return the cases of a run as they are installed here, which they have to equal."""
     found = {}
-    for name, as_stated in run.meta["cases"].items():
+    for name, entry in run.meta["cases"].items():
         case = installed.case(name)
         if case is None:
             what = f"no case {name!r} is installed here, so that nothing of it can be checked"
             _refuse(file, what, f"meta.cases.{name}", "a built-in case, or --unverified")
-        if case.digest != as_stated["digest"]:
+        if case.digest != entry["digest"]:
             what = f"other files than those of the case {name!r} that is installed here"
             _refuse(file, what, f"meta.cases.{name}.digest", f"{case.digest}: {_AGAIN}")
         structure = (run.meta.get("structures") or {}).get(name)
@@ -149,25 +148,22 @@ def _own_twins(
     run: Run, cases: Sequence[Case], installed: Installed, file: Path
 ) -> dict[str, Case]:
     """Return the twins of a run, drawn again from its seed."""
-    as_stated = run.meta.get("twins")
-    if not as_stated or as_stated["number"] < _FEWEST_TWINS:
+    twins = run.meta.get("twins")
+    if not twins or twins["number"] < _FEWEST_TWINS:
         what = f"it has no {_FEWEST_TWINS} twins, which would show who knows the cases"
         expected = f"a run with `--twins {_FEWEST_TWINS}` or more, or --unverified"
         _refuse(file, what, "meta.twins", expected)
-    drawn = {t.name: t for t in installed.twins(cases, as_stated["number"], as_stated["seed"])}
-    stated = {name: as_stated["cases"].get(name, {}).get("digest") for name in as_stated["of"]}
+    drawn = {t.name: t for t in installed.twins(cases, twins["number"], twins["seed"])}
+    stated = {name: twins["cases"].get(name, {}).get("digest") for name in twins["of"]}
     if {name: twin.digest for name, twin in drawn.items()} != stated:
-        what = f"these are not the twins that seed {as_stated['seed']} draws"
+        what = f"these are not the twins that seed {twins['seed']} draws"
         _refuse(file, what, "meta.twins", _AGAIN)
     kinds = {name: list(twin.families) for name, twin in drawn.items()}
-    if as_stated.get("kinds") != kinds:
+    if twins.get("kinds") != kinds:
         _refuse(file, "its twins are of other kinds", "meta.twins.kinds", _AGAIN)
-    if (
-        any(as_stated["of"][name] != name.rpartition("~")[0] for name in drawn)
-        or not as_stated["again"]
-    ):
+    if any(twins["of"][name] != name.rpartition("~")[0] for name in drawn) or not twins["again"]:
         _refuse(file, "they are of other cases, or nothing ran twice", "meta.twins", _AGAIN)
-    if not set(as_stated["again"].values()) <= set(run.meta["cases"]):
+    if not set(twins["again"].values()) <= set(run.meta["cases"]):
         _refuse(file, "what ran twice is no case of the run", "meta.twins.again", _AGAIN)
     return dict(drawn)
 
@@ -237,10 +233,10 @@ def _check_board(run: Run, board: object, file: Path) -> None:
     skills: dict[str, float] = dict(zip(*map(leaderboard(run).get, _STATED), strict=True))
     rows: Iterable[object] = board if isinstance(board, list) else [board]
     for number, row in enumerate(rows):
-        name, as_stated = (row.get(key) if isinstance(row, dict) else None for key in _STATED)
+        name, skill = (row.get(key) if isinstance(row, dict) else None for key in _STATED)
         own = skills.get(name) if isinstance(name, str) else None
-        if own is None or not isinstance(as_stated, (int, float)) or not _near(as_stated, own):
-            what = f"skill {as_stated!r}, the results give {own!r}"[:200]
+        if own is None or not isinstance(skill, (int, float)) or not _near(skill, own):
+            what = f"skill {skill!r}, the results give {own!r}"[:200]
             _refuse(file, what, f"leaderboard[{number}].skill", "what its results give")
 
 

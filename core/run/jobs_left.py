@@ -44,7 +44,7 @@ class JobsLeft:
         self._overhead = 0.0
         now = clock()
         self._running = [(pair, now) for pair in self._taken(workers)]
-        self._stated = now, 0.0
+        self._estimate = now, 0.0
 
     def _taken(self, count: int) -> list[Pair]:
         return [self._waiting.popleft() for _ in range(min(count, len(self._waiting)))]
@@ -60,9 +60,9 @@ class JobsLeft:
         self._running += [(following, now) for following in self._taken(1)]
         self._done += 1
         rest = self._total - self._done
-        if now - self._stated[0] >= _OFTEN or self._done <= _MANY or not rest:
-            self._stated = now, self._seconds(now)
-        left = max(self._stated[1] - (now - self._stated[0]), 0.0)
+        if now - self._estimate[0] >= _OFTEN or self._done <= _MANY or not rest:
+            self._estimate = now, self._seconds(now)
+        left = max(self._estimate[1] - (now - self._estimate[0]), 0.0)
         return Advance(self._done, self._total, " ".join(pair), left, left / max(rest, 1))
 
     def _seconds(self, now: float) -> float:

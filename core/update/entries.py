@@ -188,8 +188,8 @@ def _shortest(rows: FloatArray, right: FloatArray, cutoff: float) -> tuple[Float
     by the largest singular value: one that is known is added to the others.
     """
     largest = max(float(np.linalg.norm(rows)), 2.0 * cutoff)
-    adjacent = la.block_diag(rows, largest)
-    found = la.lstsq(adjacent, np.append(right, 0.0), cond=cutoff / largest, lapack_driver="gelsd")
+    bordered = la.block_diag(rows, largest)
+    found = la.lstsq(bordered, np.append(right, 0.0), cond=cutoff / largest, lapack_driver="gelsd")
     return np.asarray(found[0][:-1]), int(found[2]) - 1
 
 

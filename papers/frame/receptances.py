@@ -72,8 +72,8 @@ class Point:
     def grid(self) -> FloatArray:
         """Return frequencies in Hz, dense where the receptance bends."""
         special = np.concatenate([self.resonances, self.antiresonances])
-        adjacent = np.concatenate([-_NEXT_TO[:0:-1], _NEXT_TO]) * DAMPING
-        near = (special[:, None] * (1.0 + adjacent)).ravel()
+        offsets = np.concatenate([-_NEXT_TO[:0:-1], _NEXT_TO]) * DAMPING
+        near = (special[:, None] * (1.0 + offsets)).ravel()
         near = near[(near > LOWEST) & (near < HIGHEST)]
         return np.unique(np.concatenate([np.linspace(LOWEST, HIGHEST, 400), near]))
 

@@ -33,8 +33,8 @@ class System:
             local = np.array([*(radius * _circle(around)), z])
         elif self.kind == "S":
             radius, down, around = coordinates
-            z, adjacent = radius * _circle(down)
-            local = np.array([*(adjacent * _circle(around)), z])
+            z, off_axis = radius * _circle(down)
+            local = np.array([*(off_axis * _circle(around)), z])
         return np.asarray(self.origin + local @ self.axes)
 
     def axes_at(self, point: FloatArray) -> FloatArray:
@@ -45,12 +45,12 @@ class System:
         if self.kind == "R":
             return self.axes
         x, y, z = self.axes @ (point - self.origin)
-        adjacent = float(np.hypot(x, y))
-        c, s = (x / adjacent, y / adjacent) if adjacent > 0.0 else (1.0, 0.0)
+        off_axis = float(np.hypot(x, y))
+        c, s = (x / off_axis, y / off_axis) if off_axis > 0.0 else (1.0, 0.0)
         turned = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         if self.kind == "S":
-            radius = float(np.hypot(adjacent, z))
-            up, out = (z / radius, adjacent / radius) if radius > 0.0 else (1.0, 0.0)
+            radius = float(np.hypot(off_axis, z))
+            up, out = (z / radius, off_axis / radius) if radius > 0.0 else (1.0, 0.0)
             along, across, pole = turned
             turned = np.array([out * along + up * pole, up * along - out * pole, across])
         return np.asarray(turned @ self.axes)

@@ -55,11 +55,11 @@
   const frequencies = (item, entries, state) => {
     const [box, options] = [el("div"), { errors: false, mac: false, few: false }];
     const [fine, failed] = [entries.filter(({ ok }) => ok), entries.filter(({ ok }) => !ok)];
-    const companions = [[data.as_drawn[item.name] ?? {}, "from drawn"], [data.papers[item.name] ?? {}, "as printed"]];
+    const others = [[data.as_drawn[item.name] ?? {}, "from drawn"], [data.papers[item.name] ?? {}, "as printed"]];
     const fill = () => {
       const shown = fine.filter((entry) => !options.few || twoOf(state).includes(entry) || entry.name === data.baseline)
         .map((entry) => ({ ...entry, mark: [entry === state.a && "A", entry === state.b && "B", entry.result.unphysical && "unphysical"].filter(Boolean).join(", ") }));
-      box.replaceChildren(...(shown.length ? bench.frequencies(shown, companions, options) : [note("No strategy gave a model.")]));
+      box.replaceChildren(...(shown.length ? bench.frequencies(shown, others, options) : [note("No strategy gave a model.")]));
     };
     const flip = (label, name) => bench.tick(label, false, (on) => {
       options[name] = on;

@@ -14,21 +14,21 @@
     return bench.cell(hz, () => [mode && hz === null ? "none" : bench.hertz(hz), under(error), under(mac && mode?.mac && `MAC ${mode.mac.toFixed(3)}`)]);
   };
 
-  /** Return the rows of a strategy: its own and those of `companions` ([Hz by strategy and mode, where they come from]). */
-  const rowsOf = ({ name, mark, detail, result }, groups, companions, options) => {
+  /** Return the rows of a strategy: its own and those of `others` ([Hz by strategy and mode, where they come from]). */
+  const rowsOf = ({ name, mark, detail, result }, groups, others, options) => {
     const own = new Map(detail.modes.map((mode) => [keyOf(mode), mode]));
     // What an eigenvalue solution leaves of an exact fit says nothing.
     const rms = (block) => el("td", { class: "right case-sum" }, block && bench.small(result.rms[data.blocks.indexOf(block)]));
     const line = (said, of) => el("tr", { class: said ? "case-printed" : null, "data-strategy": name, "data-said": said }, el("th", { scope: "row" }, name, under(said || mark)),
       groups.map(({ block, modes, last }) => [modes.map((mode) => frequency(of(mode), mode.measured_hz, options)), last && rms(!said && block)]));
-    return [line("", (mode) => own.get(keyOf(mode))), ...companions.filter(([hertz]) => hertz[name]).map(([hertz, said]) => line(said, ({ modification, mode }) => {
+    return [line("", (mode) => own.get(keyOf(mode))), ...others.filter(([hertz]) => hertz[name]).map(([hertz, said]) => line(said, ({ modification, mode }) => {
       const hz = modification ? null : hertz[name][mode];
       return hz ? { predicted_hz: hz } : null;
     }))];
   };
 
   /** Return the table of natural frequencies of entries [{name, detail, result, mark}]; measured ones and baseline stay in view. */
-  bench.frequencies = (entries, companions, options) => {
+  bench.frequencies = (entries, others, options) => {
     const modes = [...new Map(entries.flatMap(({ detail }) => detail.modes.map((mode) => [keyOf(mode), mode]))).values()];
     const groups = data.blocks.flatMap((block) => d3.groups(modes.filter((mode) => mode.block === block), (mode) => mode.modification ?? "")
       .map(([change, own], k, all) => ({ block, change, modes: own, last: k === all.length - 1 })));
@@ -36,7 +36,7 @@
     const across = (title, of, sum) => el("tr", {}, el("th", { scope: "row" }, title),
       groups.map((group) => [group.modes.map((mode) => head(of(mode), { "data-mode": keyOf(mode) })), group.last && el(sum ? "th" : "td", { class: "right case-sum" }, sum)]));
     const bands = groups.map(({ block, change, modes: own, last }) => el("th", { scope: "colgroup", class: "case-band", colspan: own.length + last }, GROUPS[block], change && ` “${change}”`));
-    const rows = (baseline) => entries.filter(({ name }) => (name === data.baseline) === baseline).map((entry) => rowsOf(entry, groups, companions, options));
+    const rows = (baseline) => entries.filter(({ name }) => (name === data.baseline) === baseline).map((entry) => rowsOf(entry, groups, others, options));
     return [el("p", { class: "soft" }, "In Hz. “none”: the model has no mode that belongs to the measured one; “i”: imaginary. rms: of the frequency errors of a block."),
       bench.scroll(el("table", { class: "case-table case-frequencies", "aria-label": "Natural frequencies in Hz" },
         el("thead", {}, el("tr", {}, el("td"), bands), across("Mode", ({ mode }) => mode, "rms, %"), across("Measured", ({ measured_hz }) => bench.hertz(measured_hz), ""), rows(true)), el("tbody", {}, rows(false))))];
