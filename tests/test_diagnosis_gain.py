@@ -43,17 +43,16 @@ def unseen(before: list[float], after: list[float], std: float = 0.01) -> Unseen
 
 
 def test_unseen_data_confirm_what_leaves_noise_and_refuse_what_goes_astray() -> None:
-    for fitted in (0, 1, 2, 3):
-        assert unseen([0.1, -0.2, 0.1], [0.005, 0.01, -0.005]).confirms(fitted)
-        assert not unseen([0.01, 0.0, 0.01], [0.2, -0.2, 0.1]).confirms(fitted)
-        assert not unseen([0.1, -0.2, 0.1], [0.2, -0.4, 0.2]).confirms(fitted)
+    assert unseen([0.1, -0.2, 0.1], [0.005, 0.01, -0.005]).holds
+    assert not unseen([0.01, 0.0, 0.01], [0.2, -0.2, 0.1]).holds
+    assert not unseen([0.1, -0.2, 0.1], [0.2, -0.4, 0.2]).holds
 
 
 def test_unseen_data_that_cannot_see_the_causes_do_not_refuse_them() -> None:
     blind = unseen([0.01, -0.01], [0.009, -0.011])
     assert not blind.visible
-    assert blind.confirms(1)
-    assert unseen([], []).confirms(1)
+    assert blind.holds
+    assert unseen([], []).holds
 
 
 def test_data_that_cannot_see_a_cause_do_not_veto_it() -> None:
@@ -61,7 +60,7 @@ def test_data_that_cannot_see_a_cause_do_not_veto_it() -> None:
     for step in (0.0003, -0.0003):
         found = unseen([0.02, -0.021], [0.02 + step, -0.021], std=0.002)
         assert not found.visible
-        assert found.confirms(1)
+        assert found.holds
         mixed = unseen([0.02, -0.021, 0.03], [0.02 + step, -0.021, 0.001], std=0.002)
         assert mixed.log_bayes == pytest.approx(unseen([0.03], [0.001], std=0.002).log_bayes)
 
@@ -72,26 +71,26 @@ def test_a_factor_of_150_against_a_cause_is_a_veto() -> None:
     found = unseen(before, after, std=0.002)
     assert found.log_bayes < -5.0
     assert found.probability > 2e-3
-    assert not found.confirms(1)
-    assert unseen(before[:2], after[:2], std=0.002).confirms(1)
+    assert not found.holds
+    assert unseen(before[:2], after[:2], std=0.002).holds
 
 
 def test_a_gross_miss_answers_for_no_cause() -> None:
     """A mode that was mistaken for another one is 20 % off with the cause and without it."""
     before, after = [0.03, -0.02, 0.025, 0.2], [0.001, 0.0015, -0.002, 0.19]
-    assert unseen(before, after, std=0.002).confirms(1)
+    assert unseen(before, after, std=0.002).holds
     assert unseen(before, after, std=0.002).log_bayes > 5.0
     spoiled = [0.07 + e for e in before[:3]], [0.07 + e for e in after[:3]]
     assert len(unseen(*spoiled, std=0.002).sound.before) == 3
 
 
-def test_where_no_model_leaves_noise_errors_must_fall_by_a_factor() -> None:
-    """The errors of real structures stay above the noise; fitted causes must carry further."""
+def test_where_no_model_leaves_noise_errors_must_fall_decisively() -> None:
+    """The errors of real structures stay above the noise."""
     whole = [0.1, -0.1, 0.1, -0.1]
-    assert unseen(whole, [0.1 * e for e in whole], 0.001).confirms(1)
-    assert unseen(whole, [0.5 * e for e in whole], 0.001).confirms(0)
-    assert not unseen(whole, [0.5 * e for e in whole], 0.001).confirms(1)
-    assert not unseen(whole, [0.1 * e for e in whole], 0.001).confirms(3)
+    assert unseen(whole, [0.1 * e for e in whole], 0.001).holds
+    slight = unseen(whole, [0.5 * e for e in whole], 0.001)
+    assert 0.0 < slight.log_bayes < 5.0
+    assert not slight.holds
 
 
 # --- whole diagnoses --------------------------------------------------------------------------
@@ -271,9 +270,9 @@ def test_a_mode_left_out_has_no_part_in_what_predicts_it() -> None:
     effects = effects_named(*NAMES)
     seen = examine(MODEL, replace(test, frequencies=wrong), effects, tolerance=0.0)
     assert seen.best.parts
-    crossed = predict_left_out(seen, Terms(tuple(effects), tolerance=0.0))
-    assert crossed.after[3] == pytest.approx(crossed.before[3], rel=1e-6)
+    crossed = predict_left_out(seen.posterior, seen.best)
     assert crossed.before[3] == pytest.approx(0.03, rel=0.05)
+    assert crossed.after[3] == pytest.approx(0.03, rel=0.35)
 
 
 def test_modes_without_partner_are_no_errors_of_a_hundred_percent() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -14,8 +13,8 @@ from femubench.core.case.case import Case
 from femubench.core.diagnosis.faults import correct_case, fault_causes, with_faults
 from femubench.core.diagnosis.proof import (
     Unseen,
-    borne_out,
     extend_by,
+    find_held,
     gain_of,
     predict_left_out,
     rms_gain_of,
@@ -33,7 +32,7 @@ from femubench.core.diagnosis.tables import (
     rivals_of,
     smallest_visible,
 )
-from femubench.core.diagnosis.verdict import Decision, decide, elsewhere
+from femubench.core.diagnosis.verdict import Decision, Sufficiency, decide, elsewhere
 from femubench.core.diagnosis.words import sentence_of
 from femubench.core.fem.model import Model
 from femubench.core.fit.extended_model import departure
@@ -49,9 +48,10 @@ from femubench.core.look.localisation import locate
 from femubench.core.look.look import look
 from femubench.core.look.modes import Seen
 from femubench.core.look.readings import look_at_band
+from femubench.core.look.states import compare_states
 from femubench.core.plugin.loader import list_effects, list_faults
 from femubench.core.roles import Effect, Fault
-from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning
+from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning, States
 from femubench.core.score.scoring import score_model
 from femubench.core.ties import in_order
 
@@ -66,7 +66,7 @@ class _Proof:
         unseen: errors of the unseen data.
         gain, gain_rms: before and after, as medians and as root mean squares.
         crossed: whether used modes were left out in turn, for want of unseen ones.
-        confirmed: whether unseen data bear the leader out.
+        test: whether the leader is enough.
     """
 
     leader: Explanation
@@ -75,17 +75,7 @@ class _Proof:
     gain: Gain
     gain_rms: Gain
     crossed: bool
-    confirmed: bool
-
-    @cached_property
-    def adequate(self) -> float:
-        """Return the probability of what the leader leaves of the used data, were it noise."""
-        return adequacy(self.leader.fit.state, self.leader.unknowns)
-
-    @property
-    def log_bayes(self) -> float:
-        """Return ln of the Bayes factor of the leader against nothing added, on unseen data."""
-        return sum(part.log_bayes for part in self.unseen)
+    test: Sufficiency
 
 
 def diagnose(
@@ -125,22 +115,27 @@ def diagnose(
         # Faults of data and input first, then the causes that are left without them.
         inquiry = inquire(case.model, used, wrong, terms)
         repaired = correct_case(case, inquiry.repaired)
-        proof = _proof(repaired, inquiry.examination, terms, case)
+        proof = _proof(repaired, inquiry.examination, effort, case)
         with effort.piece("advice"):
             looks = _looks(case.model, repaired, (*registered, *known))
             posterior, leader = inquiry.examination.posterior, proof.leader
-            decision = decide(posterior, proof.adequate, leader, proof.log_bayes, proof.confirmed)
+            states = _compared(case)
+            decision = decide(posterior, leader, proof.test, states and states.differs)
             found = _written(repaired, inquiry, decision, proof, looks, begin)
+    found = replace(found, states=states)
     return replace(found, notes=(*case.notes, *found.notes, *_conditions(effort)))
 
 
 def _expected(case: Case) -> dict[Kind, Number]:
-    """Return what mostly follows the search: unseen data or, without any, used ones left out."""
-    if case.held_out or case.modifications:
-        # The best guess is solved and judged, and where it fails its rivals are.
-        judged = 2.0, 2.0 + settings.largest_group / 2.0
-        return {"unseen": judged, "advice": 1.0}
-    return {"single": float(settings.candidates * len(case.used)), "advice": 1.0}
+    """Return what mostly follows the search."""
+    # The best guess is solved and judged, and where it fails its rivals are.
+    judged = 2.0, 2.0 + bool(case.held_out or case.modifications) * settings.largest_group / 2.0
+    return {"unseen": judged, "advice": 1.0}
+
+
+def _compared(case: Case) -> States | None:
+    """Return how all that was measured differs from the reference, used or not."""
+    return None if case.reference is None else compare_states(case.measurement, case.reference)
 
 
 def _looks(drawn: Model, case: Case, effects: Iterable[Effect]) -> tuple[LookWarning, ...]:
@@ -153,13 +148,8 @@ def _looks(drawn: Model, case: Case, effects: Iterable[Effect]) -> tuple[LookWar
     return (*found, *look_at_band(Seen(case.model, case.measurement), case.band))
 
 
-def _proof(
-    case: Case,
-    examination: Examination,
-    terms: Terms,
-    given: Case,
-) -> _Proof:
-    best, effort = examination.best, terms.effort
+def _proof(case: Case, examination: Examination, effort: Effort, given: Case) -> _Proof:
+    best, posterior = examination.best, examination.posterior
     with effort.piece("unseen"):
         model = extend_by(case.model, best)
         # This asks for the most modes: all that follows is given those.
@@ -167,20 +157,25 @@ def _proof(
         unseen = unseen_of(case, examination, best, model)
     crossed = None
     if any(len(part.before) for part in unseen):
-        found = borne_out(case, examination, effort)
-        confirmed = found is not None
+        found = find_held(case, examination, effort)
+        holds = found is not None
         if found is not None and found is not best:
             best, model = found, extend_by(case.model, found)
             after = score_model(case, model)
             unseen = unseen_of(case, examination, best, model)
+        tells = any(part.visible for part in unseen)
     else:
-        crossed = predict_left_out(examination, terms)
-        unseen = (crossed,)
-        confirmed = crossed.confirms(len(best.parts))
+        crossed = predict_left_out(posterior, best)
+        unseen, holds = (crossed,), crossed.holds
+        tells = crossed.visible and len(crossed.before) >= settings.telling_modes
     before = score_model(given, given.model)
     median, rms = (of(before, after, crossed) for of in (gain_of, rms_gain_of))
     effort.expect("unseen", 0)
-    return _Proof(best, model, unseen, median, rms, crossed is not None, confirmed)
+    state = best.fit.state
+    log_bayes = sum(part.log_bayes for part in unseen)
+    left, own = adequacy(state, best.unknowns), examination.own_share(state)
+    test = Sufficiency(left, own, log_bayes, holds or not tells, tells)
+    return _Proof(best, model, unseen, median, rms, crossed is not None, test)
 
 
 def _written(
@@ -224,7 +219,7 @@ def _written(
         chi2=(before.chi2, after.chi2),
         scatter=scatter_rows(after),
         data_count=len(examination.problem.data),
-        adequacy_p=proof.adequate,
+        adequacy_p=proof.test.left,
         nothing=decision.nothing,
         looks=looks,
         locations=(*evidence_rows(examination), *locate(case.model, used)),
@@ -255,14 +250,14 @@ def _conditions(effort: Effort) -> tuple[str, ...]:
 
 
 def _group_causes(options: Iterable[Iterable[Cause]]) -> list[Cause]:
-    """Return every effect of a group once, as in the most probable explanation that has it.
+    """Return every cause of a group once, as in the most probable explanation that has it.
 
     Arguments:
         options: causes of every explanation, most probable explanation first.
     """
-    found: dict[str, Cause] = {}
+    found: dict[tuple[str, str], Cause] = {}
     for cause in (cause for option in options for cause in option):
-        found.setdefault(cause.effect, cause)
+        found.setdefault((cause.effect, cause.place), cause)
     return in_order(found.values(), lambda cause: 1.0 - cause.probability, 1e-9)
 
 
@@ -303,7 +298,7 @@ def _notes(
         notes.append(
             "The case holds nothing back: the gain is that on used modes left out in turn."
         )
-    elif best.parts and not any(part.visible for part in proof.unseen):
+    elif best.parts and not proof.test.tells:
         notes.append("The unseen data hardly change with the cause, so they cannot confirm it.")
     if best is not examination.best:
         first = examination.best

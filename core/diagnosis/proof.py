@@ -8,6 +8,7 @@ from functools import cached_property
 from math import log
 
 import numpy as np
+import scipy.linalg as la
 from scipy.special import chdtrc, logsumexp
 
 from femubench.core.case.case import Case
@@ -16,12 +17,12 @@ from femubench.core.fem.model import Model
 from femubench.core.fit.discrepancy import Discrepancy
 from femubench.core.fit.extended_model import extend_model, raw_residual
 from femubench.core.fit.mesh_error import mesh_bias, mesh_corrections
-from femubench.core.fit.modal_fit import Fit, Problem, bounds_of, state_at
+from femubench.core.fit.modal_fit import Fit, Problem, State, bounds_of, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
 from femubench.core.inference.effort import Effort
-from femubench.core.inference.examine import Examination, Terms
-from femubench.core.inference.posterior import Explanation
+from femubench.core.inference.examine import Examination
+from femubench.core.inference.posterior import Explanation, Posterior
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import enough_modes, modes_of, once_for
 from femubench.core.modal.measurement import Measurement
@@ -117,27 +118,14 @@ class Unseen:
         rest = sound.after / np.hypot(sound.std, own)
         return float(chdtrc(len(rest), rest @ rest)) if len(rest) else 1.0
 
-    def confirms(self, fitted: int) -> bool:
-        """Tell whether unseen data bear the causes out, or cannot see them.
+    @property
+    def holds(self) -> bool:
+        """Tell whether unseen data get no worse by the causes, or cannot see them.
 
-        More than two fitted causes may bend to any used data: what they leave of unseen data must
-        be noise.
-
-        Arguments:
-            fitted: number of causes that are more than textbook physics.
+        No real structure is a beam: where more than noise is left, they must get decisively better.
         """
-        if not self.visible:
-            return True
-        log_bayes = self.log_bayes
-        if log_bayes < -settings.decisive or self.plain_std is not None:
-            return log_bayes >= -settings.decisive
-        if fitted > settings.few_values:
-            return self.probability > settings.adequate_p
-        # No real structure is a beam, and physics from the textbook need not be all that is
-        # missing: errors that stay more than noise must fall by a factor, in the mean of their
-        # logarithms. A fitted cause must carry further.
-        enough = len(self.seeing.before) * (1 + bool(fitted)) * log(settings.error_ratio)
-        return self.probability > settings.noise_p or log_bayes > enough
+        least = -settings.decisive if self.probability > settings.noise_p else settings.decisive
+        return not self.visible or self.log_bayes >= least
 
 
 def predict_held_out(
@@ -253,38 +241,54 @@ def _relative_std(measurement: Measurement) -> FloatArray:
     return np.where(known, std, typical)
 
 
-def predict_left_out(examination: Examination, terms: Terms) -> Unseen:
-    """Return the errors of every used mode, predicted from the others alone.
+def predict_left_out(posterior: Posterior, leader: Explanation) -> Unseen:
+    """Return the errors of every used mode, predicted from the others by all that bear a name.
 
-    The causes are chosen anew without the mode, so that it has no part in what predicts it.
+    In closed form: every explanation is linear in its causes nearby, and is weighed anew without
+    the frequency and the shape of the mode, so that these have no part in what predicts it.
 
     Arguments:
-        examination: of all used modes.
-        terms: of the examination.
+        posterior: all explanations of all used modes.
+        leader: one with the name.
+
+    Source: Sundararajan & Keerthi (2001), Neural Computation 13, 1103-1118, for leaving out in
+    closed form.
     """
-    data = examination.problem.data
-    numbers = data.measurement.numbers
-    nothing = examination.nominal
-    noise = Noise.of(np.zeros((len(data), 0)), 0.0)
-    several = len(examination.best.parts) > 1
-    before, after, std = [], [], []
-    effort = terms.effort
-    for j, number in enumerate(numbers):
-        left = len(numbers) - j - 1
-        effort.expect_alike(left, several)
-        kept = data.measurement.select([other for other in numbers if other != number])
-        if len(kept) == 0:
-            break
-        again = replace(terms, pairs=several).examine(examination.model, kept)
-        found, problem = again.best.fit, again.problem_of(again.best)
-        point = state_at(replace(problem, data=data, noise=noise), found.parts, found.state.x)
-        slope = data.by_mode(point.jacobian)[j]
-        spread = slope @ found.covariance @ slope
-        relative = data.measurement.frequency_std[j] / data.measurement.frequencies[j]
-        before.append(data.by_mode(nothing.raw)[j] * relative)
-        after.append(data.by_mode(point.raw)[j] * relative)
-        std.append(np.sqrt(relative**2 * (1.0 + spread) + examination.scatter**2))
-    return Unseen(np.array(before), np.array(after), np.array(std))
+    m = leader.fit.state.problem.data.measurement
+    relative = m.frequency_std / m.frequencies
+    members = [e for e, _ in posterior.members(posterior.key(leader))][: settings.leading]
+    known = [_leave_out(e.fit.state) for e in members]
+    trust = [e.fit.state.problem.noise.trust for e in members]
+    errors, variances, densities = (np.array(rows) for rows in zip(*known, strict=True))
+    logs = np.array([e.log_weight for e in members])[:, None] - np.array(trust)[:, None] * densities
+    weights = np.exp(logs - logsumexp(logs, axis=0))
+    after = (weights * errors).sum(axis=0)
+    variance = (weights * (variances + np.square(errors - after))).sum(axis=0)
+    before, plain, _ = _leave_out(posterior.nothing.fit.state)
+    rows = before, after, np.sqrt(variance), np.sqrt(plain)
+    return Unseen(*(relative * row for row in rows))
+
+
+def _leave_out(state: State) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return errors of frequencies from all other modes, variances, ln density of each mode.
+
+    Of the mode means its frequency and its shape; in deviations of the measurement, (m,) each.
+    """
+    data, noise = state.problem.data, state.problem.noise
+    total = noise.factor @ noise.factor.T + state.slopes @ state.slopes.T
+    total = data.by_mode(data.by_mode(total).T).T
+    rest = data.by_mode(state.raw - noise.mean + state.slopes @ state.x)
+    precision = la.inv(total)
+    pulled, count = precision @ rest, len(data.measurement)
+    found = []
+    for j in range(count):
+        rows = np.append(j, count + np.flatnonzero(data.shape_rows[0] == j))
+        spread = la.inv(precision[np.ix_(rows, rows)])
+        error = spread @ pulled[rows]
+        density = -0.5 * (error @ pulled[rows] + np.linalg.slogdet(spread)[1])
+        found.append((error[0], spread[0, 0], density))
+    errors, variances, densities = np.array(found).reshape(-1, 3).T
+    return errors, variances, densities
 
 
 def rms_gain_of(before: Blocks, after: Blocks, crossed: Unseen | None) -> Gain:
@@ -398,14 +402,14 @@ def _neighbours(model: Model, explanation: Explanation) -> list[Model]:
     return [_extended(model, explanation, x) for x in steps]
 
 
-def stands(
+def holds(
     case: Case,
     examination: Examination,
     explanation: Explanation,
     model: Model,
     unseen: Sequence[Unseen],
 ) -> bool:
-    """Tell whether unseen data bear an explanation out.
+    """Tell whether unseen data get no worse by an explanation.
 
     Arguments:
         case: what holds them.
@@ -414,16 +418,15 @@ def stands(
         model: with the explanation in it.
         unseen: its errors.
     """
-    count = len(explanation.parts)
-    if all(part.confirms(count) for part in unseen):
+    if all(part.holds for part in unseen):
         return True
-    if not count or not case.modifications:
+    if not explanation.parts or not case.modifications:
         return False
     unseen = unseen_of(case, examination, explanation, model, sharply=False)
-    return all(part.confirms(count) for part in unseen)
+    return all(part.holds for part in unseen)
 
 
-def borne_out(
+def find_held(
     case: Case, examination: Examination, effort: Effort | None = None
 ) -> Explanation | None:
     """Return what unseen data bear out of all that the used data cannot tell from the best guess.
@@ -449,9 +452,9 @@ def borne_out(
     rivals = []
     for key in others:
         with effort.piece("unseen"):
-            stands, log_bayes = _judged(case, examination, posterior.best(key))
+            is_held, log_bayes = _judged(case, examination, posterior.best(key))
         gain = log_bayes - first[1] + log(posterior.names[key] / posterior.names[name])
-        if stands and gain > (settings.decisive if first[0] else 0.0):
+        if is_held and gain > (settings.decisive if first[0] else 0.0):
             rivals.append((gain, posterior.best(key)))
     if rivals:
         return max(rivals, key=lambda pair: pair[0])[1]
@@ -459,8 +462,8 @@ def borne_out(
         return best
     for found in places:
         with effort.piece("unseen"):
-            stands, _ = _judged(case, examination, found)
-        if stands:
+            is_held, _ = _judged(case, examination, found)
+        if is_held:
             return found
     return None
 
@@ -473,4 +476,4 @@ def _judged(case: Case, examination: Examination, found: Explanation) -> tuple[b
         model = _extended(case.model, found, found.fit.state.x)
     unseen = unseen_of(case, examination, found, model)
     log_bayes = sum(part.log_bayes for part in unseen)
-    return stands(case, examination, found, model, unseen), log_bayes
+    return holds(case, examination, found, model, unseen), log_bayes

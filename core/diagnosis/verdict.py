@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
 from scipy.special import expit
 
-from femubench.core.diagnosis.scatter import overstatement
 from femubench.core.effect.places import bare_place
 from femubench.core.inference.posterior import (
     Explanation,
@@ -33,13 +32,39 @@ class Decision:
         angles: of every name of the group to the first one, degrees.
         held: probability that any known explanation holds, at most; below 1 where what is left, or
             unseen data, speak against all of them.
+        unconfirmed: whether there are no unseen data that could have spoken against it.
     """
 
     verdict: Verdict
     group: tuple[Key, ...]
     nothing: float
-    angles: tuple[float, ...]
+    angles: tuple[float, ...] = ()
     held: float = 1.0
+    unconfirmed: bool = False
+
+
+@dataclass(frozen=True)
+class Sufficiency:
+    """Whether a statement is enough: of a cause, of nothing, or of a fault of the data.
+
+    Arguments:
+        left: probability of what it leaves of the used data, were it noise under model error.
+        own: share of the change that it takes for its own error.
+        log_bayes: ln of its Bayes factor against nothing added, on data that it has not seen.
+        holds: whether these data get no worse by it.
+        tells: whether they could.
+    """
+
+    left: float
+    own: float = 0.0
+    log_bayes: float = 0.0
+    holds: bool = True
+    tells: bool = True
+
+    @property
+    def explains(self) -> bool:
+        """Tell whether what is left is noise, and its own error as small as of right causes."""
+        return self.left > settings.noise_p and self.own <= settings.largest_own_error
 
 
 def angle_between(first: Explanation, second: Explanation) -> float:
@@ -56,32 +81,33 @@ def angle_between(first: Explanation, second: Explanation) -> float:
 
 
 def decide(
-    posterior: Posterior, adequate: float, leader: Explanation, log_bayes: float, confirmed: bool
+    posterior: Posterior, leader: Explanation, test: Sufficiency, differs: bool | None = None
 ) -> Decision:
-    """Return the verdict.
+    """Return the verdict: what the evidence prefers, where it is sufficient.
 
     Arguments:
         posterior: all explanations.
-        adequate: probability of what the leading explanation leaves, were it noise.
         leader: the most probable explanation, or what unseen data bear out in its place.
-        log_bayes: ln of its Bayes factor on unseen data against nothing added.
-        confirmed: whether unseen data bear it out.
+        test: of the leader.
+        differs: whether the measurement differs from that of the reference, whatever any model
+            says; None without a reference. What does not differ has no cause, what does has one.
     """
     nothing = posterior.names.get((), 0.0)
+    if differs is False:
+        return Decision("none", (), nothing)
     if nothing >= settings.nothing_missing:
-        held = 1.0 if adequate > settings.noise_p else most_believed(adequate)
-        verdict: Verdict = "none" if adequate > settings.noise_p else "unknown"
-        return Decision(verdict, (), nothing * held, (), held)
+        enough = test.explains and not differs
+        held = 1.0 if test.explains else most_believed(test.left)
+        return Decision("none" if enough else "unknown", (), nothing * held, (), held)
     group, angles = inseparable(posterior, leader)
-    held = 1.0
-    if adequate <= settings.noise_p:
-        verdict, held = "unknown", most_believed(adequate)
-        nothing *= held
-    elif not confirmed:
-        verdict, held = "not-confirmed", float(expit(min(log_bayes, 0.0)))
-    else:
-        verdict = "ambiguous" if len(group) > 1 and not mostly_common(posterior, group) else "named"
-    return Decision(verdict, group, nothing, angles, held)
+    if not test.explains:
+        held = most_believed(test.left) if test.left < settings.noise_p else 1.0
+        return Decision("unknown", group, nothing * held, angles, held)
+    if not test.holds:
+        held = float(expit(min(test.log_bayes, 0.0)))
+        return Decision("not-confirmed", group, nothing, angles, held)
+    verdict: Verdict = "ambiguous" if len(group) > 1 else "named"
+    return Decision(verdict, group, nothing, angles, unconfirmed=not test.tells)
 
 
 def most_believed(p: float) -> float:
@@ -97,45 +123,13 @@ def most_believed(p: float) -> float:
     return float(factor / (1.0 + factor))
 
 
-def mostly_common(posterior: Posterior, group: Sequence[Key]) -> bool:
-    """Tell whether the first name of a group stands, but for what hardly matters.
-
-    What all names of the group share must be the first name as a whole, or rest on textbook
-    physics, and carry most of what is explained, and all but few of them must be the first name
-    with more in addition, or with one cause for another that acts alike: what is left of a real
-    structure then goes by any name.
-    """
-    common = set(group[0]).intersection(*group[1:])
-    best = posterior.best(group[0])
-    if common != set(group[0]) and not common.intersection(best.base.names):
-        return False
-    share = sum(
-        p for key, p in posterior.names.items() if _says_as_much(posterior, best, group[0], key)
-    )
-    if share < settings.common_share:
-        return False
-    nothing = next(e for e in posterior.explanations if not e.parts and not e.base.parts)
-    core = [e.chi2 for e in posterior.explanations if set(posterior.key(e)) == common]
-    explained = nothing.chi2 - min(core, default=np.inf)
-    return bool(explained >= settings.explained_share * (nothing.chi2 - best.chi2))
-
-
-def _says_as_much(posterior: Posterior, best: Explanation, first: Key, key: Key) -> bool:
-    """Tell whether a name holds another one, or swaps one cause of it for its like."""
-    if set(first) <= set(key):
-        return True
-    swapped = len(key) == len(first) and len(set(first) - set(key)) == 1
-    if not swapped or posterior.names[key] < settings.parallel_rival_share:
-        return False
-    return angle_between(best, posterior.best(key)) < settings.parallel_angle
-
-
 def inseparable(
     posterior: Posterior, leader: Explanation | None = None
 ) -> tuple[tuple[Key, ...], tuple[float, ...]]:
     """Return the best name with all that these data cannot exclude, and their angles to it.
 
-    Not excluded is what is probable enough, and what fits about as well, whatever its prior says.
+    Not excluded is what is probable enough, and what fits about as well with no more values,
+    whatever its prior says. A name with further causes contradicts none that it holds.
 
     Arguments:
         posterior: all explanations.
@@ -143,40 +137,30 @@ def inseparable(
     """
     names = {key: p for key, p in posterior.names.items() if key}
     something = sum(names.values())
-    ranked = list(names)
-    best = posterior.best(ranked[0])
-    group, angles, covered = [ranked[0]], [0.0], names[ranked[0]] / something
-    for key in ranked[1:]:
+    best = posterior.best(next(iter(names))) if leader is None else leader
+    first = posterior.key(best)
+    group, angles, covered = [first], [0.0], names[first] / something
+    for key in names:
         if len(group) == settings.largest_group:
             break
+        if set(first) <= set(key):
+            covered += names[key] / something if key != first else 0.0
+            continue
         share = names[key] / something
         angle = angle_between(best, posterior.best(key))
         near = angle < settings.parallel_angle or covered < settings.covered_share
         least = settings.parallel_rival_share if near else settings.rival_share
-        likely = share >= least
-        if likely or fits_as_well(posterior, best, key):
+        if share >= least or fits_as_well(posterior, best, key):
             group.append(key)
             angles.append(angle)
             covered += share
-    if leader is None or posterior.key(leader) == group[0]:
-        return tuple(group), tuple(angles)
-    first = posterior.key(leader)
-    keys = (first, *(key for key in group if key != first))
-    return keys, (0.0, *(angle_between(leader, posterior.best(key)) for key in keys[1:]))
+    return tuple(group), tuple(angles)
 
 
 def fits_as_well(posterior: Posterior, best: Explanation, key: Key) -> bool:
-    """Tell whether a name explains the data about as well as the best explanation does.
-
-    A name that only adds to the best one always does, and is left to its evidence. Where the
-    stated deviations are too large, so are those of the likelihoods.
-    """
-    if set(posterior.key(best)) <= set(key):
-        return False
-    limit = settings.as_well / overstatement(best.fit.state) ** 2
-    few = settings.few_values
+    """Tell whether a name explains the data about as well as the best one, with no more values."""
     return any(
-        fits_better(best, other) <= limit and abs(best.unknowns - other.unknowns) <= few
+        fits_better(best, other) <= settings.as_well and other.unknowns <= best.unknowns
         for other, _ in posterior.members(key)
     )
 

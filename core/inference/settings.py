@@ -112,6 +112,9 @@ class Settings:
     error_scale_range: tuple[float, float] = _prior(
         (0.01, 10.0), "of the width", "smaller is nothing, larger is no beam"
     )
+    prior_measured_base: float = _prior(
+        1.0, "odds", "changes follow from the measured healthy modes rather than from the drawing's"
+    )
     own_error_of_change: float = _prior(
         0.3, "of the change", "an effect at a place is an idealisation: width of its own error"
     )
@@ -167,21 +170,15 @@ class Settings:
     covered_share: float = _decision(
         0.98, "probability", "until a group covers this, less probable rivals stay in it"
     )
-    common_share: float = _decision(
-        0.92, "probability", "of a name and its like, from which it is named whatever goes with it"
-    )
-    explained_share: float = _decision(
-        0.8, "of chi-square", "which the common part of such a group must explain"
-    )
     largest_group: int = _decision(
         6, "explanations", "more names or places than this help nobody to decide"
     )
     as_well: float = _decision(3.0, "nats", "within which two fits are as good: 6 of chi-square")
-    few_values: int = _decision(
-        2, "values", "by which two fits may differ, and causes that do not bend to any data"
-    )
     too_small: float = _decision(
         12.0, "of chi-square", "an effect that changes it by less is too small to see"
+    )
+    largest_own_error: float = _decision(
+        0.4, "of the change", "right causes have 0.01 to 0.22 as their own error, a wrong one 0.87"
     )
     # Where unseen data confirm.
     visible_deviations: float = _decision(
@@ -190,11 +187,11 @@ class Settings:
     telling_deviations: float = _decision(
         0.5, "deviations", "by which a single mode must change to say anything"
     )
+    telling_modes: int = _decision(
+        4, "modes", "fewer frequencies do not say which of them is wrong, nor what one of them does"
+    )
     decisive: float = _decision(
         5.0, "nats", "odds of 150 to 1, from which unseen data outweigh used ones"
-    )
-    error_ratio: float = _decision(
-        2.0, "factor", "by which textbook physics must lower errors; its square for a fitted cause"
     )
     gross_error: float = _decision(
         0.05, "of a frequency", "more than any model error: the drawing, or the pairing, is wrong"
