@@ -52,7 +52,7 @@ BUDGETS = {
     "scenarios": 760,
     "femubench": 580,
     "tests": 49_490,
-    "truths": 8_040,
+    "truths": 8_700,
     "benchmarks": 5_870,
 }
 ADVICE = (
