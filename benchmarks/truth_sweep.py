@@ -2,8 +2,8 @@
 
 python benchmarks/truth_sweep.py run --jobs 2         # appends, goes on where it stopped
 python benchmarks/truth_sweep.py run --reference      # with the measurement before the defect
-python benchmarks/truth_sweep.py run --set opensees   # the second generator
-python benchmarks/truth_sweep.py tables               # of each run: [--reference] [--set opensees]
+python benchmarks/truth_sweep.py run --set opensees   # the second generator; shear: the third
+python benchmarks/truth_sweep.py tables               # of each run: [--reference] [--set SET]
 """
 
 from __future__ import annotations
@@ -62,7 +62,16 @@ from femubench.core.challenge.posing import HEALTHY
 from femubench.core.challenge.truth_file import TRUTH_FILE, KnownCase, read_truth
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.plugin.loader import load_plugins
-from truths.posing import DEFECTS, FAULTS, OPENSEES, STRUCTURES, SUITE, pose
+from truths.posing import (
+    DEFECTS,
+    FAULTS,
+    OPENSEES,
+    SHEAR,
+    SHEAR_STRUCTURES,
+    STRUCTURES,
+    SUITE,
+    pose,
+)
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "femubench-results" / "truth-sweep.jsonl"
@@ -74,6 +83,7 @@ SETS = {
     "solids": ((DEFECTS,), SUITE),
     "faults": ((FAULTS,), SUITE),
     "opensees": ((OPENSEES,), STRUCTURES),
+    "shear": ((SHEAR,), SHEAR_STRUCTURES),
 }
 # Upper ends of the ranges of chi-square.
 EDGES = (9.0, 30.0, 100.0, 1000.0, math.inf)

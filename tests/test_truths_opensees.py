@@ -112,7 +112,7 @@ def test_a_recording_scatters_as_it_says() -> None:
     rng = np.random.default_rng(1)
 
     state = Observed(np.linspace(10.0, 100.0, 200), rng.standard_normal((200, len(plan.labels))))
-    table = pd.read_csv(StringIO(recorded(plan, state, 5)))
+    table = pd.read_csv(StringIO(recorded(plan.labels, state, 5)))
     drift = table["frequency"].to_numpy() / state.frequencies - 1.0
     assert drift.std() == pytest.approx(SCATTER, rel=0.15)
     assert (table["frequency_std"] / table["frequency"]).mean() == pytest.approx(SCATTER, rel=0.02)

@@ -29,7 +29,7 @@ pytestmark = pytest.mark.slow(20)
 TRUTHS = Path(__file__).parents[1] / "truths"
 # What turns solids into cases knows the project; what makes the solids does not.
 POSING = {
-    *("opensees_cases.py", "posing.py", "faults.py", "defect_cases.py"),
+    *("opensees_cases.py", "shear_cases.py", "posing.py", "faults.py", "defect_cases.py"),
     *("published.py", "stretch_file.py", "tables.py", "truth_text.py", "__main__.py"),
 }
 

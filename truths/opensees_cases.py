@@ -99,30 +99,36 @@ def with_faults(draw: Draw) -> Beams:
     return beams
 
 
-def recorded(plan: Plan, state: Observed, *seed: int) -> str:
+def recorded(
+    labels: Sequence[tuple[str, str, str]],
+    state: Observed,
+    *seed: int,
+    shape_scatter: float = SHAPE_SCATTER,
+) -> str:
     """Return `modes.csv`: modes with the scatter of a test, as stated."""
     rng = np.random.default_rng(seed)
     frequencies = state.frequencies * (1.0 + SCATTER * rng.standard_normal(len(state.frequencies)))
-    shapes = scaled(state.shapes) + SHAPE_SCATTER * rng.standard_normal(state.shapes.shape)
+    shapes = scaled(state.shapes) + shape_scatter * rng.standard_normal(state.shapes.shape)
     columns: dict[str, object] = {
         "mode": range(1, len(frequencies) + 1),
         "frequency": [f"{value:.6g}" for value in frequencies],
         "frequency_std": [f"{SCATTER * value:.2g}" for value in state.frequencies],
     }
-    for (label, *_), column in zip(plan.labels, scaled(shapes).T, strict=True):
+    for (label, *_), column in zip(labels, scaled(shapes).T, strict=True):
         columns[label] = [f"{value:.4f}" for value in column]
     return pd.DataFrame(columns).to_csv(index=False)
 
 
-def visible(plan: Plan, before: Observed, after: Observed) -> tuple[float, float, int]:
+def visible(
+    used: int, before: Observed, after: Observed, shape_scatter: float = SHAPE_SCATTER
+) -> tuple[float, float, int]:
     """Return chi-square of the change, its part of the frequencies, and how many modes appear."""
-    used = plan.used
     one = before.frequencies[:used], before.shapes[:used]
     partner = paired(one, (after.frequencies, after.shapes), CLOSENESS)
     drift = (after.frequencies[partner] / one[0] - 1.0) / SCATTER
     healthy, changed = scaled(one[1]), after.shapes[partner]
     fit = (healthy * changed).sum(axis=1) / (changed**2).sum(axis=1)
-    turned = (changed * fit[:, None] - healthy) / SHAPE_SCATTER
+    turned = (changed * fit[:, None] - healthy) / shape_scatter
     appears = int((mac(after.shapes[:used], before.shapes).max(axis=1) < NEW_MODE).sum())
     part = float((drift**2).sum())
     return part + float((turned**2).sum()), part, appears
@@ -147,7 +153,7 @@ def files_of(draw: Draw) -> dict[str, str]:
     """Return the text of every file of a case."""
     plan, beams = draw.plan, with_faults(draw)
     before, after = observed(cut(plan)), observed(beams)
-    chi2, part, appears = visible(plan, before, after) if draw.faults else (0.0, 0.0, 0)
+    chi2, part, appears = visible(plan.used, before, after) if draw.faults else (0.0, 0.0, 0)
     causes = tuple(
         TrueCause(
             *(f.what, f.effect, f.place, f.also),
@@ -162,8 +168,8 @@ def files_of(draw: Draw) -> dict[str, str]:
     )
     return {
         "truth.toml": truth_text(truth),
-        "modes.csv": recorded(plan, after, draw.seed, 1),
-        "healthy.csv": recorded(plan, before, draw.seed, 2),
+        "modes.csv": recorded(plan.labels, after, draw.seed, 1),
+        "healthy.csv": recorded(plan.labels, before, draw.seed, 2),
     }
 
 
@@ -217,7 +223,7 @@ def structure_files(plan: Plan) -> dict[str, str]:
     return {
         "case.toml": case_text(plan),
         "sensors.csv": sensors.to_csv(index=False),
-        "modes.csv": recorded(plan, observed(cut(plan)), SEED),
+        "modes.csv": recorded(plan.labels, observed(cut(plan)), SEED),
     }
 
 

@@ -14,6 +14,9 @@ FAULTS = ROOT / "truths" / "data" / "faults"
 # Of a second generator, with structures of their own.
 OPENSEES = ROOT / "truths" / "data" / "opensees"
 STRUCTURES = OPENSEES / "structures"
+# Of a third, shear frames, by SciPy alone.
+SHEAR = ROOT / "truths" / "data" / "shear"
+SHEAR_STRUCTURES = SHEAR / "structures"
 
 
 def pose(
