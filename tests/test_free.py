@@ -11,14 +11,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
-from femubench import InputError, Model, cases, read_case
+from femubench import InputError, Measurement, Model, Sensors, cases, read_case, solve_modes
+from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.writing import write_case
 from femubench.core.change.change import Change, proportional
 from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.change.terms import RowOperator, Term
 from femubench.core.effect.attachments import point_motion
 from femubench.core.fem.frame import Place
+from femubench.core.fem.model import Dofs
+from femubench.core.look.look import look
 from femubench.diagnosis import list_effects
 from femubench.effect import Parameter
 
@@ -108,3 +112,34 @@ def test_the_key_is_kept(kind: str, tmp_path: Path) -> None:
     assert found.model.free
     write_case(tmp_path / "again", found)
     assert read_case(tmp_path / "again").model.free
+
+
+def row_of_masses(weights: Sequence[float] = (1.0, 1.0, 1.0, 1.0)) -> Model:
+    """Return lumped masses above each other on rails along x, a spring as a group between two."""
+    count, springs = len(weights), {}
+    for i in range(count - 1):
+        part = np.zeros((count, count))
+        part[i : i + 2, i : i + 2] = 1e6 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        springs[f"storey-{i + 1}"] = sp.csc_array(part)
+    xyz = np.column_stack([np.zeros((count, 2)), 3.0 * np.arange(count)])
+    dofs = Dofs(np.arange(count), ("x",) * count, xyz)
+    geometry = MatrixGeometry(tuple(f"floor-{i}" for i in range(count)), dofs)
+    mass = sp.csc_array(np.diag(1000.0 * np.array(weights)))
+    return Model(mass, sum(springs.values()), dofs, geometry, groups=springs, free=True)
+
+
+@pytest.mark.parametrize("weights", [(1.0, 1.0, 1.0, 1.0), (20.0, 1.0, 1.0, 20.0), (1.0, 1.0)])
+def test_floors_on_rails_keep_their_springs_as_causes(weights: tuple[float, ...]) -> None:
+    model = row_of_masses(weights)
+    assert names(model)["member-stiffness"] == len(weights) - 1
+    assert names(model)["youngs-modulus"] == 1
+    assert names(model)["grounding-spring"] == 0
+    modes = solve_modes(model)
+    numbers = range(1, len(weights))
+    shapes = modes.shapes[:, 1:]
+    sensors = Sensors(tuple("abcd"[: len(weights)]), model.dofs.xyz, ("x",) * len(weights))
+    f = modes.natural_frequencies[1:]
+    measured = Measurement(
+        sensors, tuple(numbers), f, 1e-3 * f, np.full(len(f), np.nan), shapes, 0.01 + 0.0 * shapes
+    )
+    assert not [w for w in look(model, measured) if "hang free" in w.what]

@@ -14,14 +14,12 @@ from femubench.core.change.change import Change
 from femubench.core.change.tabulated import change_of, place_change
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import (
-    cache_by_model,
     enough_modes,
+    loose_motions,
     modes_of,
     once_for,
     zero_tolerance,
 )
-from femubench.core.modal.generalised_mass import mass_normalised
-from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.roles import Effect, EffectParameter
 from femubench.core.typing import FloatArray
 
@@ -244,7 +242,7 @@ def _hypotheses(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ..
 
 def _holds(model: Model, hypothesis: Hypothesis) -> bool:
     """Tell whether an effect makes it cost energy to move a model as a rigid body."""
-    rigid, least = _rigid_motions(model)
+    rigid, least = loose_motions(model), zero_tolerance(modes_of(model, enough_modes(model, 1)))
     extra, count = hypothesis.change.extra, rigid.shape[1]
     vectors = np.asarray(la.block_diag(rigid, np.eye(extra))) if extra else rigid
     energy = np.zeros((count + extra, count + extra))
@@ -255,13 +253,6 @@ def _holds(model: Model, hypothesis: Hypothesis) -> bool:
     body, across = energy[:count, :count], energy[:count, count:]
     body = body - across @ np.linalg.pinv(energy[count:, count:]) @ across.T
     return bool(np.abs(body).max(initial=0.0) > least)
-
-
-@cache_by_model
-def _rigid_motions(model: Model) -> tuple[FloatArray, float]:
-    """Return the motions of a model as a rigid body, mass-normalised, and an energy like none."""
-    modes = modes_of(model, enough_modes(model, 1))
-    return mass_normalised(model, rigid_body_vectors(model.dofs)), zero_tolerance(modes)
 
 
 def hypothesis_at(model: Model, effect: Effect, place: str, places: int) -> Hypothesis:
