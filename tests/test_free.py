@@ -19,6 +19,8 @@ from femubench.core.case.writing import write_case
 from femubench.core.change.change import Change, proportional
 from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.change.terms import RowOperator, Term
+from femubench.core.diagnosis.diagnose import diagnose
+from femubench.core.diagnosis.serial import diagnosis_to_json
 from femubench.core.effect.attachments import point_motion
 from femubench.core.fem.frame import Place
 from femubench.core.fem.model import Dofs
@@ -143,3 +145,23 @@ def test_floors_on_rails_keep_their_springs_as_causes(weights: tuple[float, ...]
         sensors, tuple(numbers), f, 1e-3 * f, np.full(len(f), np.nan), shapes, 0.01 + 0.0 * shapes
     )
     assert not [w for w in look(model, measured) if "hang free" in w.what]
+
+
+def test_what_is_no_candidate_is_said_with_its_reason() -> None:
+    free = replace(cases["frame"], reference=cases["frame"].measurement)
+    free = replace(free, model=replace(free.model, free=True), reference_used=free.used)
+    effects = [e for e in list_effects() if e.name in ("grounding-spring", "rotary-inertia")]
+    found = diagnose(free, effects, faults=(), pairs=False)
+    places = names(replace(free.model, free=False))["grounding-spring"]
+    assert [(row.effect, row.places) for row in found.left_out] == [
+        ("grounding-spring", places),
+        ("rotary-inertia", 1),
+    ]
+    said = [note for note in found.notes if note.startswith("Not tried")]
+    assert said == [
+        f"Not tried, since the structure hangs free: grounding-spring at {places} places.",
+        "Not tried, since the reference has them too: rotary-inertia at 1 place.",
+    ]
+    assert diagnosis_to_json(found)["left_out"][1]["reason"] == "the reference has them too"
+    plain = replace(free, model=replace(free.model, free=False), reference=None)
+    assert diagnose(plain, effects, faults=(), pairs=False).left_out == ()

@@ -196,10 +196,12 @@ def hypotheses_of(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, 
 
     Of a structure that is known to hang free, nothing that holds it to ground is a candidate.
     """
-    known = tuple(effects)
-    # Kept with the effects, so that no other one has their addresses meanwhile.
-    key = "hypotheses", *map(id, known)
-    return once_for(model, key, lambda: (known, _hypotheses(model, known)))[1]
+    return tuple(h for h, held in _offered(model, effects) if not held)
+
+
+def holding_to_ground(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ...]:
+    """Return what `hypotheses_of` leaves out, since it would hold a model that hangs free."""
+    return tuple(h for h, held in _offered(model, effects) if held)
 
 
 def by_themselves(effects: Iterable[Effect]) -> tuple[Effect, ...]:
@@ -223,7 +225,15 @@ def finer(hypothesis: Hypothesis, model: Model, effects: Iterable[Effect]) -> li
     return [hypothesis_at(model, effect, word, places) for effect, word in found]
 
 
-def _hypotheses(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ...]:
+def _offered(model: Model, effects: Iterable[Effect]) -> list[tuple[Hypothesis, bool]]:
+    """Return every effect at every place, and whether it holds what is known to hang free."""
+    known = tuple(effects)
+    # Kept with the effects, so that no other one has their addresses meanwhile.
+    key = "hypotheses", *map(id, known)
+    return once_for(model, key, lambda: (known, _hypotheses(model, known)))[1]
+
+
+def _hypotheses(model: Model, effects: Iterable[Effect]) -> list[tuple[Hypothesis, bool]]:
     found = []
     for effect in effects:
         each = {p: tuple(effect.parameters(model, p)) for p in dict.fromkeys(effect.places(model))}
@@ -233,11 +243,12 @@ def _hypotheses(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ..
             Hypothesis(effect, place_change(effect, model, p, own), len(places))
             for p, own in places.items()
         ]
-        if model.free:
-            own = [one for one in own if not _holds(model, one)]
-            own = [replace(one, places=len(own)) for one in own]
-        found += own
-    return tuple(found)
+        held = [model.free and _holds(model, one) for one in own]
+        count = held.count(False)
+        found += [
+            (replace(one, places=count or len(own)), h) for one, h in zip(own, held, strict=True)
+        ]
+    return found
 
 
 def _holds(model: Model, hypothesis: Hypothesis) -> bool:

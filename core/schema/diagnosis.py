@@ -110,6 +110,20 @@ class SmallestVisible:
     wording: Wording = "value"
 
 
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """An effect that was tried at no place, or at some only.
+
+    Arguments:
+        places: at how many it was not.
+        reason: as the end of a sentence that begins with "since".
+    """
+
+    effect: str
+    places: int
+    reason: str
+
+
 class ErrorScale(Struct, frozen=True):
     """How large a class of model error is under the first explanation, standard deviation.
 
@@ -246,6 +260,7 @@ class DiagnosisReport:
             structure is taken for a beam model.
         like_a_beam: probability that it is one, but for ordinary scatter.
         scatter: whether what is left is as much as the stated deviations let expect.
+        left_out: effects that were no candidates, and why.
     """
 
     case: str = ""
@@ -272,3 +287,4 @@ class DiagnosisReport:
     like_a_beam: Number = 1.0
     gain_rms: Gain | None = None
     scatter: tuple[Scatter, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
