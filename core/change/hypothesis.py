@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.change.change import Change
+from femubench.core.change.change import Change, parameter_of
 from femubench.core.change.tabulated import change_of, place_change
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import (
@@ -191,17 +191,24 @@ def _points(parameter: EffectParameter, sizes: Sequence[float]) -> list[float]:
     return inside or [0.5 * (low + high)]
 
 
-def hypotheses_of(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ...]:
+def hypotheses_of(
+    model: Model, effects: Iterable[Effect], damage: float = 0.0
+) -> tuple[Hypothesis, ...]:
     """Return every effect at every place where it may sit in a model.
 
     Of a structure that is known to hang free, nothing that holds it to ground is a candidate.
+
+    Arguments:
+        damage: least prior deviation of ln(factor) of a relative change of a part.
     """
-    return tuple(h for h, held in _offered(model, effects) if not held)
+    return tuple(h for h, held in _offered(model, effects, damage) if not held)
 
 
-def holding_to_ground(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ...]:
+def holding_to_ground(
+    model: Model, effects: Iterable[Effect], damage: float = 0.0
+) -> tuple[Hypothesis, ...]:
     """Return what `hypotheses_of` leaves out, since it would hold a model that hangs free."""
-    return tuple(h for h, held in _offered(model, effects) if held)
+    return tuple(h for h, held in _offered(model, effects, damage) if held)
 
 
 def by_themselves(effects: Iterable[Effect]) -> tuple[Effect, ...]:
@@ -225,18 +232,25 @@ def finer(hypothesis: Hypothesis, model: Model, effects: Iterable[Effect]) -> li
     return [hypothesis_at(model, effect, word, places) for effect, word in found]
 
 
-def _offered(model: Model, effects: Iterable[Effect]) -> list[tuple[Hypothesis, bool]]:
+def _offered(
+    model: Model, effects: Iterable[Effect], damage: float
+) -> list[tuple[Hypothesis, bool]]:
     """Return every effect at every place, and whether it holds what is known to hang free."""
     known = tuple(effects)
     # Kept with the effects, so that no other one has their addresses meanwhile.
-    key = "hypotheses", *map(id, known)
-    return once_for(model, key, lambda: (known, _hypotheses(model, known)))[1]
+    key = "hypotheses", damage, *map(id, known)
+    return once_for(model, key, lambda: (known, _hypotheses(model, known, damage)))[1]
 
 
-def _hypotheses(model: Model, effects: Iterable[Effect]) -> list[tuple[Hypothesis, bool]]:
+def _hypotheses(
+    model: Model, effects: Iterable[Effect], damage: float
+) -> list[tuple[Hypothesis, bool]]:
     found = []
     for effect in effects:
         each = {p: tuple(effect.parameters(model, p)) for p in dict.fromkeys(effect.places(model))}
+        if damage:  # what is true of the whole is a matter of the material, or of the weather
+            parts = [p for p in each if p != "all"]
+            each |= {p: tuple(parameter_of(q).widen(damage) for q in each[p]) for p in parts}
         # A rod has no bending stiffness by which a rotational spring could be measured.
         places = {p: own for p, own in each.items() if all(one.scale > 0.0 for one in own)}
         own = [

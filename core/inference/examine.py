@@ -271,9 +271,10 @@ def _candidates(
     model: Model, effects: tuple[Effect, ...], reference: Measurement | None
 ) -> tuple[tuple[Hypothesis, ...], tuple[Effect, ...]]:
     """Return the hypotheses that are screened, and the effects that may come in."""
-    offered = hypotheses_of(model, by_themselves(effects))
+    alone = by_themselves(effects)
     if reference is None:
-        return offered, effects
+        return hypotheses_of(model, alone), effects
+    offered = hypotheses_of(model, alone, settings.damage_of_part)
     innate = {id(h.effect) for h in offered if is_innate(h)}
     kept = tuple(e for e in effects if id(e) not in innate)
     return tuple(h for h in offered if id(h.effect) not in innate), kept
@@ -283,11 +284,12 @@ def list_left_out(
     model: Model, effects: Iterable[Effect], reference: Measurement | None
 ) -> tuple[LeftOut, ...]:
     """Return the effects that are no candidates, with their places and the reason."""
-    alone = by_themselves(effects)
-    free = Counter(h.effect.name for h in holding_to_ground(model, alone))
+    damage = 0.0 if reference is None else settings.damage_of_part
+    offered = model, by_themselves(effects), damage
+    free = Counter(h.effect.name for h in holding_to_ground(*offered))
     innate: Counter[str] = Counter()
     if reference is not None:
-        innate.update(h.effect.name for h in hypotheses_of(model, alone) if is_innate(h))
+        innate.update(h.effect.name for h in hypotheses_of(*offered) if is_innate(h))
     reasons = ((free, "the structure hangs free"), (innate, "the reference has them too"))
     return tuple(LeftOut(*item, why) for count, why in reasons for item in count.items())
 
