@@ -11,16 +11,24 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
-from femubench import InputError, Model, cases, read_case
+from femubench import InputError, Measurement, Model, Sensors, cases, read_case, solve_modes
+from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.writing import write_case
 from femubench.core.change.change import Change, proportional
 from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.change.terms import RowOperator, Term
+from femubench.core.diagnosis.diagnose import diagnose
+from femubench.core.diagnosis.serial import diagnosis_to_json
 from femubench.core.effect.attachments import point_motion
 from femubench.core.fem.frame import Place
+from femubench.core.fem.model import Dofs
+from femubench.core.inference.examine import examine
+from femubench.core.look.look import look
 from femubench.diagnosis import list_effects
 from femubench.effect import Parameter
+from femubench.fem import Property, with_group_factors
 
 CASES = Path(__file__).parent / "cases"
 
@@ -108,3 +116,74 @@ def test_the_key_is_kept(kind: str, tmp_path: Path) -> None:
     assert found.model.free
     write_case(tmp_path / "again", found)
     assert read_case(tmp_path / "again").model.free
+
+
+def row_of_masses(weights: Sequence[float] = (1.0, 1.0, 1.0, 1.0)) -> Model:
+    """Return lumped masses above each other on rails along x, a spring as a group between two."""
+    count, springs = len(weights), {}
+    for i in range(count - 1):
+        part = np.zeros((count, count))
+        part[i : i + 2, i : i + 2] = 1e6 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        springs[f"storey-{i + 1}"] = sp.csc_array(part)
+    xyz = np.column_stack([np.zeros((count, 2)), 3.0 * np.arange(count)])
+    dofs = Dofs(np.arange(count), ("x",) * count, xyz)
+    geometry = MatrixGeometry(tuple(f"floor-{i}" for i in range(count)), dofs)
+    mass = sp.csc_array(np.diag(1000.0 * np.array(weights)))
+    return Model(mass, sum(springs.values()), dofs, geometry, groups=springs, free=True)
+
+
+def frequencies_of(model: Model, std: float) -> Measurement:
+    """Return the elastic modes of a row of masses, their shapes known poorly."""
+    modes = solve_modes(model)
+    f, shapes = modes.natural_frequencies[1:], modes.shapes[:, 1:]
+    count = model.size
+    sensors = Sensors(tuple("abcd"[:count]), model.dofs.xyz, ("x",) * count)
+    numbers, wide = tuple(range(1, count)), np.full(shapes.shape, 0.3 * np.abs(shapes).max())
+    return Measurement(sensors, numbers, f, std * f, np.full(len(f), np.nan), shapes, wide)
+
+
+@pytest.mark.parametrize("weights", [(1.0, 1.0, 1.0, 1.0), (20.0, 1.0, 1.0, 20.0), (1.0, 1.0)])
+def test_floors_on_rails_keep_their_springs_as_causes(weights: tuple[float, ...]) -> None:
+    model = row_of_masses(weights)
+    assert names(model)["member-stiffness"] == len(weights) - 1
+    assert names(model)["youngs-modulus"] == 1
+    assert names(model)["grounding-spring"] == 0
+    assert not [w for w in look(model, frequencies_of(model, 1e-3)) if "hang free" in w.what]
+
+
+def test_damage_is_no_matter_of_tolerance_where_there_is_a_reference() -> None:
+    model, (wanted,) = row_of_masses(), [e for e in list_effects() if e.name == "member-stiffness"]
+    storey = [Property("storey-2", "E", ("group:storey-2",))]
+    broken = frequencies_of(with_group_factors(model, storey, [0.56]), 0.03)
+
+    def loss(reference: Measurement | None) -> float:
+        seen = examine(model, broken, [wanted], tolerance=0.0, pairs=False, reference=reference)
+        fits = [e.fit for e in seen.posterior.explanations if e.place == "group:storey-2"]
+        return float(fits[0].parts[0].hypothesis.values(fits[0].state.x[None])[0, 0])
+
+    assert loss(frequencies_of(model, 0.03)) == pytest.approx(-0.44, abs=0.02)
+    assert loss(None) > -0.39  # pulled towards the drawing
+    change = Parameter("change", "", 0.1, lower=-0.9, wording="change")
+    assert change.widen(0.4).coordinate(-0.44) == pytest.approx(np.log(0.56) / 0.4)
+    stated = [replace(change, scaling="factor"), replace(change, wording="share")]
+    assert [p.widen(0.4) for p in stated] == stated
+
+
+def test_what_is_no_candidate_is_said_with_its_reason() -> None:
+    free = replace(cases["frame"], reference=cases["frame"].measurement)
+    free = replace(free, model=replace(free.model, free=True), reference_used=free.used)
+    effects = [e for e in list_effects() if e.name in ("grounding-spring", "rotary-inertia")]
+    found = diagnose(free, effects, faults=(), pairs=False)
+    places = names(replace(free.model, free=False))["grounding-spring"]
+    assert [(row.effect, row.places) for row in found.left_out] == [
+        ("grounding-spring", places),
+        ("rotary-inertia", 1),
+    ]
+    said = [note for note in found.notes if note.startswith("Not tried")]
+    assert said == [
+        f"Not tried, since the structure hangs free: grounding-spring at {places} places.",
+        "Not tried, since the reference has them too: rotary-inertia at 1 place.",
+    ]
+    assert diagnosis_to_json(found)["left_out"][1]["reason"] == "the reference has them too"
+    plain = replace(free, model=replace(free.model, free=False), reference=None)
+    assert diagnose(plain, effects, faults=(), pairs=False).left_out == ()

@@ -10,18 +10,16 @@ from itertools import product
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.change.change import Change
+from femubench.core.change.change import Change, parameter_of
 from femubench.core.change.tabulated import change_of, place_change
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import (
-    cache_by_model,
     enough_modes,
+    loose_motions,
     modes_of,
     once_for,
     zero_tolerance,
 )
-from femubench.core.modal.generalised_mass import mass_normalised
-from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.roles import Effect, EffectParameter
 from femubench.core.typing import FloatArray
 
@@ -193,15 +191,24 @@ def _points(parameter: EffectParameter, sizes: Sequence[float]) -> list[float]:
     return inside or [0.5 * (low + high)]
 
 
-def hypotheses_of(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ...]:
+def hypotheses_of(
+    model: Model, effects: Iterable[Effect], damage: float = 0.0
+) -> tuple[Hypothesis, ...]:
     """Return every effect at every place where it may sit in a model.
 
     Of a structure that is known to hang free, nothing that holds it to ground is a candidate.
+
+    Arguments:
+        damage: least prior deviation of ln(factor) of a relative change of a part.
     """
-    known = tuple(effects)
-    # Kept with the effects, so that no other one has their addresses meanwhile.
-    key = "hypotheses", *map(id, known)
-    return once_for(model, key, lambda: (known, _hypotheses(model, known)))[1]
+    return tuple(h for h, held in _offered(model, effects, damage) if not held)
+
+
+def holding_to_ground(
+    model: Model, effects: Iterable[Effect], damage: float = 0.0
+) -> tuple[Hypothesis, ...]:
+    """Return what `hypotheses_of` leaves out, since it would hold a model that hangs free."""
+    return tuple(h for h, held in _offered(model, effects, damage) if held)
 
 
 def by_themselves(effects: Iterable[Effect]) -> tuple[Effect, ...]:
@@ -225,26 +232,42 @@ def finer(hypothesis: Hypothesis, model: Model, effects: Iterable[Effect]) -> li
     return [hypothesis_at(model, effect, word, places) for effect, word in found]
 
 
-def _hypotheses(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ...]:
+def _offered(
+    model: Model, effects: Iterable[Effect], damage: float
+) -> list[tuple[Hypothesis, bool]]:
+    """Return every effect at every place, and whether it holds what is known to hang free."""
+    known = tuple(effects)
+    # Kept with the effects, so that no other one has their addresses meanwhile.
+    key = "hypotheses", damage, *map(id, known)
+    return once_for(model, key, lambda: (known, _hypotheses(model, known, damage)))[1]
+
+
+def _hypotheses(
+    model: Model, effects: Iterable[Effect], damage: float
+) -> list[tuple[Hypothesis, bool]]:
     found = []
     for effect in effects:
         each = {p: tuple(effect.parameters(model, p)) for p in dict.fromkeys(effect.places(model))}
+        if damage:  # what is true of the whole is a matter of the material, or of the weather
+            parts = [p for p in each if p != "all"]
+            each |= {p: tuple(parameter_of(q).widen(damage) for q in each[p]) for p in parts}
         # A rod has no bending stiffness by which a rotational spring could be measured.
         places = {p: own for p, own in each.items() if all(one.scale > 0.0 for one in own)}
         own = [
             Hypothesis(effect, place_change(effect, model, p, own), len(places))
             for p, own in places.items()
         ]
-        if model.free:
-            own = [one for one in own if not _holds(model, one)]
-            own = [replace(one, places=len(own)) for one in own]
-        found += own
-    return tuple(found)
+        held = [model.free and _holds(model, one) for one in own]
+        count = held.count(False)
+        found += [
+            (replace(one, places=count or len(own)), h) for one, h in zip(own, held, strict=True)
+        ]
+    return found
 
 
 def _holds(model: Model, hypothesis: Hypothesis) -> bool:
     """Tell whether an effect makes it cost energy to move a model as a rigid body."""
-    rigid, least = _rigid_motions(model)
+    rigid, least = loose_motions(model), zero_tolerance(modes_of(model, enough_modes(model, 1)))
     extra, count = hypothesis.change.extra, rigid.shape[1]
     vectors = np.asarray(la.block_diag(rigid, np.eye(extra))) if extra else rigid
     energy = np.zeros((count + extra, count + extra))
@@ -255,13 +278,6 @@ def _holds(model: Model, hypothesis: Hypothesis) -> bool:
     body, across = energy[:count, :count], energy[:count, count:]
     body = body - across @ np.linalg.pinv(energy[count:, count:]) @ across.T
     return bool(np.abs(body).max(initial=0.0) > least)
-
-
-@cache_by_model
-def _rigid_motions(model: Model) -> tuple[FloatArray, float]:
-    """Return the motions of a model as a rigid body, mass-normalised, and an energy like none."""
-    modes = modes_of(model, enough_modes(model, 1))
-    return mass_normalised(model, rigid_body_vectors(model.dofs)), zero_tolerance(modes)
 
 
 def hypothesis_at(model: Model, effect: Effect, place: str, places: int) -> Hypothesis:

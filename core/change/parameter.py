@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -99,6 +99,16 @@ class Parameter:
         if self.scaling == "factor":
             return float(self.scale * np.exp(self.scale * x))
         return float(self.scale * np.exp(abs(x)))
+
+    def widen(self, std: float) -> Parameter:
+        """Return a relative change as that of a log-normal factor, where it was less free.
+
+        Arguments:
+            std: standard deviation of ln(factor).
+        """
+        if self.wording != "change" or self.scaling != "linear" or self.scale >= std:
+            return self
+        return replace(self, scale=std, scaling="factor")
 
     @property
     def range(self) -> tuple[float, float]:

@@ -10,6 +10,7 @@ import numpy as np
 from femubench.core.change.hypothesis import Hypothesis
 from femubench.core.diagnosis.symmetry import mirror_places
 from femubench.core.diagnosis.verdict import angle_between, credible, places_of
+from femubench.core.display import count_noun
 from femubench.core.fit.modal_fit import State
 from femubench.core.inference.examine import Examination
 from femubench.core.inference.posterior import Explanation, Posterior, fits_better
@@ -21,6 +22,7 @@ from femubench.core.schema.diagnosis import (
     CauseParameter,
     ErrorScale,
     Evidence,
+    LeftOut,
     LocationRow,
     ResidualRow,
     Rival,
@@ -338,3 +340,13 @@ def evidence_rows(examination: Examination) -> tuple[LocationRow, ...]:
         for place in ranked
         if top > 0.0 and totals[place] > settings.minor * top
     )
+
+
+def notes_left_out(rows: Iterable[LeftOut]) -> tuple[str, ...]:
+    """Return one sentence a reason, with the effects that were no candidates for it."""
+    found: dict[str, list[str]] = {}
+    for row in rows:
+        found.setdefault(row.reason, []).append(
+            f"{row.effect} at {count_noun(row.places, 'place')}"
+        )
+    return tuple(f"Not tried, since {why}: {', '.join(words)}." for why, words in found.items())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -11,7 +12,12 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from femubench.core.case.case import BEAM_SHARE
-from femubench.core.change.hypothesis import Hypothesis, by_themselves, hypotheses_of
+from femubench.core.change.hypothesis import (
+    Hypothesis,
+    by_themselves,
+    holding_to_ground,
+    hypotheses_of,
+)
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
 from femubench.core.fit.mesh_error import mesh_bias
@@ -36,6 +42,7 @@ from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import Modes, zero_tolerance
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
+from femubench.core.schema.diagnosis import LeftOut
 from femubench.core.typing import FloatArray
 
 
@@ -53,6 +60,7 @@ class Examination:
         modes: of the model, in the coordinates of the problem.
         error: what a beam model gets wrong, where that was asked.
         reference: as in `examine`.
+        left_out: effects that were no candidates.
     """
 
     model: Model
@@ -64,6 +72,7 @@ class Examination:
     modes: Modes
     error: Inadequacy | None = None
     reference: Measurement | None = None
+    left_out: tuple[LeftOut, ...] = ()
 
     @cached_property
     def nominal(self) -> State:
@@ -234,7 +243,8 @@ def examine(
     effort = effort or Effort()
     # Thousands of small matrices: threads would wait for each other most of the time.
     with threadpool_limits(1):
-        hypotheses, known = _candidates(model, tuple(effects), reference)
+        effects = tuple(effects)
+        hypotheses, known = _candidates(model, effects, reference)
         basis = Basis.of(model, measurement)
         problem, slopes = pose_problem(model, measurement, hypotheses, tolerance, basis)
         before = None if reference is None else before_of(problem, reference)
@@ -253,7 +263,7 @@ def examine(
     basis.forget()
     return Examination(
         *(model, own, slopes, tolerance, posterior, tuple(atlas), basis.modes),
-        *(error, reference),
+        *(error, reference, list_left_out(model, effects, reference)),
     )
 
 
@@ -261,12 +271,27 @@ def _candidates(
     model: Model, effects: tuple[Effect, ...], reference: Measurement | None
 ) -> tuple[tuple[Hypothesis, ...], tuple[Effect, ...]]:
     """Return the hypotheses that are screened, and the effects that may come in."""
-    offered = hypotheses_of(model, by_themselves(effects))
+    alone = by_themselves(effects)
     if reference is None:
-        return offered, effects
+        return hypotheses_of(model, alone), effects
+    offered = hypotheses_of(model, alone, settings.damage_of_part)
     innate = {id(h.effect) for h in offered if is_innate(h)}
     kept = tuple(e for e in effects if id(e) not in innate)
     return tuple(h for h in offered if id(h.effect) not in innate), kept
+
+
+def list_left_out(
+    model: Model, effects: Iterable[Effect], reference: Measurement | None
+) -> tuple[LeftOut, ...]:
+    """Return the effects that are no candidates, with their places and the reason."""
+    damage = 0.0 if reference is None else settings.damage_of_part
+    offered = model, by_themselves(effects), damage
+    free = Counter(h.effect.name for h in holding_to_ground(*offered))
+    innate: Counter[str] = Counter()
+    if reference is not None:
+        innate.update(h.effect.name for h in hypotheses_of(*offered) if is_innate(h))
+    reasons = ((free, "the structure hangs free"), (innate, "the reference has them too"))
+    return tuple(LeftOut(*item, why) for count, why in reasons for item in count.items())
 
 
 def is_innate(hypothesis: Hypothesis) -> bool:

@@ -75,6 +75,11 @@ class Settings:
     prior_whole_textbook: float = _prior(
         0.8, "probability", "it lacks all of it, since every beam has it; other sets share the rest"
     )
+    damage_of_part: float = _prior(
+        0.4,
+        "of ln(factor)",
+        "of a part where there is a reference: damage is not tolerance",
+    )
     prior_missed_mode: float = _prior(
         0.05, "probability", "a test does not find a mode among those that it finds"
     )

@@ -18,6 +18,9 @@ def look_at_freedom(seen: Seen) -> list[LookWarning]:
     if not model.free:
         return []
     rigid = rigid_body_vectors(model.dofs)
+    if model.structure is None:  # a lumped model may not turn as a body
+        rigid = model.dofs.motions[:, :3]
+        rigid = rigid[:, rigid.any(axis=0)]
     energy, inertia = rigid.T @ model.stiffness_times(rigid), rigid.T @ model.mass_times(rigid)
     highest = float(la.eigh(energy, inertia, eigvals_only=True)[-1])
     carried, first = np.sqrt(max(highest, 0.0)) / (2.0 * np.pi), float(elastic_band(model)[0])

@@ -14,7 +14,12 @@ import scipy.linalg as la
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import LowRank, Model
-from femubench.core.modal.rigid import rigid_modes_of, rigid_share
+from femubench.core.modal.rigid import (
+    mass_orthonormal,
+    rigid_body_vectors,
+    rigid_modes_of,
+    rigid_share,
+)
 from femubench.core.modal.sparse_eigen import lowest_eigenpairs
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
@@ -23,6 +28,7 @@ _MANY = 20  # modes of a large model, where nobody says how many
 _RIGID_SHARE = 0.9
 _ROUNDOFF = 32.0 * np.finfo(float).eps
 _ZERO = 1e-6  # of the first elastic eigenvalue
+_LOOSE = 1e-4  # of the next eigenvalue: cords that carry at a hundredth of its frequency
 _LOWEST = "lowest modes"
 
 
@@ -322,3 +328,21 @@ def modes_of(model: Model, count: int | None = None) -> Modes:
     if _LOWEST not in lowest or lowest[_LOWEST].count < wanted:
         lowest[_LOWEST] = _Lowest(wanted, modes)
     return modes
+
+
+@cache_by_model
+def loose_motions(model: Model) -> FloatArray:
+    """Return how a model that is known to hang free moves as a body, mass-orthonormal, (n, r).
+
+    Of a frame these are all that its dofs have. A model from files may be lumped: a row of floors
+    on rails does not tilt as a body, though its labels say so. There a motion counts that costs
+    nothing next to what the first mode beyond it costs.
+    """
+    rigid = mass_orthonormal(model, rigid_body_vectors(model.dofs))
+    if model.structure is not None:
+        return rigid
+    cost, turn = la.eigh(rigid.T @ model.stiffness_times(rigid))
+    beyond = modes_of(model, enough_modes(model, 1)).eigenvalues[1:]
+    cost = cost[: len(beyond)]
+    free = np.flatnonzero(cost <= _LOOSE * beyond[: len(cost)])
+    return np.asarray(rigid @ turn[:, : free.max(initial=-1) + 1])

@@ -110,6 +110,20 @@ class SmallestVisible:
     wording: Wording = "value"
 
 
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """An effect that was tried at no place, or at some only.
+
+    Arguments:
+        places: at how many it was not.
+        reason: as the end of a sentence that begins with "since".
+    """
+
+    effect: str
+    places: int
+    reason: str
+
+
 class ErrorScale(Struct, frozen=True):
     """How large a class of model error is under the first explanation, standard deviation.
 
@@ -297,6 +311,7 @@ class DiagnosisReport:
         like_a_beam: probability that it is one, but for ordinary scatter.
         scatter: whether what is left is as much as the stated deviations let expect.
         states: how the measurement differs from the reference; None without one.
+        left_out: effects that were no candidates, and why.
     """
 
     case: str = ""
@@ -324,3 +339,4 @@ class DiagnosisReport:
     gain_rms: Gain | None = None
     scatter: tuple[Scatter, ...] = ()
     states: States | None = None
+    left_out: tuple[LeftOut, ...] = ()
