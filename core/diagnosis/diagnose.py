@@ -13,6 +13,7 @@ from femubench.core.case.case import Case
 from femubench.core.diagnosis.faults import correct_case, fault_causes, with_faults
 from femubench.core.diagnosis.proof import (
     Unseen,
+    change_left,
     extend_by,
     find_held,
     gain_of,
@@ -90,7 +91,8 @@ def diagnose(
 ) -> Diagnosis:
     """Return what is missing in a case's model, where, how sure, and what it gains.
 
-    Held-out modes and modified structures never enter the naming; they confirm it or not.
+    Modified structures never enter the naming, nor held-out modes without a reference; they confirm
+    it or not. With a reference all measured modes serve the name, and each is left out in turn.
 
     Arguments:
         case: with at least one used mode.
@@ -105,6 +107,8 @@ def diagnose(
         ModelError: when the model has no modes.
     """
     begin, effort = time.perf_counter(), effort or Effort()
+    if case.reference is not None:
+        case = _use_all_modes(case)
     used = case.measurement.select(case.used)
     registered = list_effects()
     known = registered if effects is None else tuple(effects)
@@ -116,11 +120,11 @@ def diagnose(
         # Faults of data and input first, then the causes that are left without them.
         inquiry = inquire(case.model, used, wrong, terms)
         repaired = correct_case(case, inquiry.repaired)
-        proof = _proof(repaired, inquiry.examination, effort, case)
+        states = _compared(case)
+        proof = _proof(repaired, inquiry.examination, effort, case, states)
         with effort.piece("advice"):
             looks = _looks(case.model, repaired, (*registered, *known))
             posterior, leader = inquiry.examination.posterior, proof.leader
-            states = _compared(case)
             decision = decide(posterior, leader, proof.test, states and states.differs)
             found = _written(repaired, inquiry, decision, proof, looks, begin)
     found = replace(found, states=states)
@@ -132,6 +136,13 @@ def _expected(case: Case) -> dict[Kind, Number]:
     # The best guess is solved and judged, and where it fails its rivals are.
     judged = 2.0, 2.0 + bool(case.held_out or case.modifications) * settings.largest_group / 2.0
     return {"unseen": judged, "advice": 1.0}
+
+
+def _use_all_modes(case: Case) -> Case:
+    """Return a case that holds no mode back: where a change is sought, every mode shows it."""
+    used, reference = case.measurement.numbers, case.reference
+    known = () if reference is None else tuple(reference.numbers)
+    return replace(case, used=tuple(used), held_out=(), reference_used=known)
 
 
 def _compared(case: Case) -> States | None:
@@ -149,7 +160,9 @@ def _looks(drawn: Model, case: Case, effects: Iterable[Effect]) -> tuple[LookWar
     return (*found, *look_at_band(Seen(case.model, case.measurement), case.band))
 
 
-def _proof(case: Case, examination: Examination, effort: Effort, given: Case) -> _Proof:
+def _proof(
+    case: Case, examination: Examination, effort: Effort, given: Case, states: States | None
+) -> _Proof:
     best, posterior = examination.best, examination.posterior
     with effort.piece("unseen"):
         model = extend_by(case.model, best)
@@ -171,10 +184,12 @@ def _proof(case: Case, examination: Examination, effort: Effort, given: Case) ->
         tells = crossed.visible and len(crossed.before) >= settings.telling_modes
     before = score_model(given, given.model)
     median, rms = (of(before, after, crossed) for of in (gain_of, rms_gain_of))
+    if states is not None:
+        rms = replace(rms, change_percent=change_left(states, before, after))
     effort.expect("unseen", 0)
     state = best.fit.state
     log_bayes = sum(part.log_bayes for part in unseen)
-    left, own = adequacy(state, best.unknowns), examination.own_share(state)
+    left, own = adequacy(state, best.unknowns), examination.unexplained_share(state)
     test = Sufficiency(left, own, log_bayes, holds or not tells, tells)
     return _Proof(best, model, unseen, median, rms, crossed is not None, test)
 
@@ -197,6 +212,7 @@ def _written(
     top = posterior.names[decision.group[0]] if decision.group else decision.nothing
     stated = decision, causes, options, top, proof.gain_rms
     said = sentence_of(*stated, reference=case.reference is not None)
+    faults = (repaired, loose) if decision.verdict != "unknown" else ([], [])
     named = bool(decision.group)
     nothing = examination.nominal
     # Both in units of one noise: that of an explanation holds what it takes for model error.
@@ -208,7 +224,7 @@ def _written(
     return Diagnosis(
         case=case.name,
         verdict="named" if (repaired or loose) and decision.verdict == "none" else decision.verdict,
-        sentence=with_faults(said, repaired, loose),
+        sentence=with_faults(said, *faults),
         causes=(*repaired, *causes, *loose),
         rivals=rivals_of(examination, best if named else None, group),
         reason=_reason(decision),

@@ -26,7 +26,7 @@ from femubench.core.inference.posterior import Explanation, Posterior
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import enough_modes, modes_of, once_for
 from femubench.core.modal.measurement import Measurement
-from femubench.core.schema.diagnosis import Gain
+from femubench.core.schema.diagnosis import Gain, States
 from femubench.core.schema.results import Block
 from femubench.core.score.scoring import frequency_error, many_modifications, pair_modified
 from femubench.core.typing import BoolArray, FloatArray
@@ -289,6 +289,28 @@ def _leave_out(state: State) -> tuple[FloatArray, FloatArray, FloatArray]:
         found.append((error[0], spread[0, 0], density))
     errors, variances, densities = np.array(found).reshape(-1, 3).T
     return errors, variances, densities
+
+
+def change_left(states: States, before: Blocks, after: Blocks) -> tuple[float, float] | None:
+    """Return the rms change since the reference and what the causes leave of it, in percent.
+
+    Over all modes that both states and both models have; None where there is none.
+
+    Arguments:
+        states: the two measurements compared.
+        before, after: modes of the present state with those of the model without and with causes.
+    """
+    known = {row.mode: np.log(row.present_hz / row.reference_hz) for row in states.modes}
+    rows = []
+    for name in before.keys() & {"used", "higher"}:
+        for one, other in zip(before[name].modes, after[name].modes, strict=True):
+            hertz = one.predicted_hz or 0.0, other.predicted_hz or 0.0
+            if one.number in known and min(hertz) > 0.0:
+                rows.append((known[one.number], known[one.number] - np.log(hertz[1] / hertz[0])))
+    if not rows:
+        return None
+    measured, left = 100.0 * np.sqrt(np.square(rows).mean(axis=0))
+    return float(measured), float(left)
 
 
 def rms_gain_of(before: Blocks, after: Blocks, crossed: Unseen | None) -> Gain:

@@ -168,6 +168,7 @@ def list_causes(
     posterior = examination.posterior
     spread = find_spread(posterior, explanation)
     own = examination.own_error(explanation.fit.state)
+    sizes = _sizes(explanation, spread)
     causes = causes_in(explanation, 1.0, posterior.earned, spread=spread, own=own)
     first = len(causes) - len(explanation.parts)
     tied = _tied(posterior, explanation)
@@ -182,6 +183,8 @@ def list_causes(
             if part.hypothesis.name == name
         }
         others = [place for place in shares if place in alike_at and place != cause.place]
+        if k >= first and sizes[k - first] < min(settings.notable_deviations, max(sizes)):
+            continue  # a passenger, which may as well be nothing
         found.append(
             replace(
                 cause,
@@ -192,6 +195,13 @@ def list_causes(
             )
         )
     return found
+
+
+def _sizes(explanation: Explanation, spread: FloatArray) -> list[float]:
+    """Return by how many deviations each cause differs from none, at its farthest coordinate."""
+    away = np.abs(explanation.fit.state.x) / np.maximum(spread, settings.negligible)
+    counts = [len(part.hypothesis.parameters) for part in explanation.parts]
+    return [float(own.max(initial=0.0)) for own in np.split(away, np.cumsum(counts)[:-1])]
 
 
 def _tied(posterior: Posterior, best: Explanation) -> list[Explanation]:

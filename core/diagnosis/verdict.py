@@ -49,7 +49,7 @@ class Sufficiency:
 
     Arguments:
         left: probability of what it leaves of the used data, were it noise under model error.
-        own: share of the change that it takes for its own error.
+        own: share of what differs that it leaves to its own error, or to one not in the reference.
         log_bayes: ln of its Bayes factor against nothing added, on data that it has not seen.
         holds: whether these data get no worse by it.
         tells: whether they could.
@@ -128,8 +128,9 @@ def inseparable(
 ) -> tuple[tuple[Key, ...], tuple[float, ...]]:
     """Return the best name with all that these data cannot exclude, and their angles to it.
 
-    Not excluded is what is probable enough, and what fits about as well with no more values,
-    whatever its prior says. A name with further causes contradicts none that it holds.
+    These are the most probable names that cover nearly all of what is not nothing, and those that
+    fit about as well with no more values, whatever their prior says. A name with further causes
+    contradicts none that it holds.
 
     Arguments:
         posterior: all explanations.
@@ -139,22 +140,18 @@ def inseparable(
     something = sum(names.values())
     best = posterior.best(next(iter(names))) if leader is None else leader
     first = posterior.key(best)
-    group, angles, covered = [first], [0.0], names[first] / something
-    for key in names:
+    group = [first]
+    covered = sum(p for key, p in names.items() if set(first) <= set(key)) / something
+    for key, p in names.items():
         if len(group) == settings.largest_group:
             break
         if set(first) <= set(key):
-            covered += names[key] / something if key != first else 0.0
             continue
-        share = names[key] / something
-        angle = angle_between(best, posterior.best(key))
-        near = angle < settings.parallel_angle or covered < settings.covered_share
-        least = settings.parallel_rival_share if near else settings.rival_share
-        if share >= least or fits_as_well(posterior, best, key):
+        if covered < settings.nearly_all or fits_as_well(posterior, best, key):
             group.append(key)
-            angles.append(angle)
-            covered += share
-    return tuple(group), tuple(angles)
+            covered += p / something
+    angles = (angle_between(best, posterior.best(key)) for key in group[1:])
+    return tuple(group), (0.0, *angles)
 
 
 def fits_as_well(posterior: Posterior, best: Explanation, key: Key) -> bool:

@@ -73,14 +73,21 @@ def sentence_of(
     names = join_names(name_cause(cause) for cause in causes)
     if decision.verdict == "none":
         nothing = "nothing that differs from the reference" if reference else _NOTHING
-        return f"The data show {nothing} (probability {percent(decision.nothing)})."
+        # Where the measurements agree, no explanation of a difference has a probability.
+        sure = f" (probability {percent(decision.nothing)})" if decision.nothing > 0.5 else ""
+        return f"The data show {nothing}{sure}."
     if decision.verdict == "named":
         lacks = _DIFFERS if reference else _LACKS
-        return f"{lacks} {names} ({_sure(probability, causes)}){_gain(gain)}."
+        sure = _sure(probability, causes) + "; unconfirmed" * decision.unconfirmed
+        return f"{lacks} {names} ({sure}){_gain(gain)}."
     if decision.verdict == "ambiguous":
         return _either(options, reference)
     guess = f"; the nearest is {names}" if causes else ""
     if decision.verdict == "unknown":
+        if reference and not causes:
+            return (
+                "The structure differs from the reference; no cause in the catalogue explains it."
+            )
         wrong = "what differs from the reference" if reference else "what the model gets wrong"
         return f"No known effect explains {wrong}{guess}."
     return f"What fits the used data best does not hold on data that it has not seen{guess}."
@@ -113,6 +120,10 @@ def _either(options: Sequence[Sequence[Cause]], reference: bool) -> str:
 
 
 def _gain(gain: Gain) -> str:
+    if gain.change_percent is not None and gain.change_percent[0] > 0.0:
+        change, left = gain.change_percent
+        share = 100.0 * (1.0 - left / change)
+        return f"; of the change in frequencies, {change:.3g} % rms, it explains {share:.0f} %"
     for label, pair in (
         ("held-out modes", gain.held_out_percent),
         ("modified structure", gain.modified_percent),

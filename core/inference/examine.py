@@ -113,6 +113,16 @@ class Examination:
         scales = state.problem.noise.scales
         return 0.0 if self.error is None or scales is None else self.error.own_share(scales)
 
+    def unexplained_share(self, state: State) -> float:
+        """Return which share of what differs an explanation leaves to its own error.
+
+        Either that of what it changes, or of a model error that the two states do not share.
+        """
+        scales = state.problem.noise.scales
+        if self.error is None or scales is None:
+            return 0.0
+        return max(self.own_share(state), self.error.unshared_share(scales))
+
     def own_error(self, state: State) -> float:
         """Return by which share the size of a cause is in error, as an idealisation of what is.
 

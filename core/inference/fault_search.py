@@ -42,6 +42,7 @@ from femubench.core.inference.examine import (
     pose_problem,
 )
 from femubench.core.inference.posterior import Explanation
+from femubench.core.inference.search import adequacy
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import DENSE_LIMIT
 from femubench.core.modal.measurement import Measurement
@@ -132,12 +133,19 @@ def _definite(now: _Drawn, ranked: Weighed, terms: Terms) -> Repaired | None:
     without = _with_causes(seen, now.log_density, now.measurement)
     sound = seen.adequacy > settings.adequate_p and len(seen.best.parts) < 2
     least = without - now.log_density - (0.0 if sound else settings.lag)
-    tried = [(c, gain) for c, gain in pairs if gain > least][: settings.candidates]
-    densities = [_density(now, *pair, single.examine(*pair[0].repaired)) for pair in tried]
+    promising = [(c, gain) for c, gain in pairs if gain > least]
+    tried, densities = [], []
+    for charge, gain in promising[: settings.candidates]:
+        again = single.examine(*charge.repaired)
+        # What is wrong with the data leaves noise once it is corrected, as a cause has to.
+        if max(again.adequacy, now.remove_fault(charge).adequacy) > settings.noise_p:
+            tried.append((charge, gain))
+            densities.append(_density(now, charge, gain, again))
     if not tried:
         return None
     best = int(np.argmax(densities))
-    rest = [now.log_density + gain for _, gain in pairs[len(tried) :]]
+    weighed = {charge for charge, _ in tried}
+    rest = [now.log_density + gain for charge, gain in pairs if charge not in weighed]
     probability = exp(densities[best] - float(logsumexp([without, *densities, *rest])))
     found = now.refine(tried[best][0])
     sure = probability > settings.sure_fault and _inside(found)
@@ -225,6 +233,11 @@ class _Drawn:
         return replace(found, problem=replace(problem, noise=noise))
 
     @cached_property
+    def adequacy(self) -> float:
+        """Return the probability of what the model as drawn leaves, were it noise."""
+        return adequacy(self.state, 0)
+
+    @cached_property
     def log_density(self) -> float:
         """Return ln of the density of the data, in the units that they were measured in."""
         data = self.state.problem.data
@@ -295,6 +308,8 @@ class _Drawn:
             return float(after @ after) < settings.fault_remainder * float(before @ before)
         if not charge.single:
             return True
+        if len(self.measurement) < settings.telling_modes:
+            return False
         wide = self.remove_fault(charge).measurement
         m = self.measurement
         raw = self.state.raw - self.state.problem.noise.mean

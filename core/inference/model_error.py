@@ -445,13 +445,17 @@ class Inadequacy:
         """Return which share of what an explanation changes is its own error."""
         return float(settings.own_error_of_change * _scale(v[-1])) if len(v) > self._count else 0.0
 
+    def unshared_share(self, v: FloatArray) -> float:
+        """Return which share of the model error the two states do not have in common."""
+        return float(np.sqrt(self._variances(v)[1]))
+
     def scales(self, v: FloatArray) -> list[tuple[str, float, str]]:
         """Return name, standard deviation and unit of every class, at definite scales."""
-        tau, unshared = self._variances(v)
+        tau, _ = self._variances(v)
         rows = zip(self.names, np.sqrt(tau), strict=True)
         found = [(n, float(s), "deviations" if kind(n) == "shapes" else "") for n, s in rows]
         if len(self.residual):
-            found.append(("unshared", float(np.sqrt(unshared)), ""))
+            found.append(("unshared", self.unshared_share(v), ""))
         if len(v) > self._count:
             found.append(("change by the causes", self.own_share(v), ""))
         return found

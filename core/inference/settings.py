@@ -157,23 +157,15 @@ class Settings:
         20.0, "Bayes factor", "which the data must add: strong evidence (Kass & Raftery 1995)"
     )
     nearly_all: float = _decision(
-        0.95, "probability", "covered by the stated places; more than that leaves no doubt"
+        0.95,
+        "probability",
+        "covered by the stated names, and places of each; what lies outside is excluded",
     )
     adequate_p: float = _decision(
         0.05, "probability", "what is left, were it noise: above it nothing more is sought"
     )
     noise_p: float = _decision(
         1e-3, "probability", "what is left, were it noise: below it nothing known explains it"
-    )
-    rival_share: float = _decision(0.05, "probability", "from which a rival stays in the group")
-    parallel_rival_share: float = _decision(
-        0.005, "probability", "the same of one that acts alike: its size made the difference"
-    )
-    parallel_angle: float = _decision(
-        10.0, "degrees", "below which two explanations act on the data alike"
-    )
-    covered_share: float = _decision(
-        0.98, "probability", "until a group covers this, less probable rivals stay in it"
     )
     largest_group: int = _decision(
         6, "explanations", "more names or places than this help nobody to decide"

@@ -219,12 +219,15 @@ class Gain:
     Arguments:
         held_out, modified: None where the case holds none back.
         cross_validated: the same over modes left out in turn, where nothing is held out.
+        change: rms change of the frequencies since the reference, as measured and what is left of
+            it when that by the causes is taken away; None without a reference.
     """
 
     used_percent: tuple[Number, Number]
     held_out_percent: tuple[Number, Number] | None = None
     modified_percent: tuple[Number, Number] | None = None
     cross_validated_percent: tuple[Number, Number] | None = None
+    change_percent: tuple[Number, Number] | None = None
 
 
 @dataclass(frozen=True, slots=True)
