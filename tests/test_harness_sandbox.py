@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import psutil
 import pytest
 from click.testing import CliRunner
 
@@ -304,16 +305,17 @@ def test_no_namespace_and_no_process_is_left_when_a_worker_is_killed() -> None:
     before = _namespaces()
     for _ in range(3):
         limits = Limits(1.5, 400 * MIB, sandbox="require")
-        assert ended(scanner.sleeping_family, limits).how == "timeout"
+        assert ended(scanner.sleeping_family, limits, os.getpid()).how == "timeout"
     assert _namespaces() <= before
     assert list(zoo.leftovers()) == []
 
 
 def _namespaces() -> set[str]:
-    """Return the namespaces of processes that some process is in."""
+    """Return the namespaces of processes that this one and those below it are in."""
 
     def found() -> Iterator[str]:
-        for process in zoo.own_processes():
+        own = psutil.Process()
+        for process in (own, *own.children(recursive=True)):
             with suppress(OSError):
                 yield os.readlink(f"/proc/{process.pid}/ns/pid")
 

@@ -5,7 +5,6 @@ A request is a function and its argument, an answer is bytes.
 
 from __future__ import annotations
 
-import ctypes
 import importlib
 import os
 import pickle
@@ -19,13 +18,12 @@ from itertools import pairwise
 from typing import Any
 
 from femubench.core.child.limits import Limits
-from femubench.core.child.namespaces import Walls, go_apart
+from femubench.core.child.namespaces import Walls, go_apart, libc, lower_limit
 from femubench.core.child.sandbox import enter
 
 READY = b"\1"
 LENGTH_BYTES = 8
 _PR_SET_PDEATHSIG, _PR_SET_DUMPABLE = 1, 4
-_LIBC = ctypes.CDLL(None)
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class Confinement:
         """Go on in it."""
         limits = self.limits
         if self.secret and sys.platform == "linux":
-            _LIBC.prctl(_PR_SET_DUMPABLE, 0)
+            libc().prctl(_PR_SET_DUMPABLE, 0)
         sys.path[:] = self.path
         importlib.invalidate_caches()
         # The words of the command line, -W and PYTHONWARNINGS are for the parent.
@@ -126,7 +124,7 @@ def stand_alone(output: int, *kept: int) -> None:
 def end_with_parent() -> None:
     """Let this process be ended when its parent ends (Linux)."""
     if sys.platform == "linux":
-        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        libc().prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def address_space() -> int:
@@ -137,13 +135,6 @@ def address_space() -> int:
         return int(psutil.Process().memory_info().vms)
     with open("/proc/self/statm", "rb") as pages:
         return int(pages.read().split()[0]) * resource.getpagesize()
-
-
-def lower_limit(what: int, wanted: int) -> None:
-    """Lower a limit of this process, as far as it is not lower yet."""
-    _, hard = resource.getrlimit(what)
-    most = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
-    resource.setrlimit(what, (most, most))
 
 
 def object_frames(sent: object) -> Iterator[bytes | memoryview]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import os
 import select
 import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Literal
 
 import psutil
@@ -17,13 +19,14 @@ import psutil
 from femubench.core.child.confinement import LENGTH_BYTES, READY, Confinement, object_frames
 from femubench.core.child.limits import Limits, format_bytes
 from femubench.core.child.namespaces import FOLDER
-from femubench.core.child.server import NUMBER, end_group, end_server, fork_server
+from femubench.core.child.server import LAST_BREATH, NUMBER, end_group, end_server, fork_server
 
 How = Literal[
     "answer", "timeout", "memory", "output", "answer-size", "died", "no-start", "orphaned"
 ]
 _START = 120.0  # s that a process may take until it is ready
 _CHUNK = 2**20
+_CHUNKS = 16  # that are read before anybody looks at the clock again
 _TICK = 0.5  # s between two looks at a server that may have been stopped
 _BASE = 256 * 2**20  # bytes of a fresh child, most of them shared with the server
 
@@ -67,6 +70,7 @@ class GuardedChild:
     _started: float = field(default_factory=time.monotonic)
     _asked: float = 0.0
     _ready: float | None = None
+    _killed: float = math.inf
     _received: bytearray = field(default_factory=bytearray)
     _printed: int = 0
     _unsent: list[memoryview] = field(default_factory=list)
@@ -82,25 +86,27 @@ class GuardedChild:
         Raises:
             OSError: when there is none to be had.
         """
-        pipes = [os.pipe() for _ in range(4)]
-        ours = [pipes[0][1], *(end for end, _ in pipes[1:])]
-        theirs = [pipes[0][0], *(end for _, end in pipes[1:])]
-        server = fork_server()
-        try:
+        ours, theirs = list[int](), list[int]()
+        with ExitStack() as kept, ExitStack() as given:
+            for order in (1, -1, -1, -1):  # requests are read there, all else here
+                its, mine = os.pipe()[::order]
+                given.callback(os.close, its)
+                kept.callback(os.close, mine)
+                theirs.append(its)
+                ours.append(mine)
+            server = fork_server()
             try:
                 server.ask(module, theirs)
-            finally:
-                _close(theirs)
-            pid = _number(ours[-1])
-        except BaseException as error:
-            _close(ours)  # where there is a child, it ends for want of a request
-            if isinstance(error, OSError):
+                given.close()
+                pid = _number(ours[-1])
+            except OSError:
                 end_server(server)
-            raise
-        for end in ours:
-            os.set_blocking(end, False)
-        child = cls(pid, ours[0], ours[1], ours[2], ours[3], confinement, confinement.limits)
-        child._send(confinement)
+                raise
+            for end in ours:
+                os.set_blocking(end, False)
+            child = cls(pid, ours[0], ours[1], ours[2], ours[3], confinement, confinement.limits)
+            child._send(confinement)
+            kept.pop_all()  # else the child, where there is one, ends for want of a request
         return child
 
     def ask(self, function: Callable[[Any], bytes], argument: object, limits: Limits) -> None:
@@ -158,8 +164,11 @@ class GuardedChild:
 
     @property
     def gone(self) -> bool:
-        """Tell whether nothing of it is left, nor of what it started."""
+        """Tell whether nothing of it is left, nor of what it started, or there was time to end."""
         self._look()
+        # What starts others faster than they end is never gone; the server goes on to end it.
+        if time.monotonic() > self._killed + LAST_BREATH:
+            self._close("status")
         return self.status < 0
 
     def progress(self, *, look: bool) -> Ending | None:
@@ -173,44 +182,38 @@ class GuardedChild:
         for end in ("output", "answers"):
             self._take(end)
         limits, now = self.limits, time.monotonic()
-        seconds = now - self._begun if self._ready else 0.0
+        end = partial(Ending, seconds=now - self._begun if self._ready else 0.0)
         if 0 < self._length <= min(len(self._received), limits.answer + LENGTH_BYTES):
-            answer = bytes(self._received[LENGTH_BYTES : self._length])
-            return Ending("answer", answer, seconds=seconds)
+            return end("answer", bytes(self._received[LENGTH_BYTES : self._length]))
         if self._printed > limits.output:
-            what = f"printed more than {format_bytes(limits.output)}"
-            return Ending("output", reason=what, seconds=seconds)
+            return end("output", reason=f"printed more than {format_bytes(limits.output)}")
         if self._length > limits.answer + LENGTH_BYTES:
             what = f"its result is larger than {format_bytes(limits.answer)}"
-            return Ending("answer-size", reason=what, seconds=seconds)
+            return end("answer-size", reason=what)
         if ended and self.code is None:
             what = "the process from which all workers are started was ended"
-            return Ending("orphaned", reason=what, seconds=seconds)
+            return end("orphaned", reason=what)
         if ended:
-            how: How = "died" if self._ready is not None else "no-start"
-            return Ending(how, reason=self._death(), seconds=seconds)
+            return end("no-start" if self._ready is None else "died", reason=self._death())
         if self.deadline is not None and now >= self.deadline:
             if self._ready is None:
-                reason = f"the worker process was not ready in {_START:g} s"
-                return Ending("no-start", reason=reason)
+                return end("no-start", reason=f"the worker process was not ready in {_START:g} s")
             limit = limits.seconds or 0.0
             return Ending("timeout", reason=f"no result within {limit:g} s", seconds=limit)
         excess = self._excess() if look else None
-        return None if excess is None else Ending("memory", reason=excess, seconds=seconds)
+        return None if excess is None else end("memory", reason=excess)
 
     def _take(self, name: str) -> None:
         """Take what has come through a pipe, but not much more than is allowed."""
-        end = getattr(self, name)
-        while end >= 0:
+        for _ in range(_CHUNKS):
             try:
-                data = os.read(end, _CHUNK)
+                data = os.read(getattr(self, name), _CHUNK)
             except BlockingIOError:
                 return
             except OSError:
                 data = b""
             if not data:
-                _close([end])
-                setattr(self, name, -1)
+                self._close(name)
                 return
             if name == "output":
                 self._printed += len(data)
@@ -233,8 +236,7 @@ class GuardedChild:
             if data:
                 self.code = int.from_bytes(data, "big", signed=True)
             else:
-                os.close(self.status)
-                self.status = -1
+                self._close("status")
 
     def _death(self) -> str:
         when = "" if self._ready is not None else " before it was ready"
@@ -259,16 +261,23 @@ class GuardedChild:
 
     def kill(self) -> None:
         """End the process and its group; what they are at is lost."""
+        self._killed = min(self._killed, time.monotonic())
         if self.alive:
             end_group(self.pid)
-        _close(end for end in (self.requests, self.answers, self.output) if end >= 0)
-        self.requests = self.answers = self.output = -1
+        self._close("requests", "answers", "output")
 
     def bury(self) -> None:
         """Wait until nothing is left of a child that was ended."""
         while not self.gone:
             if not select.select([self.status], [], [], _TICK)[0]:
                 fork_server().wake()
+
+    def _close(self, *names: str) -> None:
+        for name in names:
+            end = getattr(self, name)
+            setattr(self, name, -1)
+            if end >= 0:
+                os.close(end)
 
     def watch(self, poll: select.poll) -> None:
         """Have a poll tell when there is something for `progress` to do."""
@@ -305,12 +314,6 @@ def _number(status: int) -> int:
     if not data:
         raise BrokenPipeError("the process from which all workers are started was ended")
     return int.from_bytes(data, "big")
-
-
-def _close(ends: Iterable[int]) -> None:
-    for end in ends:
-        with suppress(OSError):
-            os.close(end)
 
 
 def processes_of(leader: int, *, walled: bool) -> list[psutil.Process]:

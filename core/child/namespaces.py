@@ -28,15 +28,8 @@ from typing import Any
 
 _NEW_MOUNTS, _NEW_NAME, _NEW_IPC = 0x00020000, 0x04000000, 0x08000000
 _NEW_USER, _NEW_PROCESSES, _NEW_NETWORK = 0x10000000, 0x20000000, 0x40000000
-_READ_ONLY, _NO_SUID, _NO_DEV, _NO_EXEC, _BIND, _RECURSIVE, _PRIVATE = (
-    1,
-    2,
-    4,
-    8,
-    4096,
-    16384,
-    2**18,
-)
+_READ_ONLY, _NO_SUID, _NO_DEV, _NO_EXEC = 1, 2, 4, 8
+_BIND, _RECURSIVE, _PRIVATE = 4096, 16384, 2**18
 _DETACH = 2
 _ATTR_READ_ONLY, _ATTR_NO_SUID, _ATTR_NO_DEV = 1, 2, 4
 _HERE, _WHOLE_TREE = -100, 0x8000  # AT_FDCWD, AT_RECURSIVE
@@ -78,10 +71,11 @@ def go_apart(walls: Walls | None, at: str, room: int, processes: int) -> None:
         processes: that there may be, with their threads.
 
     Raises:
-        OSError: where the system refuses the namespaces; the processes are as before then.
+        OSError: where the system refuses the namespaces; this process may then have lost rights.
     """
-    if not _unshare(alone=walls is None):
+    if walls is None and not _may_unshare():
         return
+    _unshare(alone=walls is None)
     # The first process of the namespace, whose end ends all in it, is a program that reads until
     # the end, and small, where a copy of this process would be as large as this one. That it hears
     # of no signal from within makes it no place for a strategy: one that ends itself would go on.
@@ -123,60 +117,73 @@ def go_apart(walls: Walls | None, at: str, room: int, processes: int) -> None:
             with suppress(OSError):
                 _mount("", "/", flags=_RECURSIVE | _PRIVATE)
                 _mount("proc", "/proc", "proc", _NO_SUID | _NO_DEV | _NO_EXEC)
-            os.setsid()
-            resource.setrlimit(resource.RLIMIT_NPROC, (processes, processes))
             os.chdir(at)
-            return
-        _build(walls, at, room)
-        # A loopback that leads to nobody else, and another name of the host.
-        _call("sethostname", "a name", b"sandbox", 7)
-        import fcntl
+        else:
+            _build(walls, at, room)
+            # A loopback that leads to nobody else, and another name of the host.
+            _call("sethostname", "a name", b"sandbox", 7)
+            import fcntl
 
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket, suppress(OSError):
-            request = struct.pack("16sh14x", b"lo", 0)
-            (flags,) = struct.unpack_from("16xh", fcntl.ioctl(any_socket, _FLAGS_OF, request))
-            fcntl.ioctl(any_socket, _SET_FLAGS_OF, struct.pack("16sh14x", b"lo", flags | _UP))
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket, suppress(OSError):
+                request = struct.pack("16sh14x", b"lo", 0)
+                (flags,) = struct.unpack_from("16xh", fcntl.ioctl(any_socket, _FLAGS_OF, request))
+                fcntl.ioctl(any_socket, _SET_FLAGS_OF, struct.pack("16sh14x", b"lo", flags | _UP))
+            capability = 0
+            while libc().prctl(_DROP_BOUND, capability, 0, 0, 0) == 0:
+                capability += 1
+            _call("prctl", "ambient capabilities", _AMBIENT, _CLEAR_AMBIENT, 0, 0, 0)
+            head = struct.pack("=Ii", _CAPABILITY_VERSION, 0)
+            _call("capset", "capabilities", head, bytes(24))
         os.setsid()
-        resource.setrlimit(resource.RLIMIT_NPROC, (processes, processes))
-        libc = _libc()
-        capability = 0
-        while libc.prctl(_DROP_BOUND, capability, 0, 0, 0) == 0:
-            capability += 1
-        _call("prctl", "ambient capabilities", _AMBIENT, _CLEAR_AMBIENT, 0, 0, 0)
-        head = struct.pack("=Ii", _CAPABILITY_VERSION, 0)
-        _call("capset", "capabilities", head, bytes(24))
+        lower_limit(resource.RLIMIT_NPROC, processes)
     except Exception as error:
         os.write(2, f"no sandbox: {error}\n".encode())
         os._exit(FAILED)
 
 
-def _unshare(*, alone: bool) -> bool:
-    """Let the next child begin namespaces of its own; tell whether it will.
+def _may_unshare() -> bool:
+    """Tell whether a namespace of processes is to be had.
+
+    Another process tries it: one that may make a namespace of users and not write their map is
+    good for nothing (Ubuntu 24.04).
+    """
+    if sys.platform != "linux" or not os.path.exists(_READER):
+        return False
+    trial = os.fork()
+    if not trial:
+        with suppress(OSError):
+            _unshare(alone=True)
+            os._exit(0)
+        os._exit(FAILED)
+    return os.waitpid(trial, 0)[1] == 0
+
+
+def _unshare(*, alone: bool) -> None:
+    """Let the next child begin namespaces of its own.
 
     Arguments:
-        alone: whether one of processes is enough, and none is no error.
+        alone: whether one of processes is enough.
 
     Raises:
-        OSError: where the system refuses them.
+        OSError: as for `go_apart`.
     """
     user, group = os.geteuid(), os.getegid()
     wanted = _NEW_PROCESSES | _NEW_MOUNTS
     if not alone:
         wanted |= _NEW_NAME | _NEW_IPC | _NEW_NETWORK
-    elif sys.platform != "linux" or not os.path.exists(_READER):
-        return False
-    elif user == 0 and _libc().unshare(wanted) == 0:  # keeps the rights of root
-        return True
-    try:
-        _call("unshare", "namespaces", wanted | _NEW_USER)
-    except OSError:
-        if not alone:
-            raise
-        return False
+    elif user == 0 and libc().unshare(wanted) == 0:  # keeps the rights of root
+        return
+    _call("unshare", "namespaces", wanted | _NEW_USER)
     _write("/proc/self/setgroups", "deny")
     _write("/proc/self/uid_map", f"{user} {user} 1")
     _write("/proc/self/gid_map", f"{group} {group} 1")
-    return True
+
+
+def lower_limit(what: int, wanted: int) -> None:
+    """Lower a limit of this process, as far as it is not lower yet."""
+    # Where there is no limit, -1 stands for it.
+    soft, hard = (min(wanted, given % 2**64) for given in resource.getrlimit(what))
+    resource.setrlimit(what, (soft, hard))
 
 
 def _build(walls: Walls, at: str, room: int) -> None:
@@ -240,12 +247,13 @@ def _lock(at: str, attributes: int) -> None:
 
 
 @cache
-def _libc() -> Any:  # noqa: ANN401 - a library of C
+def libc() -> Any:  # noqa: ANN401 - a library of C
+    """Return the library of C."""
     return ctypes.CDLL(None, use_errno=True)
 
 
 def _call(function: str, what: str, *arguments: object) -> None:
-    if getattr(_libc(), function)(*arguments) != 0:
+    if getattr(libc(), function)(*arguments) != 0:
         number = ctypes.get_errno()
         raise OSError(number, f"{function} of {what}: {os.strerror(number)}")
 
@@ -257,11 +265,11 @@ def _mount(source: str, target: str, kind: str = "", flags: int = 0, data: str =
 
 
 def _write(path: str, text: str) -> None:
-    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT, 0o644)
     try:
-        os.write(descriptor, text.encode())
-    finally:
-        os.close(descriptor)
+        with open(path, "wb", buffering=0) as stream:
+            stream.write(text.encode())
+    except OSError as error:
+        raise OSError(error.errno, f"write of {path}: {error.strerror}") from error
 
 
 def main() -> None:
@@ -273,8 +281,7 @@ def main() -> None:
         with open(f"{FOLDER}/written", "w") as stream:
             stream.write("yes")
     except OSError as error:
-        sys.stderr.write(f"no sandbox: {error.strerror}\n")
-        sys.stderr.flush()
+        os.write(2, f"no sandbox: {error.strerror}\n".encode())
         os._exit(FAILED)
     os._exit(0)
 

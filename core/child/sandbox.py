@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Literal
 
 from femubench.core.child import namespaces
-from femubench.core.child.namespaces import FOLDER, Walls, go_apart
+from femubench.core.child.namespaces import FOLDER, Walls, go_apart, lower_limit
 from femubench.core.child.syscall_filter import knows_processor, refuse_system_calls
 from femubench.core.errors import InputError
 from femubench.core.schema.run_options import Sandbox
@@ -36,6 +36,7 @@ _DATA = frozenset({"scenarios", "papers"})  # parts of femubench that hold measu
 _MODULES = (".py", ".pyc", ".so", ".pth", ".zip", ".egg")
 _ABOUT = (".dist-info", ".egg-info", ".egg-link", ".libs", ".data")
 _PATIENCE = 20.0  # s
+_PACKAGE = Path(__file__).absolute().parents[2]
 _MOST_FILES = 1024  # open at a time: what pipes and sockets hold is in no count of memory
 
 
@@ -130,8 +131,7 @@ def walls_around(hidden: Iterable[str], code: Iterable[str] = ()) -> Walls:
     shown.update(map(str, _own_code()))
     shown.update(path for path in code if os.path.isfile(path))
     both = shown | {os.path.realpath(path) for path in shown}
-    own = Path(__file__).absolute().parents[2]
-    known = {*_own_folders(own), *_other_own()}
+    known = {*_own_folders(), *_other_own()}
     covers = {str(folder / name) for folder in known for name in _DATA}
     covers.update(path for given in hidden for path in (given, os.path.realpath(given)))
     outermost = tuple(path for path in _outermost(both) if path not in covers)
@@ -147,13 +147,11 @@ def enter(walls: Walls, at: str, room: int, processes: int) -> None:
         walls, at, room, processes: as for `go_apart`.
 
     Raises:
-        OSError: where the system refuses the namespaces; the processes are as before then.
+        OSError: as for `go_apart`.
     """
     go_apart(walls, at, room, processes)
     os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
-    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    most = _MOST_FILES if hard == resource.RLIM_INFINITY else min(_MOST_FILES, hard)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+    lower_limit(resource.RLIMIT_NOFILE, _MOST_FILES)
     refuse_system_calls()
 
 
@@ -166,9 +164,10 @@ def _environment(prefix: Path) -> Iterator[str]:
             yield str(prefix / name)
 
 
-def _own_folders(package: Path) -> set[Path]:
+def _own_folders() -> set[Path]:
     """Return where femubench lies: its package, and the clone that its links lead to."""
-    return {package, package.resolve(), *(path.resolve().parent for path in package.iterdir())}
+    linked = (path.resolve().parent for path in _PACKAGE.iterdir())
+    return {_PACKAGE, _PACKAGE.resolve(), *linked}
 
 
 def _other_own() -> Iterator[Path]:
@@ -180,9 +179,8 @@ def _other_own() -> Iterator[Path]:
 
 def _own_code() -> Iterator[Path]:
     """Yield the package of femubench, and where its links lead but to data."""
-    package = Path(__file__).absolute().parents[2]
-    yield package
-    for part in package.resolve().iterdir():
+    yield _PACKAGE
+    for part in _PACKAGE.resolve().iterdir():
         if part.is_symlink() and part.name not in _DATA:
             yield part.resolve()
 
@@ -220,8 +218,7 @@ def _code_of(entry: Path) -> Iterator[Path]:
 
 
 def _is_own(package: Path) -> bool:
-    own = Path(__file__).absolute().parents[2]
-    return package.name == "femubench" and package.resolve() in _own_folders(own)
+    return package.name == "femubench" and package.resolve() in _own_folders()
 
 
 def _outermost(paths: Iterable[str]) -> Iterator[str]:

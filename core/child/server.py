@@ -46,7 +46,7 @@ ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in _LIBRARIES} | {"VECLIB_MAXI
 _PR_SET_CHILD_SUBREAPER = 36
 _TICK = 0.5  # s between two looks at what children have left behind
 _PAUSE = 0.01  # s between two looks at what was ended
-_LAST_BREATH = 5.0  # s that the end of a process may take
+LAST_BREATH = 5.0  # s that the end of a process may take
 _exit = os._exit  # before anybody puts something else there
 
 
@@ -110,7 +110,7 @@ class ForkServer:
         self._control.close()
         self.wake()
         try:
-            self.process.wait(_LAST_BREATH)
+            self.process.wait(LAST_BREATH)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
@@ -273,7 +273,7 @@ def _end_strays(children: Iterable[int]) -> bool:
 
 def _end_all(children: dict[int, int]) -> None:
     """End all children and what they leave behind."""
-    until = time.monotonic() + _LAST_BREATH
+    until = time.monotonic() + LAST_BREATH
     for process in children:
         end_group(process)
     while (children or _end_strays(children)) and time.monotonic() < until:

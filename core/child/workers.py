@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import fcntl
 import os
 import shutil
 import sys
@@ -18,7 +19,7 @@ import psutil
 
 from femubench.core.child import server
 from femubench.core.child.confinement import Confinement
-from femubench.core.child.guarded_child import Ending, GuardedChild, wait_for
+from femubench.core.child.guarded_child import Ending, GuardedChild, processes_of, wait_for
 from femubench.core.child.limits import Limits
 from femubench.core.child.sandbox import enclosure, walls_around
 
@@ -50,25 +51,14 @@ class Workers(Generic[Key]):
         """Return how many tasks are running."""
         return len(self._running)
 
-    @property
-    def free(self) -> bool:
-        """Tell whether another task can start."""
-        return self.running < self.count
-
-    @property
-    def busy(self) -> bool:
-        """Tell whether a task is running."""
-        return self.running > 0
-
     @contextmanager
     def open(self) -> Iterator[Workers[Key]]:
         """Start what the workers need, and leave no process and no file behind."""
-        self._root = _scratch_root()
-        if not server.fork_server().current:
-            server.end_server()
-        with suppress(OSError):
-            server.fork_server().ask(self._module)
-        with adopt_orphans():
+        with _scratch_root() as self._root, adopt_orphans():
+            if not server.fork_server().current:
+                server.end_server()
+            with suppress(OSError):
+                server.fork_server().ask(self._module)
             try:
                 yield self
             finally:
@@ -77,7 +67,6 @@ class Workers(Generic[Key]):
                 self._running = []
                 self._bury(wait=True)
                 self._end_strays()
-                shutil.rmtree(self._root, ignore_errors=True)
 
     def start(
         self, key: Key, function: Callable[[Any], bytes], argument: object, limits: Limits
@@ -96,8 +85,8 @@ class Workers(Generic[Key]):
             child = GuardedChild.start(self._confinement(limits, scratch), self._module)
         except OSError as error:
             return Ending("no-start", reason=f"no worker process could start: {error}")
+        self._running.append((key, child))  # first: what cannot be pickled raises
         child.ask(function, argument, limits)
-        self._running.append((key, child))
         return None
 
     def _confinement(self, limits: Limits, scratch: str) -> Confinement:
@@ -156,7 +145,7 @@ class Workers(Generic[Key]):
         with suppress(psutil.Error):
             for child in psutil.Process().children():
                 if child.pid != running.process.pid and self._is_stray(child, running.mark):
-                    for process in (child, *_below(child)):
+                    for process in processes_of(child.pid, walled=False):
                         server.end_group(process.pid)
                     with suppress(ChildProcessError):
                         os.waitpid(child.pid, 0)
@@ -170,13 +159,6 @@ class Workers(Generic[Key]):
             marked = process.environ().get(server.MARK) == mark
             return marked or Path(process.cwd()).is_relative_to(self._root)
         return False
-
-
-def _below(process: psutil.Process) -> list[psutil.Process]:
-    try:
-        return list(process.children(recursive=True))
-    except psutil.Error:
-        return []
 
 
 @contextmanager
@@ -198,14 +180,33 @@ def adopt_orphans() -> Iterator[None]:
         libc.prctl(_PR_SET_CHILD_SUBREAPER, before.value)
 
 
-def _scratch_root() -> Path:
-    """Make a folder for the scratch folders of this process; remove those of dead processes."""
+@contextmanager
+def _scratch_root() -> Iterator[Path]:
+    """Have a folder for the scratch folders of this process; remove those of dead processes."""
     above = Path(tempfile.gettempdir())
     for left in above.glob("femubench-*-*"):
         number = left.name.split("-")[1]
         if number.isdigit() and not psutil.pid_exists(int(number)):
-            shutil.rmtree(left, ignore_errors=True)
-    return Path(tempfile.mkdtemp(prefix=f"femubench-{os.getpid()}-", dir=above))
+            with suppress(OSError), _locked(left):
+                shutil.rmtree(left, ignore_errors=True)
+    made = Path(tempfile.mkdtemp(prefix="femubench-new-", dir=above))
+    with _locked(made):
+        root = made.rename(made.with_name(made.name.replace("new", str(os.getpid()), 1)))
+        try:
+            yield root
+        finally:
+            shutil.rmtree(root, ignore_errors=True)
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Hold the lock of a folder in use, whose process may have no number in this namespace."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def run_apart(
@@ -227,14 +228,14 @@ def run_apart(
     if not waiting:
         return found
     with Workers[Key](count, module).open() as workers:
-        while waiting or workers.busy:
-            while workers.free and waiting:
+        while waiting or workers.running:
+            while workers.running < count and waiting:
                 key = waiting.pop(0)
                 attempts[key] += 1
                 ending = workers.start(key, *tasks[key], limits)
                 if ending is not None:
                     found[key] = ending
-            for key, ending in workers.wait() if workers.busy else ():
+            for key, ending in workers.wait() if workers.running else ():
                 if ending.how == "no-start" and attempts[key] < _ATTEMPTS:
                     waiting.append(key)
                 else:

@@ -92,6 +92,7 @@ def ask(
     if not questions:
         return []
     from femubench.core.child.limits import Limits
+    from femubench.core.child.sandbox import enclosure
     from femubench.core.child.workers import run_apart
 
     physical = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
@@ -109,7 +110,8 @@ def ask(
         tasks = {number: (answer_question, questions[number]) for number in asked}
         return run_apart(tasks, limits, os.cpu_count() or 1, _ANSWERS)
 
-    found = put((i for i, one in enumerate(questions) if one.get("walled")), walled)
+    inside = [i for i, one in enumerate(questions) if one.get("walled")]
+    found = put(inside, walled) if enclosure("auto").sandbox != "none" else {}
     # Where the sandbox was not entered no plugin has been imported yet.
     rest = {i for i in range(len(questions)) if i not in found or found[i].how == "no-start"}
     found |= put(rest, plain)

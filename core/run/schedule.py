@@ -91,7 +91,7 @@ def compute_jobs(
             pulse()
             while (busy := workers.running + judges.busy) < workers.count and bench.has_work(busy):
                 yield from bench.start(workers, judges)
-            if not (workers.busy or judges.busy):
+            if not (workers.running or judges.busy):
                 return
             for task, ending in (*workers.wait(judges.at_work), *judges.take_ended()):
                 yield from bench.take(task, ending)

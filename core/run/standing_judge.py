@@ -175,8 +175,8 @@ class Judges(Generic[Key]):
             judge = self._free(case)
         except OSError as error:
             return Ending("no-start", reason=f"no worker process could start: {error}")
-        judge.ask(case, verdict, limits)
         self._at_work.append((key, judge))
+        judge.ask(case, verdict, limits)
         return None
 
     def _free(self, case: bytes) -> _Judge:

@@ -173,11 +173,11 @@ def reached_outside(_: object) -> bytes:
     return ", ".join(found).encode()
 
 
-def sleeping_family(_: object) -> bytes:
+def sleeping_family(asking: int) -> bytes:
     """Leave a sleeper in a session of its own, and sleep."""
-    from zoo import _SLEEPER
+    from zoo import sleeping
 
-    subprocess.Popen(_SLEEPER, start_new_session=True)
+    subprocess.Popen(sleeping(asking), start_new_session=True)
     if os.fork() == 0:
         os.setsid()
         time.sleep(900.0)

@@ -17,7 +17,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -26,12 +26,15 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.run import answers
 from femubench.core.update.strategy import Strategy, UpdateResult
 
-if TYPE_CHECKING:
-    import psutil
-
 MARK = "femubench-zoo-animal"
-_SLEEPER = [sys.executable, "-c", f"import time; time.sleep(900)  # {MARK}"]
 
+
+def sleeping(asking: int) -> list[str]:
+    """Return the command of a process that sleeps, by which the one that asked for it knows it."""
+    return [sys.executable, "-c", f"import time; time.sleep(900)  # {MARK} of {asking}"]
+
+
+_SLEEPER = sleeping(0)  # of the animal that this process is
 
 ANIMALS: list[type[Animal]] = []
 # What the test has put up for burglars: a port, names, words.
@@ -60,6 +63,7 @@ class Animal(Strategy):
         self, model: Model, measurement: Measurement, rng: np.random.Generator
     ) -> UpdateResult:
         """Do harm."""
+        _SLEEPER[:] = sleeping(self.target["process"])
         found = self.harm(model)
         return (
             found
@@ -142,7 +146,7 @@ def sleeper(model: Model) -> None:
 def memory_hog(model: Model) -> None:
     kept = []
     while True:
-        kept.append(np.ones(2**22))
+        kept.append(np.empty(2**22))
 
 
 @animal("crashed", "used ")
@@ -653,29 +657,18 @@ def _objects() -> set[str]:
 _BEFORE = _objects()
 
 
-def own_processes() -> list[psutil.Process]:
-    """Return the processes of this machine, but those of tests that run at the same time."""
-    import psutil
-
-    every, own = list(psutil.process_iter()), psutil.Process()
-    runner = own.parent()
-    others = [p for p in runner.children() if p != own] if runner is not None else []
-    # What starts after the list was made is not in it; what has ended says nothing more.
-    theirs = {p for other in others for p in (other, *other.children(recursive=True))}
-    return [process for process in every if process not in theirs]
-
-
 def leftovers() -> Iterator[str]:
-    """Return processes and files that the zoo has left on this machine."""
+    """Return processes and files that the zoo of this process has left on this machine."""
     import tempfile
 
     import psutil
 
-    for process in own_processes():
+    for process in psutil.process_iter():
         with suppress(psutil.Error):
-            if any(MARK in word for word in process.cmdline()):
+            if process.cmdline() == sleeping(os.getpid()):
                 yield f"process {process.pid}"
-    yield from sorted(_objects() - _BEFORE)
+    # Another zoo on this machine removes its objects at once.
+    yield from sorted((_objects() - _BEFORE) & _objects())
     for folder in (Path(tempfile.gettempdir()), Path.cwd(), Path.home()):
         yield from (str(path) for path in folder.glob(f"*{MARK}*"))
     yield from map(str, Path(tempfile.gettempdir()).glob(f"femubench-{os.getpid()}-*"))
