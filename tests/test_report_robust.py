@@ -132,7 +132,8 @@ class TestDamage:
         assert notes[3].endswith("14 more records were left out")
 
     def test_a_store_of_an_older_version_is_one_line(self, report: Report, folder: Path) -> None:
-        file_in(folder).rename(folder / "results.jsonl")
+        file_in(folder).unlink()
+        (folder / "results.jsonl").write_text('{"schema": 1, "record": "run", "run": "r"}')
         result = report("-f", "html")
         assert result.exit_code == 2
         assert "`bench store repair` converts them (results.jsonl)" in result.stderr

@@ -171,7 +171,7 @@ def test_check_repair_and_resume_by_the_command(tmp_path: Path) -> None:
     assert len(store.by_key()) == len(RESULTS) - 1  # that one is computed again
     done = call("repair", "--store", store.folder)
     assert done.exit_code == 0
-    assert f"1 fault, as it was in {file.name}.damaged" in done.output
+    assert f"1 fault, 1 record left out, as it was in {file.name}.damaged" in done.output
     assert file.with_name(f"{file.name}.damaged").read_bytes() == damaged
     assert call("check", "--store", store.folder).exit_code == 0
     assert [item for item in RESULTS if item not in plain(store.load())] == [RESULTS[2]]
@@ -334,19 +334,6 @@ def test_a_disk_that_fails_is_reported_with_the_next_record(
             thread.join()
     with pytest.raises(InputError, match="cannot be written: disk I/O error"):
         store.append(RUN, RESULTS[1])
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_folder_that_may_not_be_written_is_read(tmp_path: Path) -> None:
-    store = stored(tmp_path)
-    tmp_path.chmod(0o555)
-    try:
-        assert len(store.load().results) == len(RESULTS)
-        assert find_store_faults(store) == []
-        with pytest.raises(InputError, match="Permission denied"):
-            store.begin({**META, "run": "new"})
-    finally:
-        tmp_path.chmod(0o755)
 
 
 def test_results_come_back_whole(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ import click
 from femubench.core.cli import options
 from femubench.core.cli.registry import Verbs
 from femubench.core.display import count_noun
-from femubench.core.errors import InputError
+from femubench.core.errors import InputError, harmless
 
 if TYPE_CHECKING:
     from femubench.core.run.store import Store
@@ -49,11 +50,11 @@ def check(ctx: click.Context, store: Path | None) -> None:
     kept = _open(store)
     faults = find_store_faults(kept)
     for fault in faults:
-        click.echo(" ".join(str(fault).split()))
+        click.echo(fault)
     for note in kept.notes_of_old_files():
         click.echo(note)
     runs = count_noun(len(kept.runs()), "run")
-    click.echo(f"{kept.folder}: {runs}, {count_noun(len(faults), 'fault')}")
+    click.echo(harmless(f"{kept.folder}: {runs}, {count_noun(len(faults), 'fault')}"))
     ctx.exit(int(bool(faults)))
 
 
@@ -62,24 +63,31 @@ def check(ctx: click.Context, store: Path | None) -> None:
 def repair(store: Path | None) -> None:
     """Leave out what is damaged, so that `bench run --resume` computes it again.
 
-    A damaged file is kept as RUN.sqlite.damaged. Runs of an earlier version are converted.
+    A damaged file is kept as RUN.sqlite.damaged. Runs of an earlier version are converted. A file
+    without any record of a run is left alone.
     """
+    kept, line = _open(store), ""
+    for line in _repaired(kept):
+        click.echo(harmless(line))
+    if not line:
+        click.echo(harmless(f"{kept.folder}: nothing to repair"))
+
+
+def _repaired(kept: Store) -> Iterator[str]:
+    """Convert and repair the files of a store; yield a line for each."""
     from femubench.core.run.upkeep import convert_old_files
 
-    kept = _open(store)
-    done = 0
     for file, (records, lost) in convert_old_files(kept).items():
-        click.echo(
-            f"{file}: {count_noun(records, 'record')} converted, {count_noun(len(lost), 'fault')}"
-        )
-        done += 1
+        found = f"{count_noun(records, 'record')} converted, {count_noun(len(lost), 'fault')}"
+        yield f"{file}: {found}"
+    for file in sorted(kept.folder.glob("*.jsonl")):
+        yield f"{file}: not of an earlier version, left alone"
     for file in kept.files:
         with kept.exclusive(file.stem):
-            faults = kept.repair(file.stem)
-        if faults:
-            click.echo(
-                f"{file}: {count_noun(len(faults), 'fault')}, as it was in {file.name}.damaged"
-            )
-            done += 1
-    if not done:
-        click.echo(f"{kept.folder}: nothing to repair")
+            faults, copy = kept.repair(file.stem)
+        if copy is not None:
+            out = sum(fault.line is not None for fault in faults)
+            found = f"{count_noun(len(faults), 'fault')}, {count_noun(out, 'record')} left out"
+            yield f"{file}: {found}, as it was in {copy.name}"
+        elif faults:
+            yield f"{faults[0]}: no record of a run, left alone"

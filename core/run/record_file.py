@@ -23,10 +23,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from msgspec import Struct
+
 from femubench.core.errors import InputError
-from femubench.core.files import MIB, read_bytes
+from femubench.core.files import MIB, check_regular, read_bytes
 from femubench.core.schema.records import decode_result, meta_from_json, parse_json
 from femubench.core.schema.results import JobResult
+from femubench.core.schema.validation import read_plain
 
 Kind = Literal["run", "result", "end"]
 Row = tuple[int, str, str, str, bytes, int]
@@ -42,10 +45,20 @@ _COLUMNS = (
     "number INTEGER PRIMARY KEY, kind TEXT, key TEXT, status TEXT, data BLOB, checksum INTEGER"
 )
 # The second table has a copy of the first record, on a page of its own.
-_TABLES = ("records", "copies")
+_SCHEMA = [
+    ("table", name, name, page, f"CREATE TABLE {name} ({_COLUMNS})")
+    for page, name in enumerate(("records", "copies"), 2)
+]
 _INSERT = "INSERT INTO records VALUES (?, ?, ?, ?, ?, ?)"
 # Of the first page: the count of changes twice, and a number that SQLite leaves to its users.
 _CHANGES, _DIGEST, _VALID_FOR = slice(24, 28), slice(60, 64), slice(92, 96)
+
+
+class _Begun(Struct):
+    """What a record holds that is no result."""
+
+    meta: dict[str, Any]
+    at: float = 0.0
 
 
 @dataclass(slots=True)
@@ -80,17 +93,17 @@ class Record:
 
     def meta(self) -> dict[str, Any]:
         """Return the meta data; raises as `result` does."""
-        return meta_from_json(self._table().get("meta"), file=self.file, line=self.number)
+        return meta_from_json(self._begun().meta, file=self.file, line=self.number)
 
     @property
     def at(self) -> float:
-        """Return when the run began, in seconds since 1970."""
-        return float(self._table().get("at") or 0.0)
+        """Return when the run began, in seconds since 1970; raises as `result` does."""
+        return self._begun().at
 
-    def _table(self) -> dict[str, Any]:
+    def _begun(self) -> _Begun:
         where: Any = {"file": self.file, "line": self.number}
         found = parse_json(self.data, **where, expected="a table of JSON")
-        return found if isinstance(found, dict) else {}
+        return read_plain(_Begun, found, **where)
 
 
 def _row(number: int, record: Record) -> Row:
@@ -115,20 +128,29 @@ def _is_whole(row: Row) -> bool:
         return False
 
 
-def _connect(file: Path | str) -> sqlite3.Connection:
-    """Return a connection to a file that is there; every statement is a transaction."""
-    where = file if file == ":memory:" else f"{Path(file).absolute().as_uri()}?mode=rw"
+def _connect(file: Path) -> sqlite3.Connection:
+    """Return a connection to a regular file; every statement is a transaction."""
+    check_regular(file, LARGEST)
+    # Who may not write there cannot make a log, which a file without one may ask for.
+    is_ours = os.access(file.parent, os.W_OK) or file.with_name(f"{file.name}-wal").exists()
+    where = f"{file.absolute().as_uri()}?{'mode=rw' if is_ours else 'mode=ro&immutable=1'}"
     return sqlite3.connect(
         where, uri=True, timeout=_WAIT, isolation_level=None, check_same_thread=False
     )
 
 
+def _check_tables(connection: sqlite3.Connection) -> None:
+    """Make sure of the tables of a run and nothing else: a view in their place might never end."""
+    if connection.execute("SELECT * FROM sqlite_schema").fetchmany(3) != _SCHEMA:
+        raise sqlite3.DatabaseError("its tables are not those of a run")
+
+
 def make_image(records: Iterable[Record]) -> bytes:
     """Return the content of a file with these records, numbered anew."""
-    with closing(_connect(":memory:")) as made:
+    with closing(sqlite3.connect(":memory:", isolation_level=None)) as made:
         made.execute(f"PRAGMA page_size = {_PAGE}")
-        for table in _TABLES:
-            made.execute(f"CREATE TABLE {table} ({_COLUMNS})")
+        for *_, sql in _SCHEMA:
+            made.execute(sql)
         made.execute("BEGIN")
         made.executemany(_INSERT, (_row(n, record) for n, record in enumerate(records, 1)))
         made.execute("INSERT INTO copies SELECT * FROM records WHERE number = 1")
@@ -174,6 +196,7 @@ class RecordWriter:
         self._is_due = False
         self._fault: sqlite3.Error | None = None
         self._connection = _connect(file)
+        _check_tables(self._connection)
         self._ask("PRAGMA synchronous = NORMAL")
         if self._ask("PRAGMA user_version") != (0,):
             self._ask("PRAGMA user_version = 0")  # the digest of a file that grows no longer holds
@@ -259,6 +282,7 @@ def read_records(file: Path, faults: list[InputError]) -> Iterator[Record]:
     number, kind = 0, ""
     try:
         with closing(_connect(file)) as connection:
+            _check_tables(connection)
             for row in connection.execute("SELECT * FROM records ORDER BY number"):
                 if row[0] != number + 1 or not _is_whole(row):
                     raise sqlite3.DatabaseError(f"record {number + 1} is not as it was written")
@@ -275,7 +299,9 @@ def read_records(file: Path, faults: list[InputError]) -> Iterator[Record]:
     lost = [n for n in range(number + 1, max(rest, default=number)) if n not in rest]
     faults.extend(InputError("damaged", file=file, line=n, expected=expected) for n in lost)
     if not lost:
-        faults.append(InputError(f"damaged: {why}", file=file, expected="what was written"))
+        is_shut = getattr(why, "sqlite_errorcode", None) == sqlite3.SQLITE_CANTOPEN
+        what = f"{'cannot be read' if is_shut else 'damaged'}: {why}"
+        faults.append(InputError(what, file=file, expected="what was written"))
     yield from (rest[n] for n in sorted(rest))
 
 
@@ -304,7 +330,7 @@ def _rows_of(content: bytearray) -> Iterator[Row]:
     starts = [start for start in range(_PAGE, len(content), _PAGE) if content[start]]
     for start in starts:
         content[start] = _LEAF
-    with closing(_connect(":memory:")) as connection:
+    with closing(sqlite3.connect(":memory:", isolation_level=None)) as connection:
         connection.deserialize(bytes(content))
 
         def rows(question: str) -> list[Row]:
@@ -328,6 +354,20 @@ def _check_tree(connection: sqlite3.Connection) -> str:
     return "" if found == "ok" else str(found)
 
 
+def read_contents(
+    file: Path, faults: list[InputError]
+) -> Iterator[tuple[Record, JobResult | dict[str, Any]]]:
+    """Yield the records of a file with the result or the meta data that they hold.
+
+    Arguments and errors are those of `read_records`; what cannot be decoded is left out too.
+    """
+    for record in read_records(file, faults):
+        try:
+            yield record, record.result() if record.kind == "result" else record.meta()
+        except InputError as fault:
+            faults.append(fault)
+
+
 def find_faults(file: Path) -> list[InputError]:
     """Return what is damaged or missing in a file; every record is read to its end.
 
@@ -335,11 +375,11 @@ def find_faults(file: Path) -> list[InputError]:
     leads to them.
     """
     faults: list[InputError] = []
-    for record in read_records(file, faults):
-        try:
-            record.result() if record.kind == "result" else record.meta()
-        except InputError as fault:
-            faults.append(fault)
+    try:
+        for _ in read_contents(file, faults):
+            pass
+    except InputError as fault:
+        return [fault]
     if not faults:
         with suppress(*_DAMAGE), closing(_connect(file)) as connection:
             if wrong := _check_tree(connection):

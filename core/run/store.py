@@ -11,16 +11,20 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import cached_property
+from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
 from femubench.core.drawing.files import Exhibits
-from femubench.core.errors import InputError
+from femubench.core.errors import InputError, harmless
+from femubench.core.files import open_regular
 from femubench.core.garbage import pause_collection
 from femubench.core.run.record_file import (
+    LARGEST,
     Record,
     RecordWriter,
     find_faults,
+    read_contents,
     read_records,
     write_file,
 )
@@ -42,38 +46,17 @@ _MOST_NOTES, _MOST_JOBS = 3, 5
 _SUFFIX = ".sqlite"
 _STORED = "a run stored by `bench run`"
 _RUN_ID = re.compile(r"(?!results$)[A-Za-z0-9][A-Za-z0-9._-]{0,199}")
+_OLD = re.compile(rb'\{"schema": ?[12], ?"record": ?"(run|result|end)"')
 
 
 def notes_of(faults: Sequence[InputError], folder: Path) -> list[str]:
     """Return a line for each of the first faults of a store and one for the others."""
-    shown = [
-        f"{' '.join(str(fault).split())}{': left out' if fault.line else ''}"
-        for fault in faults[:_MOST_NOTES]
-    ]
+    shown = [f"{fault}{': left out' if fault.line else ''}" for fault in faults[:_MOST_NOTES]]
     more = len(faults) - len(shown)
     if more:
         records = "record was" if more == 1 else "records were"
-        shown.append(f"{folder}: {more} more {records} left out")
+        shown.append(harmless(f"{folder}: {more} more {records} left out"))
     return shown
-
-
-def list_planned_jobs(meta: Mapping[str, Any]) -> dict[JobName, None]:
-    """Return the jobs that a run began with, by case, strategy, seed and nominal model.
-
-    Arguments:
-        meta: ``cases``, ``strategies``, ``seeds``, ``starts`` and ``twins`` of the run.
-    """
-    starts = meta.get("starts") or {}
-    models = {case: starts.get(case, NOMINALS[:1]) for case in meta.get("cases") or {}}
-    # What runs along with the cases starts from the model that ranks.
-    models |= {name: models.get(case, NOMINALS)[:1] for name, case in origins_of(meta).items()}
-    return {
-        (case, strategy, seed, nominal): None
-        for case, nominals in models.items()
-        for nominal in nominals
-        for seed in meta.get("seeds") or ()
-        for strategy in meta.get("strategies") or ()
-    }
 
 
 def note_missing_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> str | None:
@@ -84,20 +67,37 @@ def note_missing_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> 
         >>> results.note_missing_jobs(meta, ())
         '1 of 1 jobs are missing and score as failures: rod mine seed 0 drawn'
     """
-    plan = list_planned_jobs(meta)
-    there = {(r.case, r.strategy, r.seed, r.nominal) for r in results}
-    missing = [job for job in plan if job not in there]
-    if not missing:
+    starts = meta.get("starts") or {}
+    models = {case: starts.get(case, NOMINALS[:1]) for case in meta.get("cases") or {}}
+    # What runs along with the cases starts from the model that ranks.
+    models |= {name: models.get(case, NOMINALS)[:1] for name, case in origins_of(meta).items()}
+    starting = dict.fromkeys((case, nominal) for case in models for nominal in models[case])
+    seeds, strategies = (dict.fromkeys(meta.get(key) or ()) for key in ("seeds", "strategies"))
+    there = {
+        (r.case, r.nominal, r.seed, r.strategy)
+        for r in results
+        if (r.case, r.nominal) in starting and r.seed in seeds and r.strategy in strategies
+    }
+    # Of what a file claims, which may be without end, so many are made as are named.
+    plan = ((*start, seed, who) for start in starting for seed in seeds for who in strategies)
+    missing = islice((job for job in plan if job not in there), _MOST_JOBS)
+    first = ", ".join(f"{case} {who} seed {seed} {nominal}" for case, nominal, seed, who in missing)
+    planned = len(starting) * len(seeds) * len(strategies)
+    lost = planned - len(there)
+    if not lost:
         return None
-    names = [f"{case} {who} seed {seed} {nominal}" for case, who, seed, nominal in missing]
-    first = ", ".join(names[:_MOST_JOBS])
-    more = len(names) - _MOST_JOBS
-    first += f" and {more} more" if more > 0 else ""
+    first += f" and {lost - _MOST_JOBS} more" if lost > _MOST_JOBS else ""
     if "finished" in meta and (meta["finished"] is None or meta.get("interrupted") is True):
         how = "has not ended" if meta["finished"] is None else "was interrupted"
-        done = len(plan) - len(missing)
-        return f"the run {how}: {done} of {len(plan)} jobs are there; not run: {first}"
-    return f"{len(missing)} of {len(plan)} jobs are missing and score as failures: {first}"
+        return f"the run {how}: {len(there)} of {planned} jobs are there; not run: {first}"
+    return f"{lost} of {planned} jobs are missing and score as failures: {first}"
+
+
+def _is_old(file: Path) -> bool:
+    """Tell whether a file begins as those of earlier versions do."""
+    with suppress(OSError, InputError), open_regular(file, LARGEST) as stream:
+        return _OLD.match(stream.read(64)) is not None
+    return False
 
 
 def hold_lock(path: Path) -> int:
@@ -158,7 +158,7 @@ class Store:
     @property
     def old_files(self) -> tuple[Path, ...]:
         """Return the files of earlier versions, which `bench store repair` converts."""
-        return tuple(sorted(self.folder.glob("*.jsonl")))
+        return tuple(file for file in sorted(self.folder.glob("*.jsonl")) if _is_old(file))
 
     @cached_property
     def exhibits(self) -> Exhibits:
@@ -208,15 +208,12 @@ class Store:
         meta: dict[str, Any] = {"run": wanted, "finished": None}
         results: dict[JobName, JobResult] = {}
         faults: list[InputError] = []
-        for record in read_records(self.file_of(wanted), faults):
-            try:
-                if record.kind == "result":
-                    r = record.result()
-                    results[r.case, r.strategy, r.seed, r.nominal] = r
-                else:
-                    meta.update({**record.meta(), "run": wanted})
-            except InputError as fault:
-                faults.append(fault)
+        for _, content in read_contents(self.file_of(wanted), faults):
+            if isinstance(content, JobResult):
+                r = content
+                results[r.case, r.strategy, r.seed, r.nominal] = r
+            else:
+                meta.update({**content, "run": wanted})
         others = origins_of(meta)
         everything = in_order_of_jobs(meta, results.values())
         listed = [result for result in everything if result.case not in others]
@@ -253,12 +250,13 @@ class Store:
         """
         found: dict[str, Record] = {}
         for run in (*self.runs(),) if run_id is None else (run_id,):
-            for record in read_records(self.file_of(run), []) if run != but else ():
-                known = found.get(record.key)
-                if not record.key or record.kind != "result":
-                    continue
-                if known is None or record.status in DONE or known.status not in DONE:
-                    found[record.key] = record
+            with suppress(InputError):
+                for record in read_records(self.file_of(run), []) if run != but else ():
+                    known = found.get(record.key)
+                    if not record.key or record.kind != "result":
+                        continue
+                    if known is None or record.status in DONE or known.status not in DONE:
+                        found[record.key] = record
         return found
 
     def read_start(self, run_id: str | None = None) -> dict[str, Any]:
@@ -297,39 +295,46 @@ class Store:
             path.unlink(missing_ok=True)
             os.close(descriptor)
 
-    def repair(self, run_id: str) -> list[InputError]:
-        """Write the file of a run anew if it has faults; return these.
+    def repair(self, run_id: str) -> tuple[list[InputError], Path | None]:
+        """Write the file of a run anew if it has faults; return these and a copy of it as it was.
 
-        The file as it was is kept under another name.
+        A file in which there is no record is not that of a run: it is left alone, without a copy.
 
         Raises:
-            InputError: when something cannot be read or written.
+            InputError: when something cannot be written.
         """
         self._close(run_id)
-        file, faults = self.file_of(run_id), find_faults(self.file_of(run_id))
-        if faults:
-            with report_write_errors(file):
-                damaged = file.with_name(f"{file.name}.damaged")
-                damaged.write_bytes(file.read_bytes())
-                write_file(file, [*read_records(file, [])])
-        return faults
+        file, records = self.file_of(run_id), list[Record]()
+        if faults := find_faults(file):
+            with suppress(InputError):
+                records = [record for record, _ in read_contents(file, [])]
+        if not records:
+            return faults, None
+        copy, before = file.with_name(f"{file.name}.damaged"), count(2)
+        while copy.exists():
+            copy = file.with_name(f"{file.name}.damaged-{next(before)}")
+        with report_write_errors(file):
+            copy.write_bytes(file.read_bytes())
+            write_file(file, records)
+        return faults, copy
 
     def _starts(self) -> dict[str, dict[str, Any] | None]:
         """Return the meta data with which all runs began, oldest first; None where it is lost."""
         found: dict[str, tuple[float, dict[str, Any] | None]] = {}
         for file in self.files:
-            found[file.stem] = file.stat().st_mtime, None
-            first = next(read_records(file, []), None)
-            if first is not None and first.kind == "run":
-                with suppress(InputError):
-                    found[file.stem] = first.at, {**first.meta(), "run": file.stem}
+            found[file.stem] = 0.0, None  # the latest run is no file without records
+            with suppress(InputError, OSError):
+                for first in islice(read_records(file, []), 1):
+                    found[file.stem] = file.stat().st_mtime, None
+                    if first.kind == "run":
+                        found[file.stem] = first.at, {**first.meta(), "run": file.stem}
         return {run: meta for run, (_, meta) in sorted(found.items(), key=lambda item: item[1][0])}
 
     def notes_of_old_files(self) -> list[str]:
         """Return a line where there are runs of an earlier version."""
         names = ", ".join(file.name for file in self.old_files[:_MOST_NOTES])
         how = "runs of an earlier version; `bench store repair` converts them"
-        return [f"{self.folder}: {how} ({names})"] if names else []
+        return [harmless(f"{self.folder}: {how} ({names})")] if names else []
 
     def _find(self, run_id: str | None) -> str:
         """Return the id of the run that is meant."""
@@ -353,7 +358,7 @@ class Store:
                 self._writer(run_id).append(record, at_once=at_once)
             except sqlite3.DatabaseError:
                 # What is damaged, of which a full disk is no part, takes no records.
-                if not (self.file_of(run_id).exists() and self.repair(run_id)):
+                if not (self.file_of(run_id).exists() and self.repair(run_id)[1]):
                     raise
                 self._writer(run_id).append(record, at_once=at_once)
 
