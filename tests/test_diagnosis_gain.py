@@ -22,7 +22,7 @@ from femubench.core.diagnosis.proof import (
 )
 from femubench.core.fit.mesh_error import refine_mesh
 from femubench.core.fit.modal_fit import Fit, state_at
-from femubench.core.inference.examine import Terms, examine, pose_problem
+from femubench.core.inference.examine import examine, pose_problem
 from femubench.core.schema.diagnosis import Cause, Gain
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block
