@@ -321,7 +321,7 @@ EDITS = st.lists(st.tuples(st.integers(0, 5000), st.integers(0, 12), PIECES | st
 def test_only_input_errors_come_out(case: str, file: str) -> None:
     original = (CASES / case / file).read_text()
 
-    @settings(max_examples=40, deadline=None, derandomize=True, database=None)
+    @settings(max_examples=15, deadline=None, derandomize=True, database=None)
     @given(EDITS)
     def check(edits: list[tuple[int, int, str]]) -> None:
         with TemporaryDirectory() as name:

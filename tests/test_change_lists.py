@@ -50,7 +50,7 @@ def inside(parametric: ParametricModel) -> np.ndarray:
 def test_slopes_of_a_list_are_those_of_differences(case: str, words: str) -> None:
     model = femubench.cases[case].model
     if case == "hframe":
-        words = words.replace("@rung-middle/2", "").replace("@J1", "")
+        words = words.replace("@rung-middle/2", "@lower-1/2").replace("@J1", "@T1")
         words = words.replace("torsion-constant", "youngs-modulus")
     parametric = ParametricModel(model, tuple(list_changes(model, words)))
     x = inside(parametric)
