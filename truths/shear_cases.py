@@ -55,7 +55,7 @@ STATES = (
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong: in words and as a cause, and the elastic modes that a test then reads."""
+    """What is wrong, the frame that has it, and the bumper that touches, if one does."""
 
     cause: TrueCause
     frame: Frame

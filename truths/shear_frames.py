@@ -104,7 +104,8 @@ def drawn(plan: Plan) -> tuple[Array, Array]:
     lumped[:-1] += frame.columns / 2.0
     off = rng.uniform(-0.03, 0.03, len(plan.masses)), rng.uniform(-0.1, 0.1, plan.storeys)
     masses = lumped[list(plan.masses)] * (1.0 + plan.coarse * off[0])
-    return masses, frame.stiffness * (1.0 + plan.coarse * off[1])
+    # Whole N/m, so that files with ten digits hold what hangs by nothing.
+    return masses, np.round(frame.stiffness * (1.0 + plan.coarse * off[1]))
 
 
 def with_mass(frame: Frame, floor: int, mass: float) -> Frame:
