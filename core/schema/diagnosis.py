@@ -213,6 +213,56 @@ class Gain:
     cross_validated_percent: tuple[Number, Number] | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class ModeChange:
+    """A mode of the structure as it is, and the same mode of the reference.
+
+    Arguments:
+        change_percent, std_percent: of the frequency; the deviations of both states count.
+        mac: of the two shapes, close modes turned; None where they cannot be compared.
+        shape_p: probability of as large a difference of the shapes, were it noise.
+    """
+
+    mode: int
+    reference_mode: int
+    reference_hz: Number
+    present_hz: Number
+    change_percent: Number
+    std_percent: Number
+    deviations: Number
+    mac: Number | None
+    shape_p: Number | None
+
+
+@dataclass(frozen=True, slots=True)
+class States:
+    """Whether two measurements of a structure differ, without a model.
+
+    Arguments:
+        verdict: ``differs`` where p < 0.001.
+        p: probability of as large a chi-square, were all differences noise.
+        chi2, count: of the differences, and how many data it has.
+        modes: that both states have.
+        lost, new: label and Hz of modes that only the reference, only the present state has,
+            within the band of both.
+        mass_change: of the weighed mass, and its deviation, kg; None where one was not weighed.
+    """
+
+    verdict: Literal["differs", "agrees"]
+    p: Number
+    chi2: Number
+    count: int
+    modes: tuple[ModeChange, ...]
+    lost: tuple[tuple[int, Number], ...] = ()
+    new: tuple[tuple[int, Number], ...] = ()
+    mass_change: tuple[Number, Number] | None = None
+
+    @property
+    def differs(self) -> bool:
+        """Tell whether the structure changed."""
+        return self.verdict == "differs"
+
+
 @dataclass(frozen=True, kw_only=True, slots=True, repr=False)
 class DiagnosisReport:
     """What is missing in a model, where, how sure, and what it gains: all that JSON has of it.
@@ -246,6 +296,7 @@ class DiagnosisReport:
             structure is taken for a beam model.
         like_a_beam: probability that it is one, but for ordinary scatter.
         scatter: whether what is left is as much as the stated deviations let expect.
+        states: how the measurement differs from the reference; None without one.
     """
 
     case: str = ""
@@ -272,3 +323,4 @@ class DiagnosisReport:
     like_a_beam: Number = 1.0
     gain_rms: Gain | None = None
     scatter: tuple[Scatter, ...] = ()
+    states: States | None = None
