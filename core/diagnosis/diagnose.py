@@ -49,6 +49,7 @@ from femubench.core.look.localisation import locate
 from femubench.core.look.look import look
 from femubench.core.look.modes import Seen
 from femubench.core.look.readings import look_at_band
+from femubench.core.look.states import compare_states
 from femubench.core.plugin.loader import list_effects, list_faults
 from femubench.core.roles import Effect, Fault
 from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning
@@ -131,7 +132,9 @@ def diagnose(
             posterior, leader = inquiry.examination.posterior, proof.leader
             decision = decide(posterior, proof.adequate, leader, proof.log_bayes, proof.confirmed)
             found = _written(repaired, inquiry, decision, proof, looks, begin)
-    return replace(found, notes=(*case.notes, *found.notes, *_conditions(effort)))
+    states = None if case.reference is None else compare_states(case.measurement, case.reference)
+    notes = (*case.notes, *found.notes, *_conditions(effort))
+    return replace(found, states=states, notes=notes)
 
 
 def _expected(case: Case) -> dict[Kind, Number]:
