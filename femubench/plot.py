@@ -15,6 +15,7 @@ from femubench.core.plot.diagnosis import (
     evidence as evidence,
     residual_dots as residual_dots,
     residuals as residuals,
+    state_changes as state_changes,
     strongest_places as strongest_places,
 )
 from femubench.core.plot.findings import changes as changes

@@ -81,11 +81,13 @@ class Items:
         entries: label, which may be empty, text, and what is said about it.
         whole: whether words wider than the screen stay whole, as commands must to be copied.
         look: in HTML ``tiles`` or ``parameters``, or a list that is styled by this word.
+        folded: as of a table.
     """
 
     entries: Sequence[tuple[str, ...]]
     whole: bool = False
     look: str = ""
+    folded: str = ""
 
 
 @dataclass(frozen=True)

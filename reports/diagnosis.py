@@ -11,7 +11,15 @@ from functools import partial
 from typing import Any
 
 from femubench import InputError
-from femubench.plot import MOST_ROWS, evidence, residual_dots, residuals, strongest_places, svg
+from femubench.plot import (
+    MOST_ROWS,
+    evidence,
+    residual_dots,
+    residuals,
+    state_changes,
+    strongest_places,
+    svg,
+)
 from femubench.reports import diagnosis_words as words
 from femubench.reports.blocks import (
     Block,
@@ -35,17 +43,18 @@ _LEAST = 0.005  # what two decimals show
 _WHEN = ("before", "after")
 _KINDS = {"frequency": "Frequencies", "shape": "Mode shapes, rms over the sensors"}
 _MAP, _SMALL = (4.8, 3.7), (3.4, 2.4)  # inch
+_ARROWS = "Arrows: from the reference to the present. Bands: ±2 standard deviations of both states."
 _EVIDENCE = "Thick lines and large dots: strong evidence. Numbers: the causes. "
 
 
 def diagnosis_text(data: Data) -> str:
     """Return a diagnosis as plain text of 80 columns at most."""
-    return to_terminal([Passage("", [_heading(data)]), *_sections(data)])
+    return to_terminal([Passage("", [*_lead(data), _heading(data)]), *_sections(data)])
 
 
 def diagnosis_markdown(data: Data) -> str:
     """Return a diagnosis in GitHub's Markdown."""
-    sections = [Passage("", [_heading(data)]), *_sections(data)]
+    sections = [Passage("", [*_lead(data), _heading(data)]), *_sections(data)]
     return to_markdown(sections, f"Diagnosis of {data['case']}")
 
 
@@ -57,6 +66,7 @@ def diagnosis_html(data: Data) -> str:
     return to_html(
         _sections(data, page=True),
         title=f"Diagnosis of {data['case']}: {data['verdict']}",
+        lead="".join(_lead(data)),
         heading=_heading(data),
         brand=f"Diagnosis of {data['case']}",
         foot=f"femubench {data.get('version') or ''}, {seconds}. The numbers are those of bench "
@@ -76,8 +86,13 @@ def _heading(data: Data) -> str:
     return data["sentence"] or f"The verdict on {data['case']} is {data['verdict']}."
 
 
+def _lead(data: Data) -> list[str]:
+    """Return what the two measurements alone say; nothing without a reference."""
+    return [words.states(data["states"])] if data.get("states") else []
+
+
 def _sections(data: Data, *, page: bool = False) -> list[Passage]:
-    """Return what a diagnosis says; of a page the verdict, causes and faults stand at the top."""
+    """Return what a diagnosis says; of a page the first passages and faults stand at the top."""
     verdict, base, reason = data["verdict"], data["base"], sentence(data["reason"])
     name = verdict if page else f"{data['case']}: {verdict}"
     said = Items([(name, f"{words.MEANINGS[verdict]}.")], look=f"verdict {verdict}")
@@ -92,8 +107,10 @@ def _sections(data: Data, *, page: bool = False) -> list[Passage]:
     gain_title = "How far off the model is" if verdict == "none" else "What it gains"
     textbook = [f"Taken at the textbook value: {', '.join(base)}."] if base else []
     found = (
-        Passage("", [said, Items(_tiles(data), look="tiles")], area="first"),
+        Passage("", [said], area="first"),
+        Passage("The two measurements", _states(data, page=page), area="first"),
         Passage(words.CAUSES.get(verdict, ""), [*_cards(data), *textbook], area="first"),
+        Passage("", [Items(_tiles(data), look="tiles"), *_error(data)], area="first"),
         Passage("", [_map(data)] if page else [], area="aside"),
         Passage(words.FAULTS, _cards(data, faults=True), area="aside"),
         Passage("The stated scatter does not fit what is left", [Items(warned)] * bool(warned),
@@ -124,8 +141,40 @@ def _tiles(data: Data) -> list[tuple[str, ...]]:
         said = f"{kind} frequency error, before → after"
         tiles.append((f"Error on {name}", f"{before} → {after}", said))
     tiles.append(("What is left", *words.adequacy(data)))
+    return tiles
+
+
+def _error(data: Data) -> list[Block]:
+    """Return the classes of model error, folded: they are many."""
     scales = ((f"{figure(r['scale'], 2)} {r['unit']}", r["class"]) for r in data["model_error"])
-    return [*tiles, *(("Model error", *scale) for scale in scales)]
+    tiles = [("Model error", *scale) for scale in scales]
+    return [Items(tiles, look="tiles", folded="Model error by classes")] if tiles else []
+
+
+def _states(data: Data, *, page: bool) -> list[Block]:
+    """Return the two measurements mode by mode, in a page as arrows too."""
+    states = data.get("states")
+    if not states or not states["modes"]:
+        return []
+    say = partial(figure, digits=6)
+    columns = {
+        "reference_mode": Column("reference\nmode", 9),
+        "reference_hz": Column("reference,\nHz", 9, say=say),
+        "mode": Column("present\nmode", 9),
+        "present_hz": Column("present,\nHz", 9, say=say),
+        "change_percent": Column("change, %", 9, say=partial(format_signed, decimals=2)),
+        "deviations": Column("deviations", 10, say=format_signed),
+        "mac": Column("MAC", 5, digits=2),
+    }
+    found = [*states["modes"]]
+    found += [{"reference_mode": m["mode"], "reference_hz": m["hz"]} for m in states["lost"]]
+    found += [{"mode": m["mode"], "present_hz": m["hz"]} for m in states["new"]]
+    rows = [[row.get(key) for key in columns] for row in found]
+    size = 4.4, 0.9 + 0.27 * min(len(rows), MOST_ROWS)
+    title = "Change of the frequencies from the reference to the present state"
+    drawn = _drawn(partial(state_changes, states), "states", title, _lead(data)[0], size)
+    table = Table([*columns.values()], rows, folded=f"The {len(rows)} modes in figures")
+    return [*([Row([Drawing("", _ARROWS, drawn)])] * page), table]
 
 
 def _cards(data: Data, *, faults: bool = False) -> list[Block]:

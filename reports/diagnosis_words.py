@@ -49,7 +49,43 @@ INDICATORS = {
 }
 _MOST_CHANGES, _MOST_PLACES = 8, 5
 _NOISE, _LIMIT = 0.05, 1e-3
+_NOTABLE, _MOST_MOVED = 3.0, 3  # deviations; modes
 _LARGEST_ODDS = 1e6
+
+
+def states(found: Data) -> str:
+    """Return in a sentence how two measurements differ, or that they agree."""
+    modes, p = found["modes"], figure(found["p"], 2)
+    if found["verdict"] == "agrees":
+        among = f"in {len(modes)} mode{'s' * (len(modes) != 1)}"
+        return f"The two measurements agree {among} (probability {p})."
+    rows = sorted(modes, key=lambda row: -abs(row["deviations"] or 0.0))
+    changed = [said for row in rows if (said := _changed(row))]
+    parts = [first_of(changed, _MOST_MOVED)] if changed else []
+    mass, std = found["mass_change"] or (0.0, 0.0)
+    if std and abs(mass / std) >= _NOTABLE:
+        parts.append(f"the weighed mass {_moved(mass, mass / std, 'kg')}")
+    for key, became in (("lost", "of the reference, {} Hz, is gone"), ("new", "at {} Hz is new")):
+        alone = [f"mode {m['mode']} {became.format(figure(m['hz']))}" for m in found[key]]
+        parts += [first_of(alone, 1)] if alone else []
+    parts = parts or [f"all data together (probability {p}), no mode alone"]
+    parts += ["the others agree"] if 0 < len(changed) < len(modes) else []
+    return f"The two measurements differ: {'; '.join(parts)}."
+
+
+def _changed(row: Data) -> str:
+    """Return what became of a mode; nothing where it hardly changed."""
+    parts = []
+    if abs(row["deviations"] or 0.0) >= _NOTABLE:
+        parts.append(_moved(row["change_percent"], row["deviations"], "%"))
+    if row["shape_p"] is not None and row["shape_p"] < _LIMIT:
+        parts.append(f"changed its shape (MAC {figure(row['mac'], 2)})")
+    return f"mode {row['mode']} {' and '.join(parts)}" if parts else ""
+
+
+def _moved(change: float, deviations: float, unit: str) -> str:
+    rose, times = ("rose" if change > 0.0 else "fell"), figure(abs(deviations), 2)
+    return f"{rose} by {figure(abs(change), 2)} {unit} ({times} deviations)"
 
 
 def percent(value: float | None) -> str:

@@ -17,6 +17,7 @@ def to_html(
     *,
     title: str,
     heading: str,
+    lead: str = "",
     brand: str = "",
     foot: str = "",
     scripts: Iterable[str] = (),
@@ -27,6 +28,7 @@ def to_html(
         sections: of level 2 and 3, in reading order.
         title: in the title bar.
         heading: at the top, the line that matters most.
+        lead: a line above it; may be empty.
         brand, foot: one line above all, and one below; may be empty.
         scripts: names of assets; the document reads without them.
     """
@@ -34,6 +36,7 @@ def to_html(
     return room.get_template("report.html").render(
         title=title,
         heading=heading,
+        lead=lead,
         brand=brand,
         foot=foot,
         sections=list(sections),

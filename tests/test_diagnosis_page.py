@@ -17,8 +17,16 @@ from femubench.core.cli.main import bench
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
 from femubench.core.drawing.places import find_wireframe
 from femubench.core.errors import InputError
-from femubench.core.schema.diagnosis import LocationRow, Rival
-from femubench.reports.diagnosis import diagnosis_html, diagnosis_text
+from femubench.core.schema.diagnosis import (
+    ErrorScale,
+    LocationRow,
+    LoneMode,
+    ModeChange,
+    Rival,
+    States,
+)
+from femubench.reports import diagnosis_words as words
+from femubench.reports.diagnosis import diagnosis_html, diagnosis_markdown, diagnosis_text
 from femubench.reports.diagnosis_words import odds, times
 
 VERDICTS = ("named", "none", "unknown", "ambiguous", "not-confirmed")
@@ -281,3 +289,43 @@ def test_odds() -> None:
     assert odds(10.0) == "150 to 1"
     assert odds(1e300) == "over a million to 1"
     assert odds(None) == "–"
+
+
+class TestStates:
+    LONE = LoneMode(4, 61.5)
+    MODES = (
+        ModeChange(3, 3, 44.0, 45.892, 4.3, 0.2, 21.0, 0.98, 0.4),
+        ModeChange(5, 6, 80.0, 80.1, 0.125, 0.2, 0.6, 0.57, 1e-9),
+        ModeChange(7, 7, 90.0, 90.0, 0.0, 0.2, 0.0, 1.0, 1.0),
+    )
+    DIFFERS = States("differs", 1e-99, 500.0, 11, MODES, (), (LONE,), (0.6, 0.05))
+
+    def test_what_differs_is_said_first_then_drawn_then_the_causes(self) -> None:
+        data = data_of(states=self.DIFFERS, model_error=(ErrorScale("joints", 0.05, ""),))
+        said = (
+            "The two measurements differ: mode 3 rose by 4.3 % (21 deviations), mode 5 changed its "
+            "shape (MAC 0.57); the weighed mass rose by 0.6 kg (12 deviations); mode 4 at 61.5 Hz "
+            "is new; the others agree."
+        )
+        text = page_of(data).text
+        first, second, third = text.split("named: ")[1].partition("What is missing")
+        assert text.index(said) < text.index("The T joints rotate")
+        for part in ("3: 44 Hz", "+4.3 %", "+0.12 %, MAC 0.57", "4: 61.5 Hz"):
+            assert part in first, part
+        assert second
+        assert third.index("Something is missing") < third.index("Model error by classes")
+        for report in (diagnosis_text(data), diagnosis_markdown(data)):
+            assert said in " ".join(report.split())
+            assert report.index("The two measurements differ") < report.index("The T joints")
+
+    def test_what_agrees_is_said_and_nothing_without_a_reference(self) -> None:
+        agrees = States("agrees", 0.43, 10.0, 11, self.MODES[2:])
+        assert diagnosis_text(data_of(states=agrees)).startswith(
+            "The two measurements agree in 1 mode (probability 0.43).\nThe T joints"
+        )
+        together = States("differs", 2e-4, 60.0, 30, self.MODES[2:])
+        assert "differ: all data together (probability 0.0002), no" in words.states(
+            data_of(states=together)["states"]
+        )
+        assert data_of()["states"] is None
+        assert "two measurements" not in page_of(data_of()).text

@@ -10,6 +10,7 @@ import pytest
 from femubench.core.fem.sensors import Sensors
 from femubench.core.look.states import compare_states
 from femubench.core.modal.measurement import Measurement
+from femubench.core.schema.diagnosis import LoneMode
 
 HZ = np.array([20.0, 31.0, 44.0, 60.0, 85.0, 120.0])
 SHARE = 0.02
@@ -99,7 +100,7 @@ def test_a_hardly_seen_mode_is_not_absurdly_sharp() -> None:
 def test_a_mode_that_is_missing_counts_in_the_common_band_and_proves_nothing_alone() -> None:
     reference = measured()
     inside = compare_states(reference.select([1, 2, 4, 5, 6]), reference)
-    assert (inside.lost, inside.new) == (((3, 44.0),), ())
+    assert (inside.lost, inside.new) == ((LoneMode(3, 44.0),), ())
     assert not inside.differs
     assert inside.chi2 == pytest.approx(-2.0 * np.log(0.05))
     assert compare_states(reference, reference.select([2, 3, 4])).new == ()

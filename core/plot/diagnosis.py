@@ -15,6 +15,7 @@ from femubench.core.diagnosis.serial import diagnosis_to_json
 from femubench.core.drawing.findings import Finding, causes_found
 from femubench.core.drawing.places import DrawnPlace, PlacedWireframe
 from femubench.core.errors import InputError
+from femubench.core.inference.settings import settings
 from femubench.core.plot.findings import draw_findings, lines_of
 from femubench.core.plot.structure import (
     View,
@@ -46,6 +47,7 @@ BAND = 2.0  # sigmas within which 19 of 20 data of pure noise lie
 MOST_ROWS = 60
 _PLAIN = 8.0  # up to here the axis is the same everywhere
 _FARTHEST = 1e12
+_ALONE = {"lost": "gone", "new": "new"}
 _LEVELS = 5
 _MOST_SPOTS, _LEAST = 14, 0.005  # what two decimals show
 
@@ -183,19 +185,65 @@ def residuals(
             markeredgewidth=1.6 if mark == "o" else 0.6, label=name, **look,
         )  # fmt: skip
     _residual_axis(ax, dots, one_sided)
-    ax.set_yticks(list(rows), [name_of(dot.name, 24) for dot in dots])
-    ax.set_ylim(len(dots) - 0.4, -0.6)
-    right = ax.secondary_yaxis("right")
-    right.set_yticks(list(rows), [dot.text for dot in dots])
-    for side in (ax, right):
-        side.tick_params(axis="y", length=0)
-        side.spines[:].set_visible(False)
+    _two_sided(ax, [name_of(dot.name, 24) for dot in dots], [dot.text for dot in dots])
     ax.set_xlabel("standard deviations of the measurement")
     ax.annotate(
         "before → after", (1.0, 1.0), xycoords="axes fraction", xytext=(4.0, 3.0),
         textcoords="offset points", fontsize=8.5, color=SOFT,
     )  # fmt: skip
     return ax
+
+
+def state_changes(states: Data, *, ax: Axes | None = None) -> Axes:
+    """Draw how the frequency of each mode changed, as arrows from the reference to the present.
+
+    Two standard deviations of both states are shaded; a mode that only one state has is a cross.
+    At most 60 modes are drawn.
+
+    Arguments:
+        states: of the JSON of a diagnosis with a reference.
+        ax: to draw on; None for axes of a new figure.
+
+    Examples:
+        >>> changes = {"change_percent": 4.3, "std_percent": 0.2, "deviations": 21.0}
+        >>> row = {"mode": 3, "reference_hz": 44.0, "mac": 0.98, "shape_p": 0.4, **changes}
+        >>> plot.state_changes({"modes": [row], "lost": [], "new": []}).get_xlabel()
+        'change of the frequency, %'
+    """
+    rows = states["modes"][:MOST_ROWS]
+    alone = [(m, word) for key, word in _ALONE.items() for m in states[key]]
+    alone = alone[: MOST_ROWS - len(rows)]
+    ax = own_axes(ax, (4.4, 0.9 + 0.27 * (len(rows) + len(alone))))
+    left, right = [], []
+    for k, row in enumerate(rows):
+        left.append(f"{row['mode']}: {row['reference_hz'] or math.nan:.4g} Hz")
+        change, std = (row[key] or 0.0 for key in ("change_percent", "std_percent"))
+        ax.barh(k, 2.0 * BAND * std, left=-BAND * std, height=0.8, color=COLOURS["band"])
+        ax.plot([0.0, change], [k, k], color=AFTER, linewidth=2.0)
+        ax.plot(change, k, marker=">" if change > 0.0 else "<", markersize=6.0, color=AFTER)
+        turned = row["shape_p"] is not None and row["shape_p"] < settings.noise_p
+        right.append(f"{change:+.2g} %" + f", MAC {row['mac'] or 0.0:.2f}" * turned)
+    for k, (row, word) in enumerate(alone, len(rows)):
+        left.append(f"{row['mode']}: {row['hz'] or math.nan:.4g} Hz")
+        ax.plot(0.0, k, marker="x", markersize=7.0, markeredgewidth=2.0, color=BEFORE)
+        right.append(word)
+    ax.axvline(0.0, color=SOFT, linewidth=0.9)
+    ax.margins(x=0.08)
+    _two_sided(ax, left, right)
+    ax.set_xlabel("change of the frequency, %")
+    return ax
+
+
+def _two_sided(ax: Axes, left: Sequence[str], right: Sequence[str]) -> None:
+    """Write at both sides of rows, the first one above."""
+    rows = list(range(len(left)))
+    ax.set_yticks(rows, left)
+    ax.set_ylim(len(rows) - 0.4, -0.6)
+    other = ax.secondary_yaxis("right")
+    other.set_yticks(rows, right)
+    for side in (ax, other):
+        side.tick_params(axis="y", length=0)
+        side.spines[:].set_visible(False)
 
 
 def _residual_axis(ax: Axes, dots: Sequence[ResidualDot], one_sided: bool) -> None:

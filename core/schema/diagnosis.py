@@ -252,6 +252,14 @@ class ModeChange:
 
 
 @dataclass(frozen=True, slots=True)
+class LoneMode:
+    """A mode, by its label, that only one of two measurements has."""
+
+    mode: int
+    hz: Number
+
+
+@dataclass(frozen=True, slots=True)
 class States:
     """Whether two measurements of a structure differ, without a model.
 
@@ -260,8 +268,7 @@ class States:
         p: probability of as large a chi-square, were all differences noise.
         chi2, count: of the differences, and how many data it has.
         modes: that both states have.
-        lost, new: label and Hz of modes that only the reference, only the present state has,
-            within the band of both.
+        lost, new: modes that only the reference, only the present state has, in the band of both.
         mass_change: of the weighed mass, and its deviation, kg; None where one was not weighed.
     """
 
@@ -270,8 +277,8 @@ class States:
     chi2: Number
     count: int
     modes: tuple[ModeChange, ...]
-    lost: tuple[tuple[int, Number], ...] = ()
-    new: tuple[tuple[int, Number], ...] = ()
+    lost: tuple[LoneMode, ...] = ()
+    new: tuple[LoneMode, ...] = ()
     mass_change: tuple[Number, Number] | None = None
 
     @property
