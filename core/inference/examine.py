@@ -24,7 +24,7 @@ from femubench.core.fit.mesh_error import mesh_bias
 from femubench.core.fit.modal_fit import Fit, Problem, State, fit, log_evidence, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
-from femubench.core.fit.static_response import Basis, LargeProblem, place_data
+from femubench.core.fit.static_response import Basis, place_data
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.model_error import (
     Fitted,
@@ -263,7 +263,7 @@ def examine(
         if width > 0.0:
             error = model_error_of(problem, basis, before, width, log(1.0 - beam))
             with effort.scope():
-                explanations = search_explanations(problem, error, known, pairs, effort, before)
+                explanations = search_explanations(problem, error, known, pairs, effort)
         own = replace(problem, noise=beam_noise(basis, slopes, before, tolerance, log(beam)))
         slopes = slopes[: len(measurement)].copy()  # those of shapes fill the memory
         floor = max((e.log_weight for e in explanations), default=-np.inf) - settings.lag
@@ -322,12 +322,7 @@ def before_of(problem: Problem, reference: Measurement) -> State:
 
 
 def search_explanations(
-    problem: Problem,
-    error: Inadequacy,
-    effects: Sequence[Effect],
-    pairs: bool,
-    effort: Effort,
-    before: State | None = None,
+    problem: Problem, error: Inadequacy, effects: Sequence[Effect], pairs: bool, effort: Effort
 ) -> list[Explanation]:
     """Return explanations under a model error, each with scales of its own where it matters.
 
@@ -335,8 +330,6 @@ def search_explanations(
     sought with its own.
     """
     nothing = state_at(problem, (), np.zeros(0))
-
-    measured = None if before is None else measured_base(nothing, before)
 
     def sought(scales: Fitted, pairs: bool) -> list[Explanation]:
         own = replace(problem, noise=error.noise(scales))
@@ -363,57 +356,9 @@ def search_explanations(
     # One cause and its own error may do what otherwise takes a second one.
     few = [i for i, e in enumerate(ranked) if len(e.parts) < 2]
     near = {*close[: settings.leading], *few[: settings.leading]}
-    found = [
+    return [
         with_scales(error, e, scales, nothing) if i in near else e for i, e in enumerate(ranked)
     ]
-    if measured is None:
-        return found
-    start = state_at(measured, (), np.zeros(0))
-    bases = replace(error, log_prior=error.log_prior + log(settings.prior_measured_base))
-    return [*found, *(on_measured_base(bases, found[i], scales, start) for i in sorted(near))]
-
-
-def measured_base(nothing: State, before: State) -> Problem | None:
-    """Return the data in coordinates whose modes are those measured on the structure as it was.
-
-    What a change does to a mode depends on the mode, and the reference shows it where a drawing
-    errs: its frequencies and shapes take the place of the model's own. Nothing added leaves what it
-    leaves on the model as drawn. None of a large model, whose coordinates are no modes.
-
-    Arguments:
-        nothing, before: the model as drawn, compared with the data and with the reference.
-    """
-    problem = nothing.problem
-    if isinstance(problem, LargeProblem):
-        return None
-    space, data = problem.space, before.problem.data
-    values, readings = space.eigenvalues.copy(), space.readings.copy()
-    hertz, _ = before.predicted
-    for j, partner in enumerate(before.partner):
-        own = int(np.abs(before.vectors[:, partner]).argmax())
-        turned = abs(before.vectors[own, partner]) < settings.alike_readings
-        if turned or hertz[0, partner] <= space.zero:
-            continue
-        values[own] *= (data.measurement.frequencies[j] / hertz[0, partner]) ** 2
-        square, shape = np.square(data.weight[:, j]), data.shapes[:, j]
-        if square.any():
-            size = (square * shape) @ readings[:, own] / ((square * shape) @ shape)
-            readings[:, own] = np.where(square > 0.0, size * shape, readings[:, own])
-    moved = replace(problem, space=replace(space, eigenvalues=values, readings=readings))
-    offset = nothing.raw - state_at(moved, (), np.zeros(0)).raw
-    return replace(moved, offset=offset)
-
-
-def on_measured_base(
-    error: Inadequacy, explanation: Explanation, near: Fitted, nothing: State
-) -> Explanation:
-    """Return an explanation fitted in coordinates of `measured_base`, where `nothing` is too."""
-    state = explanation.fit.state
-    offset = state.problem.offset + nothing.problem.offset
-    problem = replace(nothing.problem, noise=state.problem.noise, offset=offset)
-    found = fit(problem, state.parts, state.x)
-    moved = explanation if found is None else replace(explanation, fit=found)
-    return with_scales(error, moved, near, nothing)
 
 
 def _causes(explanation: Explanation) -> tuple[object, ...]:

@@ -117,9 +117,6 @@ class Settings:
     error_scale_range: tuple[float, float] = _prior(
         (0.01, 10.0), "of the width", "smaller is nothing, larger is no beam"
     )
-    prior_measured_base: float = _prior(
-        1.0, "odds", "changes follow from the measured healthy modes rather than from the drawing's"
-    )
     own_error_of_change: float = _prior(
         0.3, "of the change", "an effect at a place is an idealisation: width of its own error"
     )
