@@ -1,9 +1,8 @@
 """Elements with springs at their ends, the rotations of the springs condensed.
 
-An element of stiffness k hangs on its node by a rigid arm (u = A q) and a rotational spring kappa,
-whose own rotation d follows the node statically: with B the rotations of its end,
-(B'kB + kappa) d = -B'kA q. The arm keeps the mass of the length that it takes from the member. In
-the eigenvectors of B'kB = V diag(r) V' the condensed stiffness is
+An element of stiffness k hangs on its node by a rigid massless arm (u = A q) and a rotational
+spring kappa, whose own rotation d follows the node statically: with B the rotations of its end,
+(B'kB + kappa) d = -B'kA q. In the eigenvectors of B'kB = V diag(r) V' the condensed stiffness is
 
     A'kA - sum_i tau_i / r_i (A'kB v_i)(A'kB v_i)' ,   tau_i = r_i / (r_i + kappa)
 
@@ -15,7 +14,7 @@ out (it is there with eccentric mass centres or coupled sections alone).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
@@ -27,7 +26,7 @@ from femubench.core.change.interpolation import barycentric, chebyshev_nodes
 from femubench.core.change.terms import ElementOperator, RowOperator, Term
 from femubench.core.effect.places import member_length
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices
-from femubench.core.fem.frame import Frame, Place, PointMass
+from femubench.core.fem.frame import Frame
 from femubench.core.fem.joints import available_length, half_depth, spring_ends
 from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.model import Model
@@ -40,8 +39,6 @@ _MOST = 24
 _NODES = 20
 _SAME_RATE = 1e-10
 _ARMS = 6
-# Two points that have the mass of an arm, and its first and second moments (Gauss).
-_ON_ARM = (0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0))
 
 
 def rate_nodes(rates: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -161,18 +158,7 @@ def soften_ends(
     """
     structure = Structure.build(frame)
     arms = {end: arm * end_arm(structure, end) for end in stiffness}
-    masses = [mass for end, length in arms.items() for mass in _arm_masses(structure, end, length)]
-    return spring_ends(replace(frame, masses=(*frame.masses, *masses)), stiffness, arms)
-
-
-def _arm_masses(structure: Structure, end: str, arm: float) -> Iterator[PointMass]:
-    """Yield the mass that an arm takes from its member, as points on it."""
-    if arm > 0.0:
-        (element, side), joint = structure.element_ends[end], end.rpartition("@")[2]
-        axis = structure.mesh.axes[element, 0] * (1.0, -1.0)[side]
-        share = 0.5 * arm * float(structure.properties.rhoA[element])
-        for x in _ON_ARM:
-            yield PointMass(Place(joint=joint), share, tuple(x * arm * axis))
+    return spring_ends(frame, stiffness, arms)
 
 
 def free_arm_change(
@@ -307,21 +293,11 @@ class _Elements:
         plain_k = once_for(model, "element stiffness", lambda: stiffness_matrices(p))
         plain_m = once_for(model, "element mass", lambda: mass_matrices(p))
         stiffness = turned @ self.stiffness @ self.motion - plain_k[self.rows]
-        mass = turned @ self.mass @ self.motion + self._on_arms(p.rhoA) - plain_m[self.rows]
+        mass = turned @ self.mass @ self.motion - plain_m[self.rows]
         return [
             Term("stiffness", ElementOperator(structure, self.rows, stiffness)),
             Term("mass", ElementOperator(structure, self.rows, mass)),
         ]
-
-    def _on_arms(self, density: FloatArray) -> FloatArray:
-        """Return the mass matrices of the arms by themselves, (k, 12, 12)."""
-        mass = np.zeros_like(self.mass)
-        for side, sign in ((0, 1.0), (1, -1.0)):
-            own = slice(6 * side, 6 * side + 6)
-            for i, (row, arm) in enumerate(zip(self.rows, self.arms[:, side], strict=True)):
-                points = [rigid_arm(np.array([sign * x * arm, 0.0, 0.0]))[:3] for x in _ON_ARM]
-                mass[i, own, own] = 0.5 * arm * density[row] * sum(t.T @ t for t in points)
-        return mass
 
     def items(self, slots: Mapping[int, Sequence[int]]) -> list[_Item]:
         """Return what springs at some local dofs of elements do, by rate."""
