@@ -165,9 +165,10 @@ def fit_modes(shaken: Shaken, response: Complex, start: Array) -> tuple[float, A
     result = optimize.least_squares(
         left, values, bounds=(values - spread, values + spread), xtol=1e-12, ftol=1e-12
     )
-    residues = np.linalg.lstsq(basis(result.x), target, rcond=None)[0][:many]
+    residues = np.asarray(np.linalg.lstsq(basis(result.x), target, rcond=None)[0][:many])
     order = np.argsort(result.x[:many])
-    return float(result.cost), np.exp(result.x[:many])[order], residues[order]
+    omega: Array = np.exp(result.x[:many])[order]
+    return float(result.cost), omega, residues[order]
 
 
 def identify(frame: Frame, bumper: Bumper, used: int, seed: int) -> tuple[Array, Array]:

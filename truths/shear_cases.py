@@ -141,7 +141,7 @@ def draws() -> list[Draw]:
 
     The half follows from the name: its number is the first one that gives the half of its frame.
     """
-    found = []
+    found: list[Draw] = []
     for i, plan in enumerate(plans()):
         for word in STATES[i % len(STATES)]:
             seed = SEED + len(found)

@@ -137,7 +137,7 @@ def floor_row(count: int, hangs: bool, first: int, second: int) -> Array:
     return row
 
 
-def _matrices(frame: Frame) -> tuple[Array, Array, Array]:
+def _matrices(frame: Frame) -> tuple[Array, Array, npt.NDArray[np.int64]]:
     """Return mass and stiffness, and which of their rows is the motion of each floor.
 
     Source: Euler-Bernoulli element with consistent mass, Przemieniecki 1968, chapters 5 and 11.
@@ -181,7 +181,7 @@ def modes(frame: Frame) -> tuple[Array, Array]:
     squared, vectors = linalg.eigh(stiffness, mass, subset_by_index=(0, len(rows) - 1))
     if frame.hangs and not any(-1 in ends[:2] for ends in frame.springs):
         squared[0] = 0.0
-    return np.sqrt(squared), vectors[rows].T
+    return np.asarray(np.sqrt(squared)), np.asarray(vectors[rows].T)
 
 
 def readings(plan: Plan, shapes: Array) -> Array:
@@ -191,19 +191,16 @@ def readings(plan: Plan, shapes: Array) -> Array:
 
 def plans() -> Sequence[Plan]:
     """Return the frames: the first five of development, the others held."""
-    rows = (
-        ("free-3", 3, True, 2, 0, (1, 2, 3), True),
-        ("fixed-5", 5, False, 3, 0, (1, 3, 5)),
+    kinds: tuple[tuple[str, int, bool, int, int, tuple[int, ...], bool, bool], ...] = (
+        ("free-3", 3, True, 2, 0, (1, 2, 3), True, False),
+        ("fixed-5", 5, False, 3, 0, (1, 3, 5), False, False),
         ("free-4", 4, True, 3, 0, (0, 1, 2, 3, 4), False, True),
-        ("fixed-8", 8, False, 3, 1, (2, 4, 6, 7, 8)),
-        ("fixed-3", 3, False, 2, 0, (1, 2, 3)),
-        ("free-3-short", 3, True, 2, 0, (0, 2, 3)),
-        ("fixed-6", 6, False, 3, 0, (1, 2, 3, 4, 5, 6)),
+        ("fixed-8", 8, False, 3, 1, (2, 4, 6, 7, 8), False, False),
+        ("fixed-3", 3, False, 2, 0, (1, 2, 3), False, False),
+        ("free-3-short", 3, True, 2, 0, (0, 2, 3), False, False),
+        ("fixed-6", 6, False, 3, 0, (1, 2, 3, 4, 5, 6), False, False),
         ("free-5", 5, True, 3, 1, (0, 2, 4, 5), True, True),
-        ("fixed-7", 7, False, 4, 0, (1, 3, 5, 7)),
-        ("fixed-4", 4, False, 2, 0, (2, 4)),
+        ("fixed-7", 7, False, 4, 0, (1, 3, 5, 7), False, False),
+        ("fixed-4", 4, False, 2, 0, (2, 4), False, False),
     )
-    return [
-        Plan(*row[:6], 52_000 + i, *row[6:])  # type: ignore[arg-type]
-        for i, row in enumerate(rows)
-    ]
+    return [Plan(*row[:6], 52_000 + i, *row[6:]) for i, row in enumerate(kinds)]
