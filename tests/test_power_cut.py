@@ -20,7 +20,7 @@ from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block, JobResult
 
 RUN, JOBS = "20260101T000000Z-000000", 30
-CUTS, FEW = 200, 20  # all of them in `make nightly`
+CUTS, FEW = 200, 8  # all of them in `make nightly`
 META = {"run": RUN, "seeds": [*range(JOBS)], "cases": {"corner": {}}, "strategies": ["a"]}
 PAGE = 512  # bytes that a disk writes whole
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from samples import one_of_each
 
 from femubench import read_case
 from femubench.core.challenge.truth_file import read_truth
@@ -51,7 +52,11 @@ def test_a_clean_case_is_clean() -> None:
             assert truth.chi2 is not None
 
 
-@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+@pytest.mark.parametrize(
+    "folder",
+    one_of_each(FOLDERS, lambda folder: read_truth(folder).structure),
+    ids=lambda folder: folder.name,
+)
 def test_a_defect_is_a_case(folder: Path, tmp_path: Path) -> None:
     """Both states have the same sensors, other scatter, and a case can be read of them."""
     pose(folder, tmp_path / "case")

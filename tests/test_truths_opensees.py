@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from samples import one_of_each
 
 from femubench import read_case
 from femubench.core.challenge.truth_file import read_truth
@@ -65,7 +66,11 @@ def test_structures_are_as_drawn(name: str) -> None:
     assert len(case.held_out) == plan.held_out
 
 
-@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+@pytest.mark.parametrize(
+    "folder",
+    one_of_each(FOLDERS, lambda folder: DRAWS[folder.name].plan.name),
+    ids=lambda folder: folder.name,
+)
 def test_a_truth_is_a_case(folder: Path, tmp_path: Path) -> None:
     truth = pose(folder, tmp_path / "case", reference=True, suite=STRUCTURES)
     case = read_case(tmp_path / "case")
