@@ -179,8 +179,8 @@ class GuardedChild:
         """
         ended = not self.alive
         self._push()
-        for end in ("output", "answers"):
-            self._take(end)
+        for name in ("output", "answers"):
+            self._take(name)
         limits, now = self.limits, time.monotonic()
         end = partial(Ending, seconds=now - self._begun if self._ready else 0.0)
         if 0 < self._length <= min(len(self._received), limits.answer + LENGTH_BYTES):
