@@ -203,4 +203,4 @@ def plans() -> Sequence[Plan]:
         ("fixed-7", 7, False, 4, 0, (1, 3, 5, 7), False, False),
         ("fixed-4", 4, False, 2, 0, (2, 4), False, False),
     )
-    return [Plan(*row[:6], 52_000 + i, *row[6:]) for i, row in enumerate(kinds)]  # type: ignore[call-arg]
+    return [Plan(*row[:6], 52_000 + i, *row[6:]) for i, row in enumerate(kinds)]

@@ -38,17 +38,6 @@ def scatter_of(state: State, kind: Kind = "all") -> Scatter | None:
     return Scatter(kind, chi2, dof, float(chdtr(dof, chi2)), float(more), factor)
 
 
-def overstatement(state: State, kind: Kind = "all") -> float:
-    """Return by what factor stated deviations seem too large; 1 where chance may have done it.
-
-    Arguments:
-        state: after the fit.
-        kind: of the data.
-    """
-    found = scatter_of(state, kind)
-    return 1.0 if found is None or found.less_p >= settings.noise_p else found.factor
-
-
 def scatter_rows(state: State) -> tuple[Scatter, ...]:
     """Return every kind of data, with a warning on what chance hardly leaves.
 
