@@ -134,7 +134,7 @@ def _tiles(data: Data) -> list[tuple[str, ...]]:
     sure = nothing if none or nothing is None else 1.0 - nothing
     found = "Nothing is missing" if none else "Something is missing"
     tiles: list[tuple[str, ...]] = [(found, chance(sure), "probability, before any name is given")]
-    stated = [(key, name) for key, name in words.GAINS.items() if data["gain"][key]]
+    stated = [(key, name) for key, name in words.GAINS.items() if data["gain"].get(key)]
     for key, name in stated[:1] if not none else ():
         kind, pairs = next(iter(_errors(data).items()))
         before, after = map(words.percent, pairs[key])

@@ -40,6 +40,7 @@ GAINS = {
     "modified_percent": "modified structure",
     "cross_validated_percent": "used modes, each left out in turn",
     "used_percent": "used modes",
+    "change_percent": "change since the reference",
 }
 INDICATORS = {
     "force-residual": "forces that the measured shapes would need in the model",
@@ -69,7 +70,8 @@ def states(found: Data) -> str:
         alone = [f"mode {m['mode']} {became.format(figure(m['hz']))}" for m in found[key]]
         parts += [first_of(alone, 1)] if alone else []
     parts = parts or [f"all data together (probability {p}), no mode alone"]
-    parts += ["the others agree"] if 0 < len(changed) < len(modes) else []
+    rest = "the other agrees" if len(modes) == len(changed) + 1 else "the others agree"
+    parts += [rest] if 0 < len(changed) < len(modes) else []
     return f"The two measurements differ: {'; '.join(parts)}."
 
 

@@ -78,6 +78,7 @@ class TestJson:
             "held_out_percent": [3.4, 0.75],
             "modified_percent": None,
             "cross_validated_percent": None,
+            "change_percent": None,
         }
         assert data["adequacy_p"] == 0.614
         assert data["looks"][0]["changes"] == [
@@ -167,10 +168,10 @@ class TestTerminal:
         text = words(toys.made(gain_rms=Gain((5.5, 0.25), (3.6, 0.8))))
         parts = [
             "toy: named: one explanation stands alone",
-            "Something is missing: > 99.9 %, probability, before any name is given",
             "joint-rotation at type:T: probability 94.2 %; the joints rotate; "
             "bending 31000 ± 1200 N m/rad; torsion 20500 N m/rad",
             "Taken at the textbook value: shear-deformation, rotary-inertia.",
+            "Something is missing: > 99.9 %, probability, before any name is given",
             "weigh the structure 140 over a million to 1",
             "rms rms median median frequency error before after before after",
             "used modes 5.5 % 0.25 % 4.25 % 0.125 % 22 times smaller "

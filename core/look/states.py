@@ -17,9 +17,6 @@ from femubench.core.modal.pairing import LEAST_SENSORS, Pairing, pair_modes
 from femubench.core.schema.diagnosis import LoneMode, ModeChange, States
 from femubench.core.typing import FloatArray, IntArray
 
-_LEAST_P = 1e-300  # numbers end near it
-_SETTLED = 3  # reweighted fits of a scale: it changes the deviations by little
-
 
 @dataclass(frozen=True)
 class _State:
@@ -146,12 +143,12 @@ def _shape_p(now: _State, mode: int, before: _State, columns: IntArray) -> float
         return None
     shape, space, own, others = shape[known], space[known], own[known], others[known]
     variance = own
-    for _ in range(_SETTLED):
+    for _ in range(settings.few_steps):
         root = np.sqrt(variance)
         scale = np.linalg.lstsq(space / root[:, None], shape / root, rcond=None)[0]
         variance = own + others @ np.square(scale)
     chi2 = np.square(shape - space @ scale) / variance
-    return max(float(chdtrc(degrees, chi2.sum())), _LEAST_P)
+    return max(float(chdtrc(degrees, chi2.sum())), float(np.finfo(float).tiny))
 
 
 def _filled(shares: FloatArray, usual: float) -> FloatArray:
