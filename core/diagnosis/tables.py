@@ -11,7 +11,7 @@ from femubench.core.change.hypothesis import Hypothesis
 from femubench.core.diagnosis.symmetry import mirror_places
 from femubench.core.diagnosis.verdict import angle_between, credible, places_of
 from femubench.core.display import count_noun
-from femubench.core.fit.modal_fit import State
+from femubench.core.fit.modal_fit import State, state_at
 from femubench.core.inference.examine import Examination
 from femubench.core.inference.posterior import Explanation, Posterior, fits_better
 from femubench.core.inference.search import Found
@@ -168,7 +168,7 @@ def list_causes(
     posterior = examination.posterior
     spread = find_spread(posterior, explanation)
     own = examination.own_error(explanation.fit.state)
-    sizes = _sizes(explanation, spread)
+    passengers = _passengers(explanation)
     causes = causes_in(explanation, 1.0, posterior.earned, spread=spread, own=own)
     first = len(causes) - len(explanation.parts)
     tied = _tied(posterior, explanation)
@@ -183,8 +183,8 @@ def list_causes(
             if part.hypothesis.name == name
         }
         others = [place for place in shares if place in alike_at and place != cause.place]
-        if k >= first and sizes[k - first] < min(settings.notable_deviations, max(sizes)):
-            continue  # a passenger, which may as well be nothing
+        if k >= first and passengers[k - first]:
+            continue
         found.append(
             replace(
                 cause,
@@ -197,11 +197,21 @@ def list_causes(
     return found
 
 
-def _sizes(explanation: Explanation, spread: FloatArray) -> list[float]:
-    """Return by how many deviations each cause differs from none, at its farthest coordinate."""
-    away = np.abs(explanation.fit.state.x) / np.maximum(spread, settings.negligible)
-    counts = [len(part.hypothesis.parameters) for part in explanation.parts]
-    return [float(own.max(initial=0.0)) for own in np.split(away, np.cumsum(counts)[:-1])]
+def _passengers(explanation: Explanation) -> list[bool]:
+    """Return which causes may as well be left out, the rest as it is; never the only one."""
+    state, parts = explanation.fit.state, explanation.parts
+    if len(parts) < 2:
+        return [False] * len(parts)
+    ends = np.cumsum([len(part.hypothesis.parameters) for part in parts])
+    pieces = np.split(state.x, ends[:-1])
+    found = []
+    for k in range(len(parts)):
+        rest = [x for j, x in enumerate(pieces) if j != k]
+        without = state_at(
+            state.problem, (*parts[:k], *parts[k + 1 :]), np.concatenate(rest or [[]])
+        )
+        found.append(without.chi2 - state.chi2 < settings.notable_deviations**2)
+    return found if not all(found) else [False] * len(parts)
 
 
 def _tied(posterior: Posterior, best: Explanation) -> list[Explanation]:
