@@ -16,7 +16,10 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import harness_toys as toys
 import pytest
+import scanner
+import zoo
 from click.testing import CliRunner
 
 import femubench
@@ -31,11 +34,6 @@ from femubench.core.run import cluster_worker
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.runner import run_jobs
 from femubench.core.schema.results import JobResult
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
-import scanner
-import zoo
 
 needed = pytest.mark.skipif(sandbox.missing() is not None, reason=f"{sandbox.missing()}")
 
