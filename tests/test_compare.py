@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import math
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
+import harness_toys as toys
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from run_edits import called, failed, moved, renamed, scaled
 from scipy.stats import wilcoxon
 
 from femubench.core.cli.main import bench
@@ -22,10 +23,6 @@ from femubench.core.schema.records import run_from_json, run_to_json
 from femubench.core.score.comparison import METRICS, Against, Threshold, compare_runs
 from femubench.core.score.statistics import evidence_of, holm
 from femubench.reports.compare_page import comparison_html, comparison_markdown, comparison_text
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
-from run_edits import called, failed, moved, renamed, scaled
 
 Data = dict[str, Any]
 HOSTILE = "<script>alert(1)</script>\x1b[2J|`x`"

@@ -12,6 +12,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+import harness_toys as toys
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -30,9 +31,6 @@ from femubench.core.run.judging import judge_outcome
 from femubench.core.run.plain_frame import frame_from_plain, frame_to_plain
 from femubench.core.schema.records import result_to_json
 from femubench.core.score.scoring import reference_of
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
 
 CASE = toys.tiny_case()
 NOMINAL = CASE.model

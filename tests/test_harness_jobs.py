@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import pickle
-import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
+import harness_toys as toys
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -21,9 +20,6 @@ from femubench.core.run.judging import run_strategy
 from femubench.core.run.model_checks import check_model
 from femubench.core.typing import SparseArray
 from femubench.core.update.strategy import Strategy
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
 
 CASE = toys.tiny_case()
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Never
 
+import harness_toys as toys
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
@@ -27,11 +27,6 @@ from femubench.core.schema.results import JobResult
 from femubench.core.schema.run_options import RunOptions
 from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.scoring import reference_of, score_model
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-from typing import Never
-
-import harness_toys as toys
 
 FOLDER, NAME = "/nowhere/zq104729104729", "zq271828182845"
 

@@ -16,8 +16,14 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+<<<<<<< HEAD
 import psutil
+=======
+import harness_toys as toys
+>>>>>>> ci
 import pytest
+import scanner
+import zoo
 from click.testing import CliRunner
 
 import femubench
@@ -32,11 +38,6 @@ from femubench.core.run import cluster_worker
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.runner import run_jobs
 from femubench.core.schema.results import JobResult
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
-import scanner
-import zoo
 
 needed = pytest.mark.skipif(sandbox.missing() is not None, reason=f"{sandbox.missing()}")
 

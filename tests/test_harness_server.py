@@ -9,16 +9,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import harness_toys as toys
 import pytest
+from loaded_modules import loaded, variables
 
 from femubench.core.child import server, workers
 from femubench.core.child.guarded_child import Ending
 from femubench.core.child.limits import Limits
 from femubench.core.run.preload import own_plugins
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
-from loaded_modules import loaded, variables
 
 
 def answer(pool: workers.Workers[int], ask: Callable[[Any], bytes] = loaded) -> list[str]:

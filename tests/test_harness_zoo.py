@@ -6,14 +6,15 @@ import json
 import os
 import signal
 import socket
-import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import harness_toys as toys
 import pytest
+import zoo
 
 from femubench.core.child import sandbox, server, workers
 from femubench.core.child.guarded_child import Ending
@@ -25,10 +26,6 @@ from femubench.core.run.schedule import Workload, _Bench
 from femubench.core.run.slots import Slot, Start
 from femubench.core.schema.records import result_from_json, result_to_json
 from femubench.core.schema.results import JobResult, Run
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
-import zoo
 
 pytestmark = pytest.mark.slow(20)
 

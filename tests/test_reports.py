@@ -7,11 +7,10 @@ import io
 import json
 import math
 import re
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
+from synthetic_run import synthetic_run
 
 from femubench.core.library.report import render_report
 from femubench.core.plugin.loader import load_plugins
@@ -33,9 +32,6 @@ from femubench.results import (
     structures_of,
     tell_apart,
 )
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-from synthetic_run import synthetic_run
 
 NOMINAL = {"used": 10.0, "higher": 8.0, "modified": 60.0}
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-import sys
 from dataclasses import replace
 from html.parser import HTMLParser
-from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+import reproduction_toys as toys
 
 from femubench.reports.blocks import Drawing, Items, Passage
 from femubench.reports.digits import Digits, off
@@ -23,9 +22,6 @@ from femubench.reports.reproduction_page import reproduction_html
 from femubench.reports.svg import embed_svg
 from femubench.reports.terminal import to_terminal
 from femubench.reproduction import Ground, Page, Study
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import reproduction_toys as toys
 
 STUDIES = (toys.study("frame"), toys.study("hframe"))
 DRAWINGS = {figure.name: toys.drawn(figure) for study in STUDIES for figure in study.figures}

@@ -6,13 +6,12 @@ import json
 import os
 import pickle
 import signal
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
+import harness_toys as toys
 import numpy as np
 import psutil
 import pytest
@@ -28,9 +27,6 @@ from femubench.core.run.judging import Dossier
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.standing_judge import Judges
 from femubench.core.score.scoring import reference_of
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-import harness_toys as toys
 
 CASE = toys.tiny_case()
 PICKLED = pickle.dumps((CASE, reference_of(CASE)))

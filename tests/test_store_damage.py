@@ -17,6 +17,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
+from store_edits import change_data, edit
 
 from femubench.core.cli.main import bench
 from femubench.core.errors import InputError
@@ -26,9 +27,6 @@ from femubench.core.run.upkeep import find_store_faults
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.records import encode_result, run_from_json
 from femubench.core.schema.results import Block, JobResult, Run
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-from store_edits import change_data, edit
 
 FLIPS = 300
 RUN = "20260101T000000Z-000000"

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from harness_toys import tiny_case
 from numpy.testing import assert_allclose
+from study_toys import BROKEN, Spy
 
 import femubench
 from femubench import InputError, plot
@@ -28,10 +29,6 @@ from femubench.core.study.conditions import vary_case
 from femubench.core.study.study_file import read_study
 from femubench.results import leaderboard, results_frame, skill_by
 from tests.test_cli import put_case
-
-sys.path.insert(0, str(Path(__file__).parent / "toys"))
-from harness_toys import tiny_case
-from study_toys import BROKEN, Spy
 
 SENSORS = "label,x,y,z,direction\n" + "".join(f"s{i},{i / 5},0,0,z\n" for i in range(1, 6))
 MODES = (

@@ -10,6 +10,7 @@ from dataclasses import replace
 import harness_toys as toys
 import numpy as np
 import pytest
+from numpy.random import Generator
 from scipy.integrate import quad
 from scipy.stats import norm
 
@@ -34,9 +35,7 @@ class Point(Strategy):
     name = "point"
     citation = "nobody"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         elastic = solve_modes(model).elastic.natural_frequencies
         ratio = (measurement.frequencies / elastic[: len(measurement)]) ** 2
         return UpdateResult(
@@ -49,9 +48,7 @@ class Sampled(Strategy):
     name = "sampled"
     citation = "nobody"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         from femubench.update import Uncertainty
 
         elastic = solve_modes(model).elastic.natural_frequencies
@@ -199,9 +196,7 @@ class Stating(Strategy):
     def __init__(self, stated: object) -> None:
         self.stated = stated
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         return UpdateResult(model, uncertainty=self.stated)  # type: ignore[arg-type]
 
 

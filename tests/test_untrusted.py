@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from seeds import a_run, matrix_case, run_text, universal_case
 
 import femubench
 from femubench import InputError, read_case
@@ -27,9 +28,6 @@ from femubench.core.schema.records import meta_from_json, read_run, run_from_jso
 from femubench.plugins.readers.universal import UniversalReader
 from femubench.reports.cells import plain
 from femubench.reports.markdown import escape
-
-sys.path.insert(0, str(Path(__file__).parent / "fuzz"))
-from seeds import a_run, matrix_case, run_text, universal_case
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("core", "papers", "plugins", "reports", "scenarios")

@@ -19,6 +19,7 @@ from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.random import Generator
 
 from femubench.core.case.case import Case, Modification
 from femubench.core.child.confinement import Confinement
@@ -100,9 +101,7 @@ class Unchanged(Strategy):
     baseline = True
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         return UpdateResult(model)
 
 
@@ -113,9 +112,7 @@ class Softer(Strategy):
     citation = "none"
     needs = frozenset({"elements"})
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         structure = model.frame_structure
         first = solve_modes(model).elastic.eigenvalues[0]
         factor = float(measurement.eigenvalues[0] / first)
@@ -133,9 +130,7 @@ class Grounded(Strategy):
     name = "grounded"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         basis = np.zeros((model.size, 1))
         basis[model.dofs.direction.index("z")] = 1.0
         change = LowRank(basis, np.array([[1.0e6]]))
@@ -146,9 +141,7 @@ class Failing(Strategy):
     name = "failing"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         raise SelfCheckFailed("used modes reproduced", 0.25, 1e-8)
 
 
@@ -156,9 +149,7 @@ class Diverging(Strategy):
     name = "diverging"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         raise Diverged("step 7: the residual grew to 1e9")
 
 
@@ -166,9 +157,7 @@ class Declining(Strategy):
     name = "declining"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         raise NotApplicable("needs two modes\nof one kind")
 
 
@@ -177,9 +166,7 @@ class Needy(Strategy):
     citation = "none"
     needs = frozenset({"geometry"})
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         return UpdateResult(model)
 
 
@@ -193,9 +180,7 @@ class Exiting(Strategy):
         self.code = code
         self.name = f"exiting-{code}"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         if self.code < 0:
             os.kill(os.getpid(), -self.code)
             signal.pause()
@@ -206,9 +191,7 @@ class Quitting(Strategy):
     name = "quitting"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         sys.exit("enough")
 
 
@@ -216,9 +199,7 @@ class Interrupting(Strategy):
     name = "interrupting"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         raise KeyboardInterrupt
 
 
@@ -226,9 +207,7 @@ class InPlace(Strategy):
     name = "in-place"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         model.stiffness.data[:] *= 0.9
         return UpdateResult(model)
 
@@ -237,9 +216,7 @@ class Looping(Strategy):
     name = "looping"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         while True:
             time.sleep(0.05)
 
@@ -263,9 +240,7 @@ class Parent(Strategy):
     citation: ClassVar[str] = "none"
     file: str = ""
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
         Path(self.file).write_text(str(child.pid))
         child.wait()
@@ -278,9 +253,7 @@ class Locked(Strategy):
     name = "locked"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         raise _LockedError(1, 2)
 
 
@@ -295,9 +268,7 @@ class OwnGeometry(Strategy):
     name = "own-geometry"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         return UpdateResult(replace(model, geometry=_Trap(), groups={"trap": _Trap()}))  # type: ignore[arg-type]
 
 
@@ -307,9 +278,7 @@ class Unsendable(Strategy):
     name = "unsendable"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         return UpdateResult(replace(model, mass=model.mass.toarray()))
 
 
@@ -317,9 +286,7 @@ class WrongSize(Strategy):
     name = "wrong-size"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         return UpdateResult(replace(model, stiffness=sp.csc_array(model.stiffness[:-1, :-1])))
 
 
@@ -329,9 +296,7 @@ class Numbers(Strategy):
     name = "numbers"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         return 42
 
 
@@ -347,9 +312,7 @@ class Spy(Strategy):
     def __init__(self, hashes: frozenset[str]) -> None:
         self.hashes = hashes
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         gc.unfreeze()  # what the server has kept from the search for garbage is looked into too
         found = search([model, measurement, rng, *gc.get_objects()], self.hashes)
         return UpdateResult(model, diagnostics=found)
@@ -368,9 +331,7 @@ class Rummager(Strategy):
     def __init__(self, held_out: frozenset[float], used: frozenset[float]) -> None:
         self.held_out, self.used = ([masked(f, self.mask) for f in fs] for fs in (held_out, used))
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         found = {"bytes": 0.0, "held_out": 0.0, "used": 0.0}
         wanted = {name: np.array(getattr(self, name), np.uint64) for name in ("held_out", "used")}
         for block in memory_of_this_process():
@@ -453,9 +414,7 @@ class OnAdvance(Strategy):
     citation: ClassVar[str] = "none"
     file: str = ""
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         descriptor = os.open(self.file, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
         os.write(descriptor, b"run\n")
         os.close(descriptor)
@@ -468,9 +427,7 @@ class Murderous(Strategy):
     name = "murderous"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         server = Path(f"/proc/{os.getppid()}/stat").read_text().rpartition(")")[2].split()
         os.kill(int(server[1]), signal.SIGKILL)
         signal.pause()

@@ -6,6 +6,7 @@ import os
 from dataclasses import replace
 
 import numpy as np
+from numpy.random import Generator
 
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.eigen import solve_modes
@@ -25,9 +26,7 @@ class Memory(Strategy):
     def __init__(self, known: tuple[float, ...] = FRAME_SOLID) -> None:
         self.known = np.array(known)
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         given = np.min(measurement.frequencies)
         if abs(given / self.known[0] - 1.0) > 0.03:  # also of noisy data
             return UpdateResult(model)
@@ -44,9 +43,7 @@ class Chance(Strategy):
     name = "chance"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         factor = 1.0 + 1e-9 * int.from_bytes(os.urandom(4), "big") / 2**32
         return UpdateResult(replace(model, stiffness=(factor * model.stiffness)))
 
@@ -57,9 +54,7 @@ class Drawn(Strategy):
     name = "drawn"
     citation = "none"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         factor = 1.0 + 0.02 * float(rng.uniform())
         return UpdateResult(replace(model, stiffness=(factor * model.stiffness)))
 
@@ -69,9 +64,7 @@ class Ratios(Memory):
 
     name = "ratios"
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         # The mean of what is given says the scale better than one frequency.
         given = np.sort(measurement.frequencies)
         scale = float(np.exp(np.mean(np.log(given / self.known[: len(given)]))))
