@@ -16,11 +16,8 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
-<<<<<<< HEAD
-import psutil
-=======
 import harness_toys as toys
->>>>>>> ci
+import psutil
 import pytest
 import scanner
 import zoo
