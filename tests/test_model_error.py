@@ -210,7 +210,6 @@ def test_unseen_data_lie_within_what_is_foreseen(
         mean, std = model.foreseen(
             found.v,
             {k: s[rows] for k, s in slopes.items()},
-            np.zeros(len(rows), dtype=bool),
             state.raw[rows],
             np.arange(len(used), len(rows)),
         )

@@ -174,7 +174,7 @@ def predict_held_out(
         return Unseen(first * relative, last * relative, std)
     nothing = examination.posterior.nothing.fit.state
     (plain, spared), (mean, error) = examination.foreseen(
-        [(nothing, before.raw), (found.state, exact)], data, case.reference
+        [(nothing, before.raw), (found.state, exact)], data
     )
     error = np.hypot(error, examination.own_share(found.state) * (first - last))
     return Unseen(

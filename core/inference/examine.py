@@ -32,7 +32,6 @@ from femubench.core.inference.model_error import (
     class_widths,
     condition_noise,
     error_slopes,
-    rows_of,
     scatter_slopes,
 )
 from femubench.core.inference.posterior import Explanation, Posterior, by_weight
@@ -132,20 +131,17 @@ class Examination:
         return max(own, settings.own_error_of_change) if own > 0.0 else 0.0
 
     def foreseen(
-        self,
-        explained: Iterable[tuple[State, FloatArray]],
-        data: Data,
-        reference: Measurement | None,
+        self, explained: Iterable[tuple[State, FloatArray]], data: Data
     ) -> list[tuple[FloatArray, FloatArray]]:
         """Return mean and deviation of what the model error makes of unseen frequencies.
 
         One pair an explanation, in standard deviations of their measurement; nothing where it
-        takes the structure for a beam model.
+        takes the structure for a beam model. With a reference nothing is unseen but the modes of
+        modified structures.
 
         Arguments:
             explained: explanations, and the residuals of used and unseen modes under each, (n,).
             data: used modes, then unseen ones.
-            reference: used and unseen modes of the structure as it was.
         """
         used, count = len(self.problem.data.measurement), len(data.measurement)
         assert self.error is not None
@@ -156,24 +152,14 @@ class Examination:
         )
         problem, structure = replace(self.problem, data=data), self.model.structure
         slopes = {k: s[kept] for k, s in error_slopes(problem, structure, self.modes).items()}
-        before = np.zeros(0)
-        if reference is not None:
-            state = before_of(self.problem, reference)
-            before, more = state.raw, error_slopes(state.problem, structure, self.modes)
-            slopes = {
-                k: np.vstack(
-                    [rows_of(k, slopes, more, len(kept)), rows_of(k, more, slopes, len(before))]
-                )
-                for k in dict.fromkeys((*slopes, *more))
-            }
-        earlier, unseen = np.arange(len(kept) + len(before)) >= len(kept), np.arange(used, count)
+        unseen = np.arange(used, count)
         found = []
         for state, raw in explained:
-            scales, together = state.problem.noise.scales, np.concatenate([raw[kept], before])
+            scales = state.problem.noise.scales
             found.append(
                 (np.zeros(len(unseen)), np.zeros(len(unseen)))
                 if scales is None
-                else self.error.foreseen(scales, slopes, earlier, together, unseen)
+                else self.error.foreseen(scales, slopes, raw[kept], unseen)
             )
         return found
 

@@ -28,7 +28,7 @@ from femubench.core.fit.modal_fit import Problem, State, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import Modes
-from femubench.core.typing import BoolArray, FloatArray, IntArray
+from femubench.core.typing import FloatArray, IntArray
 
 
 def class_widths() -> dict[str, float]:
@@ -464,7 +464,6 @@ class Inadequacy:
         self,
         scales: FloatArray,
         slopes: Mapping[str, FloatArray],
-        earlier: BoolArray,
         raw: FloatArray,
         unseen: IntArray,
     ) -> tuple[FloatArray, FloatArray]:
@@ -475,16 +474,14 @@ class Inadequacy:
         Arguments:
             scales: of an explanation.
             slopes: sensitivities of all data to each class, (N, p_k).
-            earlier: which data are of the reference, (N,).
             raw: residuals of all data under the explanation, (N,).
             unseen: rows, (u,).
         """
-        tau, unshared = self._variances(scales)
+        tau, _ = self._variances(scales)
         total = np.zeros((len(raw), len(raw)))
         for name, variance in zip(self.names, tau, strict=True):
             if name in slopes:
                 total += variance * slopes[name] @ slopes[name].T
-        total *= 1.0 + unshared * (earlier[:, None] == earlier)
         known = np.setdiff1d(np.arange(len(raw)), unseen)
         inverse, _ = _inverse(np.eye(len(known)) + total[np.ix_(known, known)])
         weight = total[np.ix_(unseen, known)] @ inverse
