@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from femubench.core.typing import FloatArray, SparseArray
 
-Scaling = Literal["linear", "exponential", "decades", "compliance", "factor", "log"]
+Scaling = Literal["linear", "exponential", "compliance", "factor", "log"]
 # Of a size: in its unit; a relative change, also in percent with a sign; a part of a whole.
 Wording = Literal["value", "change", "share"]
 # Where something is wrong: in the structure's model, in what was measured, in what was typed in.

@@ -75,7 +75,7 @@ def test_every_effect_is_in_both_tables() -> None:
 def test_units_priors_and_keys_are_those_of_the_effect(name: str, models: list[Model]) -> None:
     effect = EFFECTS[name]
     _, where, unit, prior = rows_of(THERE)[name]
-    scalings = set(re.findall(r"linear|exponential|decades|compliance|factor", prior))
+    scalings = set(re.findall(r"linear|exponential|compliance|factor", prior))
     written: set[str] = set()
     for model in models:
         frame = model.frame_structure.frame

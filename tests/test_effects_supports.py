@@ -29,8 +29,6 @@ from femubench.fem import (
     Support,
     solid_rectangle,
 )
-from femubench.plugins.effects.added_mass import AddedMass
-from femubench.plugins.effects.grounding_spring import GroundingSpring
 from femubench.plugins.effects.support_flexibility import SupportFlexibility
 
 FrameBuilder = Callable[..., Frame]
@@ -234,17 +232,3 @@ def test_one_soft_foot_of_two_is_found_in_a_finer_model(hframe: FrameBuilder) ->
     (stiffness,) = first.parameters
     assert abs(stiffness.value - parameter.scale) < 2.0 * stiffness.std
     assert stiffness.std < 0.1 * parameter.scale
-
-
-def test_no_size_that_occurs_is_beyond_the_prior_of_springs_and_masses(held: list[Model]) -> None:
-    model = held[0]
-    (spring,) = GroundingSpring().parameters(model, GroundingSpring().places(model)[0])
-    (mass,) = AddedMass().parameters(model, AddedMass().places(model)[0])
-    # A stop as stiff as the structure itself, and a tenth of its mass.
-    for parameter, size in ((spring, 90.0 * spring.scale), (mass, 0.1 * model.total_mass)):
-        assert 0.5 * parameter.coordinate(size) ** 2 < 4.0  # nats
-        for x in (0.0, 0.3, 2.6):
-            assert parameter.coordinate(parameter.value(x)) == pytest.approx(x)
-            rise = (parameter.value(x + 1e-6) - parameter.value(max(x - 1e-6, 0.0))) / 2e-6
-            assert parameter.slope(x) == pytest.approx(rise * (1.0 if x else 2.0), rel=1e-5)
-        assert parameter.slope(0.0) == parameter.scale

@@ -20,7 +20,6 @@ class Parameter:
 
     - ``linear``: value = neutral + scale x
     - ``exponential``: value = neutral + scale (exp |x| - 1) sign x, for sizes over decades
-    - ``decades``: value = neutral + scale (exp |2 x| - 1) / 2 sign x, for sizes over twice as many
     - ``compliance``: value = scale / (exp x - 1), for springs that are rigid at x = 0
     - ``factor``: value = neutral + exp (scale x) - 1, for the change of a log-normal factor
     - ``log``: value = neutral exp (scale x), for a log-normal value
@@ -71,8 +70,7 @@ class Parameter:
             return self.scale / np.expm1(np.maximum(x, 1e-9))
         if self.scaling == "factor":
             return self.neutral + np.expm1(self.scale * x)
-        grown = np.expm1(self._growth * np.abs(x)) / self._growth
-        return self.neutral + self.scale * grown * np.sign(x)
+        return self.neutral + self.scale * np.expm1(np.abs(x)) * np.sign(x)
 
     def coordinate(self, value: float) -> float:
         """Return x of a value."""
@@ -87,7 +85,7 @@ class Parameter:
         share = (value - self.neutral) / self.scale
         if self.scaling == "linear":
             return float(share)
-        return float(np.sign(share) * np.log1p(self._growth * abs(share)) / self._growth)
+        return float(np.sign(share) * np.log1p(abs(share)))
 
     def slope(self, x: float) -> float:
         """Return d value / dx at a coordinate."""
@@ -100,12 +98,7 @@ class Parameter:
             return float(-self.scale * (grown + 1.0) / grown**2)
         if self.scaling == "factor":
             return float(self.scale * np.exp(self.scale * x))
-        return float(self.scale * np.exp(self._growth * abs(x)))
-
-    @property
-    def _growth(self) -> float:
-        """Return by how much ln of a large value grows a unit of x."""
-        return 2.0 if self.scaling == "decades" else 1.0
+        return float(self.scale * np.exp(abs(x)))
 
     def widen(self, std: float) -> Parameter:
         """Return a relative change as that of a log-normal factor, where it was less free.

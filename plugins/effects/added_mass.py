@@ -43,7 +43,7 @@ class AddedMass(FrameEffect):
         structure = model.structure
         points = point_places(model) if structure is None else structure.frame.joints
         scale = model.total_mass * min(max(1.0 / max(len(points), 1), _LEAST), _MOST)
-        return (Parameter("mass", "kg", scale, scaling="exponential", one_sided=True),)
+        return (Parameter("mass", "kg", scale, one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the mass."""

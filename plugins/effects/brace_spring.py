@@ -79,7 +79,7 @@ class BraceSpring(FrameEffect):
             return _SHARE * float(np.mean(each))
 
         scale = once_for(model, "stiffness of a brace", rigidity)
-        return (Parameter("stiffness", "N/m", scale, scaling="decades", one_sided=True),)
+        return (Parameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the brace."""

@@ -49,7 +49,7 @@ class InterfaceSpring(FrameEffect):
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the stiffness of each spring."""
         scale = _SHARE * model.total_mass * (2.0 * np.pi * float(elastic_band(model)[0])) ** 2
-        return (Parameter("stiffness", "N/m", scale, scaling="decades", one_sided=True),)
+        return (Parameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the springs."""
