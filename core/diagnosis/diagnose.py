@@ -21,6 +21,7 @@ from femubench.core.diagnosis.proof import (
     rms_gain_of,
     unseen_of,
 )
+from femubench.core.diagnosis.region import Regions
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.scatter import scatter_rows
 from femubench.core.diagnosis.tables import (
@@ -207,7 +208,8 @@ def _written(
     best, posterior = proof.leader, examination.posterior
     group = [best, *(posterior.best(key) for key in decision.group[1:])] if decision.group else []
     shown = group if decision.verdict == "ambiguous" else group[:1]
-    options = [list_causes(examination, explanation, decision.held) for explanation in shown]
+    regions = Regions(examination, shown)
+    options = [list_causes(examination, e, regions, decision.held) for e in shown]
     causes = _group_causes(options)
     top = posterior.names[decision.group[0]] if decision.group else decision.nothing
     stated = decision, causes, options, top, proof.gain_rms
