@@ -151,12 +151,11 @@ def changed(structure: str, effect: str, place: str, value: float, *, shapes: in
     frame = structure_named(structure).frame
     model, rng = Model.of(frame), np.random.default_rng(6)
     truth = catalogue()[effect].extend(model, place, (value,))
-    now, before = (
-        measured(tested, frame, count=6, shapes=shapes, rng=rng) for tested in (truth, model)
-    )
+    now = measured(truth, frame, count=6, shapes=shapes, rng=rng)
+    before = measured(model, frame, count=6, shapes=shapes, rng=rng)
     case = replace(case_of(model, now, 6), reference=before, reference_used=before.numbers)
     sought = effects_named("local-stiffness-loss", "joint-rotation", "added-mass", "joint-mass")
-    return diagnose(case, sought, faults=(), pairs=False)
+    return diagnose(case, sought, faults=False, pairs=False)
 
 
 @pytest.mark.slow(5)
