@@ -347,8 +347,10 @@ def test_a_cause_that_some_names_lack_is_not_named_for_sure() -> None:
     more = posterior(
         nothing, explained(("a",), 0.3, chi2=80.0), explained(("a", "b"), 0.7, chi2=70.0)
     )
-    for found in (apart, weak, more):
+    for found in (apart, weak):
         assert decided(found, 0.5, True).verdict == "ambiguous"
+    decision = decided(more, 0.5, True)
+    assert (decision.verdict, decision.shared) == ("named", ("a",))
 
 
 def test_an_angle_is_between_subspaces_and_takes_no_units() -> None:

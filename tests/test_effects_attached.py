@@ -20,6 +20,7 @@ from femubench.core.change.hypothesis import (
     finer as finer_hypotheses,
     hypothesis_at,
 )
+from femubench.core.diagnosis.region import Regions
 from femubench.core.diagnosis.tables import list_causes
 from femubench.core.effect.places import match
 from femubench.core.fit.projection import Projector
@@ -396,7 +397,7 @@ def test_a_mass_beside_the_axis_is_told_where_it_shows(
     rng = np.random.default_rng(3)
     test = measured(truth, specimen.frame, count=8, shapes=6, rng=rng)
     seen = examine(specimen.model, test, tuple(catalogue().values()), tolerance=0.002)
-    (cause,) = list_causes(seen, seen.best)
+    (cause,) = list_causes(seen, seen.best, Regions(seen, ()))
     assert (cause.effect, cause.place) == (stated, place)
     assert cause.probability == pytest.approx(seen.posterior.inclusion("added-mass"))
     values = [p.value for p in cause.parameters]

@@ -21,6 +21,7 @@ from femubench.core.diagnosis.proof import (
     rms_gain_of,
     unseen_of,
 )
+from femubench.core.diagnosis.region import Regions
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.scatter import scatter_rows
 from femubench.core.diagnosis.tables import (
@@ -125,7 +126,8 @@ def diagnose(
         with effort.piece("advice"):
             looks = _looks(case.model, repaired, (*registered, *known))
             posterior, leader = inquiry.examination.posterior, proof.leader
-            decision = decide(posterior, leader, proof.test, states and states.differs)
+            differs = None if states is None else states.differs
+            decision = decide(posterior, leader, proof.test, differs)
             found = _written(repaired, inquiry, decision, proof, looks, begin)
     found = replace(found, states=states)
     return replace(found, notes=(*case.notes, *found.notes, *_conditions(effort)))
@@ -207,9 +209,13 @@ def _written(
     best, posterior = proof.leader, examination.posterior
     group = [best, *(posterior.best(key) for key in decision.group[1:])] if decision.group else []
     shown = group if decision.verdict == "ambiguous" else group[:1]
-    options = [list_causes(examination, explanation, decision.held) for explanation in shown]
+    regions = Regions(examination, shown)
+    options = [list_causes(examination, e, regions, decision.held) for e in shown]
     causes = _group_causes(options)
     top = posterior.names[decision.group[0]] if decision.group else decision.nothing
+    if decision.shared:
+        causes = [cause for cause in causes if cause.effect in decision.shared]
+        top = sum(p for key, p in posterior.names.items() if set(decision.shared) <= set(key))
     stated = decision, causes, options, top, proof.gain_rms
     said = sentence_of(*stated, reference=case.reference is not None)
     faults = (repaired, loose) if decision.verdict != "unknown" else ([], [])

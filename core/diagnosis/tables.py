@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from femubench.core.change.hypothesis import Hypothesis
+from femubench.core.diagnosis.region import Regions
 from femubench.core.diagnosis.symmetry import mirror_places
 from femubench.core.diagnosis.verdict import angle_between, credible, places_of
 from femubench.core.display import count_noun
@@ -156,13 +157,14 @@ def _coordinates(
 
 
 def list_causes(
-    examination: Examination, explanation: Explanation, held: float = 1.0
+    examination: Examination, explanation: Explanation, regions: Regions, held: float = 1.0
 ) -> list[Cause]:
     """Return the causes of an explanation, each with the probability of its name and of its place.
 
     Arguments:
         examination: what the explanation was weighed in.
         explanation: one of its explanations.
+        regions: of what competes with it.
         held: probability that any of them holds, at most.
     """
     posterior = examination.posterior
@@ -192,6 +194,7 @@ def list_causes(
                 place_probability=shares[cause.place],
                 places=credible(shares),
                 mirrors=mirror_places(examination.model, cause.place, others) if others else (),
+                region=regions.find(explanation, k - first, held) if k >= first else None,
             )
         )
     return found

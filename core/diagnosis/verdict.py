@@ -33,6 +33,7 @@ class Decision:
         held: probability that any known explanation holds, at most; below 1 where what is left, or
             unseen data, speak against all of them.
         unconfirmed: whether there are no unseen data that could have spoken against it.
+        shared: of a group that is named for what its names have in common, these causes.
     """
 
     verdict: Verdict
@@ -41,6 +42,7 @@ class Decision:
     angles: tuple[float, ...] = ()
     held: float = 1.0
     unconfirmed: bool = False
+    shared: Key = ()
 
 
 @dataclass(frozen=True)
@@ -106,8 +108,19 @@ def decide(
     if not test.holds:
         held = float(expit(min(test.log_bayes, 0.0)))
         return Decision("not-confirmed", group, nothing, angles, held)
-    verdict: Verdict = "ambiguous" if len(group) > 1 else "named"
-    return Decision(verdict, group, nothing, angles, unconfirmed=not test.tells)
+    shared = find_shared(posterior, group[0]) if len(group) > 1 else ()
+    verdict: Verdict = "ambiguous" if len(group) > 1 and not shared else "named"
+    return Decision(verdict, group, nothing, angles, 1.0, not test.tells, shared)
+
+
+def find_shared(posterior: Posterior, first: Key) -> Key:
+    """Return the causes of a name that nearly all have, where these explain nearly all it does."""
+    shared = tuple(name for name in first if posterior.inclusion(name) >= settings.nearly_all)
+    core = [e.chi2 for e in posterior.explanations if posterior.key(e) == shared]
+    nothing = posterior.nothing.chi2
+    explained = nothing - min(core, default=np.inf)
+    whole = nothing - posterior.best(first).chi2
+    return shared if explained >= settings.nearly_all * whole else ()
 
 
 def most_believed(p: float) -> float:

@@ -6,12 +6,13 @@ import math
 from collections.abc import Iterable, Sequence
 
 from femubench.core.diagnosis.verdict import Decision
-from femubench.core.schema.diagnosis import Cause, Gain
+from femubench.core.inference.settings import settings
+from femubench.core.schema.diagnosis import Cause, Gain, Region
 
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
 
 _LACKS, _NOTHING = "The model lacks", "nothing that the model lacks"
-_DIFFERS = "What differs from the reference is"
+_DIFFERS, _WRONG = "What differs from the reference is", "What the model gets wrong is"
 
 
 def percent(probability: float) -> str:
@@ -26,6 +27,27 @@ def percent(probability: float) -> str:
 def name_cause(cause: Cause) -> str:
     """Return a cause with its place."""
     return f"{cause.effect} at {cause.place}" if cause.place != "all" else cause.effect
+
+
+def name_region(region: Region) -> str:
+    """Return what is different in a region, where and by how much."""
+    member, _, joint = region.place.rpartition("@")
+    end = f"the end of {member} at {joint}" if member and joint[:2] != "0." else region.place
+    what = f"{region.kind} {'everywhere' if end == 'all' else f'at {end}'}"
+    if region.size is None or region.std is None:
+        return what
+    low, high = (max(region.size + k * region.std, 0.0) for k in (-1.0, 1.0))
+    if region.unit:
+        return f"{what}, {low:.2g} to {high:.2g} {region.unit}"
+    return f"{what}, {100.0 * low:.2g} to {100.0 * high:.2g} %"
+
+
+def _shared_region(options: Sequence[Sequence[Cause]]) -> Region | None:
+    """Return the sure region, less than the whole, of the first cause of every option."""
+    found = [option[0].region if option else None for option in options]
+    sure = [r for r in found if r and r.place != "all" and r.probability >= settings.nearly_all]
+    alike = len({(r.place, r.kind) for r in sure}) == 1
+    return sure[0] if alike and len(sure) == len(found) else None
 
 
 def where(cause: Cause) -> str:
@@ -79,7 +101,8 @@ def sentence_of(
     if decision.verdict == "named":
         lacks = _DIFFERS if reference else _LACKS
         sure = _sure(probability, causes) + "; unconfirmed" * decision.unconfirmed
-        return f"{lacks} {names} ({sure}){_gain(gain)}."
+        open_ = ", and these data cannot tell what else" * bool(decision.shared)
+        return f"{lacks} {names} ({sure}){open_}{_gain(gain)}."
     if decision.verdict == "ambiguous":
         return _either(options, reference)
     guess = f"; the nearest is {names}" if causes else ""
@@ -115,6 +138,10 @@ def _either(options: Sequence[Sequence[Cause]], reference: bool) -> str:
         shared = join_names(f"{name}{mirrored[name]}" for name in common)
         lacks = _DIFFERS if reference else _LACKS
         return f"{lacks} {shared}, and these data cannot tell what else: {open_}."
+    if region := _shared_region(options):
+        sure = f"probability {percent(region.probability)}"
+        stated = f"{_DIFFERS if reference else _WRONG} {name_region(region)} ({sure})"
+        return f"{stated}; these data cannot tell whether it is {open_}."
     something = "Something differs from the reference" if reference else f"{_LACKS} something"
     return f"{something}, and these data cannot tell which: {open_}."
 

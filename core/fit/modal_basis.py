@@ -69,7 +69,7 @@ class Space:
         own = np.arange(len(self))
         stiffness[own, own], mass[own, own] = self.eigenvalues, 1.0
         weight = self.mass
-        for part, index, columns in _placed(len(self), parts):
+        for part, index, columns in place_parts(len(self), parts):
             factors = part.hypothesis.factors(x[None, columns])[0]
             weight += float(factors @ part.weights)
             for matrix, kind in ((stiffness, False), (mass, True)):
@@ -84,7 +84,7 @@ class Space:
         """Return the derivatives of `assembled` with respect to every coordinate."""
         size = len(self) + sum(part.extra for part in parts)
         result = []
-        for part, index, columns in _placed(len(self), parts):
+        for part, index, columns in place_parts(len(self), parts):
             for slope in part.hypothesis.slopes(x[columns]):
                 pair = np.zeros((2, size, size))
                 for matrix, kind in zip(pair, (False, True), strict=True):
@@ -108,7 +108,7 @@ class Space:
             forces (N + extra, m, p) and masses in kg (p,).
         """
         forces, masses = np.zeros((len(x), *near.shape)), np.zeros(len(x))
-        for part, index, columns in _placed(len(self), parts):
+        for part, index, columns in place_parts(len(self), parts):
             slopes = part.hypothesis.slopes(x[columns])
             masses[columns] = slopes @ part.weights
             seen = part.rows @ near[index]
@@ -143,7 +143,7 @@ class Space:
         return Space(values, readings, tuple(projections), weight, rigid)
 
 
-def _placed(size: int, parts: Sequence[Projection]) -> list[tuple[Projection, IntArray, slice]]:
+def place_parts(size: int, parts: Sequence[Projection]) -> list[tuple[Projection, IntArray, slice]]:
     """Return every part with its rows in the joint matrices and its columns of x."""
     result, row, column = [], size, 0
     for part in parts:

@@ -12,6 +12,7 @@ from femubench.core.roles import Side, Wording
 from femubench.core.schema.bounds import Number
 
 Verdict = Literal["named", "none", "unknown", "ambiguous", "not-confirmed"]
+RegionKind = Literal["stiffness lost", "stiffness added", "mass lost", "mass added"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +34,24 @@ class CauseParameter:
 
 
 @dataclass(frozen=True, slots=True)
+class Region:
+    """Where something differs and of what kind, whichever of the competing effects it is.
+
+    Arguments:
+        place: end of a member, joint, member, family or ``all`` that holds all that competes.
+        probability: of a cause of that kind there.
+        size, std: kg, or a share of its stiffness; None where the causes state no common size.
+    """
+
+    place: str
+    kind: RegionKind
+    probability: Number
+    size: Number | None = None
+    std: Number | None = None
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Cause:
     """An effect at a place, with what it takes; `summary` says it as a clause.
 
@@ -44,6 +63,7 @@ class Cause:
         mirrors: the other places that fit exactly as well, as images of this one by a symmetry
             of the structure that the data do not break.
         side: whether the model lacks it, or the data or what was typed in are wrong there.
+        region: that holds what competes with it; None for textbook values and faults.
     """
 
     effect: str
@@ -55,6 +75,7 @@ class Cause:
     places: tuple[tuple[str, Number], ...] = ()
     mirrors: tuple[str, ...] = ()
     side: Side = "model"
+    region: Region | None = None
 
 
 @dataclass(frozen=True, slots=True)
