@@ -34,7 +34,6 @@ from femubench.core.schema.diagnosis import Region, RegionKind
 from femubench.core.typing import FloatArray
 
 _KINDS: tuple[RegionKind, ...] = ("stiffness lost", "stiffness added", "mass lost", "mass added")
-_BETWEEN = 1e-4  # of an element: a station this near to a node is there
 
 
 @dataclass(frozen=True)
@@ -183,7 +182,7 @@ def list_atoms(frame: Frame | None, place: str, *, around: bool = False) -> froz
         along = (
             float(point.s or 0.0) * frame.members[frame.member_index[str(point.member)]].elements
         )
-        near = {int(np.ceil(along + shift)) for shift in (-_BETWEEN, _BETWEEN)}
+        near = {int(np.ceil(along + shift)) for shift in (-settings.minor, settings.minor)}
         return frozenset().union(*(list_atoms(frame, f"{point.member}/{k}") for k in near))
     return frozenset({place})
 
