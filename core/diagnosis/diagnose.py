@@ -121,7 +121,9 @@ def diagnose(
         # Faults of data and input first, then the causes that are left without them.
         inquiry = inquire(case.model, used, wrong, terms)
         repaired = correct_case(case, inquiry.repaired)
-        states = _compared(case)
+        states = None
+        if repaired.reference is not None:  # what is wrong with the data is no difference
+            states = compare_states(repaired.measurement, repaired.reference)
         proof = _proof(repaired, inquiry.examination, effort, case, states)
         with effort.piece("advice"):
             looks = _looks(case.model, repaired, (*registered, *known))
@@ -129,8 +131,8 @@ def diagnose(
             differs = None if states is None else states.differs
             decision = decide(posterior, leader, proof.test, differs)
             found = _written(repaired, inquiry, decision, proof, looks, begin)
-    found = replace(found, states=states)
-    return replace(found, notes=(*case.notes, *found.notes, *_conditions(effort)))
+    notes = (*case.notes, *found.notes, *_conditions(effort))
+    return replace(found, states=states, notes=notes)
 
 
 def _expected(case: Case) -> dict[Kind, Number]:
@@ -145,11 +147,6 @@ def _use_all_modes(case: Case) -> Case:
     used, reference = case.measurement.numbers, case.reference
     known = () if reference is None else tuple(reference.numbers)
     return replace(case, used=tuple(used), held_out=(), reference_used=known)
-
-
-def _compared(case: Case) -> States | None:
-    """Return how all that was measured differs from the reference, used or not."""
-    return None if case.reference is None else compare_states(case.measurement, case.reference)
 
 
 def _looks(drawn: Model, case: Case, effects: Iterable[Effect]) -> tuple[LookWarning, ...]:

@@ -209,10 +209,8 @@ def _passengers(explanation: Explanation) -> list[bool]:
     pieces = np.split(state.x, ends[:-1])
     found = []
     for k in range(len(parts)):
-        rest = [x for j, x in enumerate(pieces) if j != k]
-        without = state_at(
-            state.problem, (*parts[:k], *parts[k + 1 :]), np.concatenate(rest or [[]])
-        )
+        rest = np.concatenate([x for j, x in enumerate(pieces) if j != k])
+        without = state_at(state.problem, (*parts[:k], *parts[k + 1 :]), rest)
         found.append(without.chi2 - state.chi2 < settings.notable_deviations**2)
     return found if not all(found) else [False] * len(parts)
 
