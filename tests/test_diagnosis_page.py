@@ -305,7 +305,7 @@ class TestStates:
         said = (
             "The two measurements differ: mode 3 rose by 4.3 % (21 deviations), mode 5 changed its "
             "shape (MAC 0.57); the weighed mass rose by 0.6 kg (12 deviations); mode 4 at 61.5 Hz "
-            "is new; the others agree."
+            "is new; the other agrees."
         )
         text = page_of(data).text
         first, second, third = text.split("named: ")[1].partition("What is missing")
