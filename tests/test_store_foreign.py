@@ -34,7 +34,7 @@ USED = (*range(8 * 112), *range(8 * 740, 8 * 1024))
 
 @pytest.mark.parametrize(
     "bits",
-    [pytest.param(NAMES, id="some"), pytest.param(USED, marks=pytest.mark.slow(40), id="all")],
+    [pytest.param(NAMES, id="some"), pytest.param(USED, marks=pytest.mark.nightly, id="all")],
 )
 def test_no_bit_of_the_first_page_shuts_a_store(bits: Sequence[int], tmp_path: Path) -> None:
     store = stored(tmp_path)
