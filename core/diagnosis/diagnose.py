@@ -41,7 +41,7 @@ from femubench.core.fem.model import Model
 from femubench.core.fit.extended_model import departure
 from femubench.core.fit.static_response import LargeProblem
 from femubench.core.inference.effort import Effort, Kind, Number
-from femubench.core.inference.examine import Examination, Terms
+from femubench.core.inference.examine import Examination, Terms, list_left_out
 from femubench.core.inference.fault_search import Inquiry, inquire
 from femubench.core.inference.model_error import class_widths
 from femubench.core.inference.posterior import Explanation
@@ -131,8 +131,9 @@ def diagnose(
             differs = None if states is None else states.differs
             decision = decide(posterior, leader, proof.test, differs)
             found = _written(repaired, inquiry, decision, proof, looks, begin)
-    notes = (*case.notes, *found.notes, *_conditions(effort))
-    return replace(found, states=states, notes=notes)
+    left_out = list_left_out(repaired.model, known, reference)
+    notes = (*case.notes, *found.notes, *notes_left_out(left_out), *_conditions(effort))
+    return replace(found, states=states, left_out=left_out, notes=notes)
 
 
 def _expected(case: Case) -> dict[Kind, Number]:
@@ -248,13 +249,11 @@ def _written(
         notes=(
             *_notes(case, examination, proof, shown),
             *_error_notes(examination, leader),
-            *notes_left_out(examination.left_out),
         ),
         seconds=time.perf_counter() - begin,
         evidence=odds_rows(posterior, best) if named else (),
         model_error=error_scales(examination, leader),
         like_a_beam=examination.like_a_beam,
-        left_out=examination.left_out,
         subject=case,
         examination=examination,
     )

@@ -59,7 +59,6 @@ class Examination:
         modes: of the model, in the coordinates of the problem.
         error: what a beam model gets wrong, where that was asked.
         reference: as in `examine`.
-        left_out: effects that were no candidates.
     """
 
     model: Model
@@ -71,7 +70,6 @@ class Examination:
     modes: Modes
     error: Inadequacy | None = None
     reference: Measurement | None = None
-    left_out: tuple[LeftOut, ...] = ()
 
     @cached_property
     def nominal(self) -> State:
@@ -259,7 +257,8 @@ def examine(
     basis.forget()
     return Examination(
         *(model, own, slopes, tolerance, posterior, tuple(atlas), basis.modes),
-        *(error, reference, list_left_out(model, effects, reference)),
+        error,
+        reference,
     )
 
 
