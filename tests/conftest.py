@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 from functools import partial
@@ -25,6 +26,11 @@ from femubench.core.fem.frame import (
 from femubench.core.fem.sections import Section, constant_kappa, rectangular_tube
 
 FrameBuilder = Callable[..., Frame]
+
+# What a shell starts in the background ignores Ctrl-C, and so does all that it starts itself: tests
+# that send one would wait for ever.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 UNMARKED = 2.0  # s of a processor that a test without the marker `slow` takes at most
 # A test fails above so many times its budget: what it shares is charged to the first that asks for
