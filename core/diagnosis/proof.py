@@ -154,7 +154,8 @@ def predict_held_out(
     everything = case.measurement.select([*case.used, *case.held_out])
     std = _relative_std(everything) * everything.frequencies
     everything = replace(everything, frequency_std=std)
-    data = Data(everything, nominal.data.bias, nominal.data.still)
+    label = settings.shape_label
+    data = Data(everything, nominal.data.bias, nominal.data.still, label)
     noise = Noise.of(np.zeros((len(data), 0)), 0.0)
     rows = slice(used, used + hidden)
     before = state_at(Problem(nominal.model, nominal.space, data, noise), (), np.zeros(0))
@@ -163,7 +164,7 @@ def predict_held_out(
     modes_of(extended, enough_modes(extended, 2 * len(everything)))  # the most that is asked for
     # A cause may add a mode: the extended model has corrections of its own for the mesh.
     own_bias = mesh_bias(extended, len(nominal.data.bias))
-    own_data = data if own_bias is None else Data(everything, own_bias)
+    own_data = data if own_bias is None else Data(everything, own_bias, shape_label=label)
     exact = raw_residual(replace(whole, data=own_data), extended)
     relative = everything.frequency_std[rows] / everything.frequencies[rows]
     spread = data.by_mode(after.jacobian)[rows]

@@ -34,11 +34,14 @@ class Data:
         still: number of modes of zero frequency of the model that they were found on, which come
             first there; what gives these a frequency moves no other mode on in the list. None
             where every candidate counts its own.
+        shape_label: as far off as this part of its largest reading a shape tells a mode no better,
+            where modes are paired.
     """
 
     measurement: Measurement
     bias: FloatArray
     still: int | None = None
+    shape_label: float = 0.0
 
     def __post_init__(self) -> None:
         std = self.measurement.frequency_std
@@ -164,7 +167,8 @@ class Data:
         gap = frequencies[:, None, :] / measured[:, None] - 1.0
         cost = np.square(gap / label[:, None])
         cost += np.where((gap > _WINDOW - 1.0) | (gap < 1.0 / _WINDOW - 1.0), _LAST, 0.0)
-        square = np.square(self.weight)
+        blur = self.shape_label * np.abs(self.shapes).max(axis=0, initial=0.0)
+        square = np.square(self.weight) / (1.0 + np.square(blur * self.weight))
         seen = np.einsum("sm,gsq->gmq", square * self.shapes, readings)
         norm = np.einsum("sm,gsq->gmq", square, np.square(readings))
         total = np.einsum("sm,sm->m", square, np.square(self.shapes))

@@ -126,6 +126,9 @@ class Settings:
     idealisation_error: float = _prior(
         0.05, "of the change", "the same where unseen data judge a cause"
     )
+    shape_label: float = _prior(
+        0.1, "of a shape's largest reading", "as far off it labels an unseen mode no better"
+    )
     unseen_error_median: float = _prior(
         0.003, "of a frequency", "what a beam model gets wrong of an unseen mode, where anything"
     )
