@@ -145,7 +145,7 @@ def test_a_structure_without_fault_lacks_nothing(structure: str) -> None:
 
 
 @pytest.mark.slow(5)
-@pytest.mark.parametrize("seed", [3, 5])
+@pytest.mark.parametrize("seed", [3, pytest.param(5, marks=pytest.mark.nightly)])
 def test_two_hidden_effects_are_both_found(seed: int) -> None:
     verdict, _, delta = judged(Blind(seed, hidden="pair"))
     assert min(delta) > CLEAR
@@ -157,9 +157,13 @@ def test_two_hidden_effects_are_both_found(seed: int) -> None:
 @pytest.mark.parametrize(
     ("blind", "few"),
     [
-        (Blind(1, structure="ladder", hidden="outside"), False),
         (Blind(4, structure="ladder", hidden="outside"), True),
-        (Blind(3, structure="ladder", hidden="outside"), True),
+        pytest.param(
+            Blind(1, structure="ladder", hidden="outside"), False, marks=pytest.mark.nightly
+        ),
+        pytest.param(
+            Blind(3, structure="ladder", hidden="outside"), True, marks=pytest.mark.nightly
+        ),
     ],
     ids=str,
 )

@@ -48,6 +48,7 @@ def test_a_spent_budget_leaves_single_causes_and_says_so() -> None:
     assert "ended after its budget of 0 s" in short.notes[-1]
 
 
+@pytest.mark.nightly
 def test_a_budget_that_is_not_spent_changes_nothing_and_pieces_done_never_fall() -> None:
     as_stated: list[Advance] = []
     whole, limited = diagnosed(None), diagnose(pair().case, effort=Effort(1e6, as_stated.append))

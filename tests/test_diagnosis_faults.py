@@ -173,7 +173,7 @@ def test_a_fault_of_what_was_typed_in_is_named(
 
 
 @pytest.mark.slow(10)
-@pytest.mark.parametrize("structure", ["ladder", "portal"])
+@pytest.mark.parametrize("structure", ["ladder", pytest.param("portal", marks=pytest.mark.nightly)])
 def test_clean_data_have_no_fault(structure: str) -> None:
     assert [faults_of(diagnosed(clean(structure, seed))) for seed in range(10)] == [[]] * 10
 

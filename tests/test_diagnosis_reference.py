@@ -88,7 +88,7 @@ def test_a_structure_as_it_was_lacks_nothing(damaged: tuple[Frame, Frame]) -> No
     assert verdicts == ["none"] * len(verdicts)
 
 
-@pytest.mark.slow(20)
+@pytest.mark.nightly
 def test_without_the_reference_the_drawing_is_to_blame(damaged: tuple[Frame, Frame]) -> None:
     """Its joints stand between the data and the loss."""
     _, broken = damaged
@@ -246,7 +246,7 @@ class TestCaseFolder:
         assert len(str(fault.value).splitlines()) == 1
 
 
-@pytest.mark.slow(5)
+@pytest.mark.nightly
 def test_a_large_model_uses_all_modes_with_a_reference(damaged: tuple[Frame, Frame]) -> None:
     """Of a large model some modes are solved, more of them for more data."""
     fine = replace(FRAME, members=tuple(replace(m, elements=30) for m in FRAME.members))

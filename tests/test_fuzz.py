@@ -213,7 +213,13 @@ def check(folder: Path, share: float, format: str) -> None:
 
 
 @pytest.mark.slow(20)
-@pytest.mark.parametrize("format", FORMATS)
+@pytest.mark.parametrize(
+    "format",
+    ["toml", "store"]
+    + [
+        pytest.param(name, marks=pytest.mark.nightly) for name in ("csv", "mtx", "universal", "run")
+    ],
+)
 def test_a_few(tmp_path: Path, format: str) -> None:
     check(tmp_path, FEW, format)
 

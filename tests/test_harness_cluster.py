@@ -92,6 +92,7 @@ def check_kills(executor: DaskWorkers, jobs: int, folder: Path) -> None:
     assert stable(runs["cluster"].results) == stable(runs["serial"].results)
 
 
+@pytest.mark.nightly
 def test_a_run_whose_workers_are_killed_twice_ends_like_one_of_this_machine(
     open_two: DaskWorkers, tmp_path: Path
 ) -> None:
@@ -232,6 +233,7 @@ def test_an_interrupted_run_keeps_what_is_done_and_leaves_nothing_behind(tmp_pat
     assert [item.strategy for item in run.results] == ["unchanged"]
 
 
+@pytest.mark.nightly
 def test_workers_that_a_user_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """``dask scheduler`` and ``dask worker`` by hand, and the scheduler lost in the end."""
     file = tmp_path / "scheduler.json"

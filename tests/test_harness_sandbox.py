@@ -94,7 +94,7 @@ def test_a_scanner_finds_nothing_in_the_sandbox(
     assert result.provenance["sandbox"] == "namespaces"
 
 
-@pytest.mark.slow(20)
+@pytest.mark.nightly
 def test_the_same_scanner_finds_what_was_planted_without(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -38,7 +38,9 @@ def small(seconds: float | None, memory: int | None, **others: Any) -> Limits:
     return Limits(seconds, memory, output=4 * MIB, answer=16 * MIB, **others)
 
 
-@pytest.fixture(scope="module", params=["namespaces", "none"])
+@pytest.fixture(
+    scope="module", params=["namespaces", pytest.param("none", marks=pytest.mark.nightly)]
+)
 def runs(request: pytest.FixtureRequest) -> Iterator[dict[str, Run]]:
     """One run with the zoo and one without, both in a sandbox or both on a machine without."""
     with pytest.MonkeyPatch.context() as patch, ExitStack() as stack:

@@ -325,7 +325,7 @@ def fine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     sys.modules.pop(MODULE, None)
 
 
-@pytest.mark.slow(20)
+@pytest.mark.nightly
 def test_no_command_imports_a_stranger(fine: Path, tmp_path: Path) -> None:
     store = ("--store", str(tmp_path / "store"))
     file = tmp_path / "run.json"
@@ -422,7 +422,7 @@ def test_its_version_changes_with_its_source(fine: Path) -> None:
     assert MODULE not in sys.modules
 
 
-@pytest.mark.slow(10)
+@pytest.mark.nightly
 def test_faults_of_folders_and_reports_are_told(fine: Path, tmp_path: Path) -> None:
     plugins = load_plugins()
     with pytest.raises(InputError, match=r"^the licence is missing$"):

@@ -233,6 +233,7 @@ def test_make_installs_anew_only_with_other_dependencies(clone: Path, tmp_path: 
     assert "install --quiet -e '.[test]'" in steps("test")
 
 
+@pytest.mark.nightly
 def test_coverage_finds_the_files_through_the_links(clone: Path, python: Path) -> None:
     coverage = (python, "-m", "coverage")
     tests = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/test_sections.py")

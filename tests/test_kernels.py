@@ -62,7 +62,7 @@ def under(**kernel: str) -> Any:
     return json.loads(answer.stdout)
 
 
-@pytest.mark.slow(10)
+@pytest.mark.nightly
 def test_two_kernels_give_one_answer() -> None:
     """The processor's own and one that every x86-64 has; where there is no other, the same."""
     one, two = under(), under(OPENBLAS_CORETYPE="Nehalem")

@@ -364,7 +364,7 @@ class TestRank:
         assert label_variant(Plain()).name == "duck"
 
     @pytest.mark.slow(5)
-    @pytest.mark.parametrize("how", ["script", "stdin"])
+    @pytest.mark.parametrize("how", ["script", pytest.param("stdin", marks=pytest.mark.nightly)])
     def test_a_class_of_a_script_or_notebook_needs_no_guard(self, folder: Path, how: str) -> None:
         """It is sent with its code, and the script itself does not run again in a worker."""
         script = textwrap.dedent(
@@ -449,7 +449,7 @@ class TestOptionsOfARun:
             femubench.study("study.toml", seeds=1)  # type: ignore[call-arg]
 
 
-@pytest.mark.slow(10)
+@pytest.mark.nightly
 def test_the_page_of_the_docs_runs() -> None:
     """All its snippets are one script, as a reader types them."""
     text = (ROOT / "docs" / "library.md").read_text(encoding="utf-8")

@@ -74,7 +74,7 @@ def test_that_is_what_the_printed_frequencies_would_need() -> None:
     assert there > 0.9 * nominal
 
 
-@pytest.mark.slow(5)
+@pytest.mark.nightly
 def test_nearest_model_with_the_measured_frequencies_is_near_least_squares() -> None:
     _, met = predicted(Reading(iterations=1))
     _, least, there, _ = nearest_with(Reading(), met)

@@ -313,6 +313,7 @@ def test_the_transcription_contradicts_itself_at_the_misprints_only() -> None:
     assert wrong == [("c", "initial", 1), ("c", "initial", 4), ("d", "initial", 4)]
 
 
+@pytest.mark.nightly
 def test_docs_count_the_cells_of_both_papers(done: Study) -> None:
     """One sentence on the screen, in README and in docs; JSON counts the same."""
     steps: list[Advance] = []

@@ -32,6 +32,11 @@ SITE = Path(str(femubench.__file__)).parents[1]
 LONGEST = "a-method-that-has-got-a-rather-long-name"
 
 
+def at_night(*values: str) -> Any:
+    """Return what is tried by `make nightly` alone."""
+    return pytest.param(*values, marks=pytest.mark.nightly)
+
+
 def invoke(*words: str | Path) -> Result:
     return CliRunner().invoke(bench, [str(word) for word in words])
 
@@ -85,7 +90,7 @@ def copy(packages: Path, tmp_path: Path, request: pytest.FixtureRequest) -> Path
     return Path(shutil.copytree(packages / f"my-{request.param}", tmp_path / "copy"))
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [KINDS[0], *map(at_night, KINDS[1:])])
 def test_package_passes_its_own_tests(packages: Path, kind: str) -> None:
     result = pytest_of(packages / f"my-{kind}")
     assert result.returncode == 0, result.stdout + result.stderr
@@ -95,9 +100,11 @@ def test_package_passes_its_own_tests(packages: Path, kind: str) -> None:
     ("copy", "old", "new"),
     [
         ("strategy", "ratio.sum() / (ratio @ ratio)", "1.0 / ratio.mean()"),
-        ("strategy", "        ratio = ", "        model.stiffness.data *= 1.5\n        ratio = "),
-        ("effect", 'Factor("EI"', 'Factor("E"'),
-        ("reader", "len(modes), len(points)).T", "len(points), len(modes))"),
+        at_night(
+            "strategy", "        ratio = ", "        model.stiffness.data *= 1.5\n        ratio = "
+        ),
+        at_night("effect", 'Factor("EI"', 'Factor("E"'),
+        at_night("reader", "len(modes), len(points)).T", "len(points), len(modes))"),
     ],
     indirect=["copy"],
 )
@@ -110,6 +117,7 @@ def test_its_tests_fail_when_the_plugin_is_wrong(copy: Path, old: str, new: str)
     assert result.returncode == 1, result.stdout + result.stderr
 
 
+@pytest.mark.nightly
 def test_strategy_is_timed_beside_others(packages: Path) -> None:
     brief = ("--benchmark-max-time=0.05", "--benchmark-min-rounds=2", "--benchmark-only")
     result = pytest_of(packages / "my-strategy", *brief)
@@ -124,6 +132,7 @@ def test_strategy_is_timed_beside_others(packages: Path) -> None:
         assert float(multiple) == pytest.approx(float(time) / own, rel=0.02)
 
 
+@pytest.mark.nightly
 def test_strategy_is_not_timed_without_pytest_benchmark(packages: Path) -> None:
     result = pytest_of(packages / "my-strategy", "-p", "no:benchmark", "-rs")
     assert result.returncode == 0, result.stdout + result.stderr
@@ -132,6 +141,7 @@ def test_strategy_is_not_timed_without_pytest_benchmark(packages: Path) -> None:
     assert line.endswith("strategy_speed needs pytest-benchmark: pip install pytest-benchmark")
 
 
+@pytest.mark.nightly
 def test_pyright_finds_nothing(packages: Path) -> None:
     """An editor follows every name of femubench, and the types of a package fit its roles."""
     roots = [
@@ -148,6 +158,7 @@ def test_pyright_finds_nothing(packages: Path) -> None:
     assert "0 errors, 0 warnings" in result.stdout
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("copy", ["scenario"], indirect=True)
 def test_scenario_with_sensors_in_the_wrong_place_fails_its_test(copy: Path) -> None:
     (sensors,) = copy.glob("src/*/case/sensors.csv")
@@ -203,11 +214,13 @@ class TestInstalled:
         assert result.returncode == 0, result.stderr
         assert re.search(r"1  my-strategy +0\.3.*\n2  unchanged +-1\.97", result.stdout)
 
+    @pytest.mark.nightly
     def test_scenario_is_run(self, bench_with: Any) -> None:
         result = bench_with(["scenario"], "run", "my-scenario", "-s", "global", "-s", "unchanged")
         assert result.returncode == 0, result.stderr
         assert result.stdout.index("global ") < result.stdout.index("unchanged ")
 
+    @pytest.mark.nightly
     def test_effect_is_tried(self, bench_with: Any, tmp_path: Path) -> None:
         assert bench_with(["effect"], "init", "portal").returncode == 0
         result = bench_with(
@@ -216,6 +229,7 @@ class TestInstalled:
         assert result.returncode == 0, result.stderr
         assert result.stdout
 
+    @pytest.mark.nightly
     def test_reader_reads_its_case(self, bench_with: Any, packages: Path) -> None:
         case = packages / "my-reader" / "tests" / "case"
         result = bench_with(["reader"], "run", case, "-s", "global", "-s", "unchanged")

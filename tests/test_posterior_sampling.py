@@ -72,7 +72,7 @@ def test_the_posterior_is_that_of_exact_solutions() -> None:
         assert parameter.std / parameter.after == pytest.approx(std[k], rel=0.25)
 
 
-@pytest.mark.slow(5)
+@pytest.mark.nightly
 def test_the_discrepancy_grows_with_what_the_model_cannot_follow() -> None:
     measurement = CASE.used_measurement()
     spoiled = replace(measurement, frequencies=measurement.frequencies * [1.0, 1.25, 0.8])

@@ -203,7 +203,7 @@ def test_global_gives_the_factor_that_its_residual_asks_for(ladder: Any, residua
         assert abs(factor / nearest_factor(other, LADDER_HZ, nominal) - 1.0) > 1e-3
 
 
-@pytest.mark.slow(5)
+@pytest.mark.nightly
 def test_spring_comes_nearer_to_the_data_the_weaker_its_damping(hframe_case: Any) -> None:
     costs = [
         Spring(options=UpdateOptions(damping=damping)).update(*hframe_case, RNG).history[-1]["cost"]

@@ -118,6 +118,7 @@ def test_rigid_motions_of_a_stretched_solid_are_sums_of_the_fields() -> None:
         assert np.abs(fields @ share - motion).max() < 1e-12
 
 
+@pytest.mark.nightly
 def test_a_file_gives_the_modes_of_solids_in_full() -> None:
     structure, solid = tee(), small()
     solved = held_out(structure, solid, HELD_OUT_SEED)
@@ -230,6 +231,7 @@ def test_the_drawing_is_stretched_as_the_solid(name: str, tmp_path: Path) -> Non
         assert abs(one - other).max() < 1e-7 * abs(other).max()
 
 
+@pytest.mark.nightly
 def test_twins_have_ratios_of_their_own_and_noise_of_the_stated_size() -> None:
     name = NAMES[0]
     case = builtin(name)

@@ -149,6 +149,7 @@ def test_a_regression_fails_with_one_line_and_keeps_the_file(repository: Reposit
     assert "worse than the baseline" not in allowed[1]
 
 
+@pytest.mark.nightly
 def test_a_crash_fails_and_is_named(repository: Repository) -> None:
     repository.becomes('__import__("os").abort()', "0.3.0")
     code, stated, summary = repository.act(baseline="baseline.json")
@@ -159,6 +160,7 @@ def test_a_crash_fails_and_is_named(repository: Repository) -> None:
     assert result_of(repository)["results"][0]["status"] == "crashed"
 
 
+@pytest.mark.nightly
 def test_failing_tests_of_the_repository_fail_the_job(repository: Repository) -> None:
     repository.becomes(FACTOR)
     own = repository.folder / "own_test.py"
@@ -170,6 +172,7 @@ def test_failing_tests_of_the_repository_fail_the_job(repository: Repository) ->
     assert stated.splitlines()[-1] == "accepted: submission.json"
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["*", "sr?"])
 def test_names_are_no_patterns_of_files(repository: Repository, name: str) -> None:
     assert sorted(repository.folder.glob(name))

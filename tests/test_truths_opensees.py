@@ -138,6 +138,7 @@ def solver() -> None:
         pytest.skip("openseespy cannot be imported")
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("solver")
 @pytest.mark.parametrize("name", sorted(plans()))
 def test_an_end_on_rigid_springs_is_no_change_and_on_soft_ones_a_hinge(name: str) -> None:

@@ -74,7 +74,7 @@ def test_the_generator_gives_a_stored_state_again() -> None:
         assert (SHEAR / draw.name / name).read_text(encoding="utf-8") == text
 
 
-@pytest.mark.slow(20)
+@pytest.mark.nightly
 def test_a_bumper_out_of_reach_leaves_the_modes_of_the_frame() -> None:
     draw = next(draw for draw in DRAWS.values() if draw.fault and draw.fault.bumper)
     assert draw.fault is not None

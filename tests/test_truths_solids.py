@@ -77,6 +77,7 @@ def test_a_slender_bar_meets_bernoulli(clamped: bool, roots: tuple[float, ...]) 
         np.testing.assert_allclose(found[2 * i : 2 * i + 2], hertz, rtol=3e-3)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("clamped", [True, False])
 def test_a_tube_meets_timoshenko(clamped: bool, tmp_path: Path) -> None:
     """Bending of a rectangular tube against a drawn model with shear and rotary inertia.
@@ -180,6 +181,7 @@ def test_open_sections_have_their_centroid_on_the_axis(section: Section) -> None
     np.testing.assert_allclose(area, section.drawn["A"], rtol=1e-12)
 
 
+@pytest.mark.nightly
 def test_every_kind_of_defect_can_be_seen() -> None:
     """Each kind changes a frame that allows it, and leaves its drawing alone."""
     from truths.defect_cases import Healthy, damaged

@@ -461,6 +461,7 @@ def test_the_command_prints_the_seed(tmp_path: Path) -> None:
     assert "1 twin (seed 77; 1 stretched and similar)" in " ".join(answer.output.split())
 
 
+@pytest.mark.nightly
 def test_no_strategy_of_ours_is_marked_where_order_and_rounding_decide() -> None:
     names = ["local", "offset", "sparse", "eigensensitivity", "baruch"]
     cases = ["suite/tapered-cantilever", "suite/arch", "frame-solid"]

@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 from run_edits import called, scaled
 
-OTHERS = ("board", "compared", "diagnosis", "reproduction")
 CASES = ("frame", "hframe", "frame-solid")
 
 
@@ -50,9 +49,24 @@ def unfolded(page: Any) -> None:
 
 @pytest.mark.parametrize(
     ("name", "scheme"),
-    [(name, scheme) for name in OTHERS for scheme in ("light", "dark")]
-    # A change element by element, and one of the whole matrix.
-    + [("frame", "light"), ("hframe", "dark")],
+    [
+        ("board", "light"),
+        ("diagnosis", "dark"),
+        ("compared", "light"),
+        # A change of the whole matrix; the next one is element by element.
+        ("hframe", "dark"),
+        *(
+            pytest.param(name, scheme, marks=pytest.mark.nightly)
+            for name, scheme in (
+                ("frame", "light"),
+                ("board", "dark"),
+                ("diagnosis", "light"),
+                ("compared", "dark"),
+                ("reproduction", "light"),
+                ("reproduction", "dark"),
+            )
+        ),
+    ],
 )
 def test_axe_finds_nothing_serious(
     view: Callable[..., Any], addresses: dict[str, tuple[Path, str]], name: str, scheme: str
@@ -65,7 +79,14 @@ def test_axe_finds_nothing_serious(
     assert not [url for url in found.requests if not url.startswith(("file:", "data:"))]
 
 
-@pytest.mark.parametrize("name", [*OTHERS, *CASES])
+@pytest.mark.parametrize(
+    "name",
+    ["board", "hframe", "diagnosis"]
+    + [
+        pytest.param(name, marks=pytest.mark.nightly)
+        for name in ("compared", "reproduction", "frame", "frame-solid")
+    ],
+)
 def test_fits_a_small_screen(
     view: Callable[..., Any], addresses: dict[str, tuple[Path, str]], name: str
 ) -> None:
