@@ -125,7 +125,14 @@ def test_a_bad_strategy_fails_the_check_that_it_should(toy: type[Strategy]) -> N
     assert "\n" not in message
 
 
-@pytest.mark.parametrize("toy", SAYS, ids=lambda toy: toy.__name__)
+@pytest.mark.parametrize(
+    "toy",
+    [
+        pytest.param(toy, marks=pytest.mark.nightly) if toy is toys.LoopingWhenFree else toy
+        for toy in SAYS
+    ],
+    ids=lambda toy: toy.__name__,
+)
 def test_a_strategy_that_ends_or_blocks_its_process_leaves_the_checker_alone(
     toy: type[Strategy],
 ) -> None:

@@ -90,7 +90,11 @@ def judged(blind: Blind) -> tuple[Judgement, Answer, tuple[float, ...]]:
     return judge_answer(drawn.truth, answer, delta), answer, delta
 
 
-@pytest.mark.parametrize("blind", SINGLES, ids=str)
+@pytest.mark.parametrize(
+    "blind",
+    [*SINGLES[::2], *(pytest.param(one, marks=pytest.mark.nightly) for one in SINGLES[1::2])],
+    ids=str,
+)
 def test_a_hidden_effect_is_found_at_its_place(blind: Blind) -> None:
     verdict, answer, (delta,) = judged(blind)
     assert delta > CLEAR

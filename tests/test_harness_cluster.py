@@ -104,6 +104,7 @@ def test_ten_thousand_jobs_with_two_kills(open_two: DaskWorkers, tmp_path: Path)
     check_kills(open_two, 10_000, tmp_path)
 
 
+@pytest.mark.nightly
 def test_a_job_that_ends_its_workers_is_crashed_and_the_others_are_not(
     open_two: DaskWorkers,
 ) -> None:

@@ -28,7 +28,7 @@ import harness_toys as toys
 from store_edits import change_data, records
 
 TOYS = Path(__file__).parent / "toys"
-FEW_KILLS, MANY_KILLS, JOBS = 8, 50, 104
+FEW_KILLS, MANY_KILLS, JOBS = 4, 50, 104
 CASE = toys.tiny_case()
 
 

@@ -125,6 +125,7 @@ def test_the_result_file_goes_onto_a_leaderboard(repository: Repository, tmp_pat
     assert "javascript:" not in page
 
 
+@pytest.mark.nightly
 def test_as_good_as_before_is_accepted(repository: Repository) -> None:
     repository.becomes(f"{FACTOR} * (1.0 + 1e-6)", "0.1.1")
     code, stated, summary = repository.act(baseline="baseline.json")
