@@ -15,7 +15,7 @@ from true_fit import CataloguedCause, true_fit
 
 from femubench.core.case.case import Case
 from femubench.core.challenge.outcome import Same, outcome, same_place
-from femubench.core.challenge.score import Parts
+from femubench.core.challenge.score import LARGEST_GROUP, Parts
 from femubench.core.challenge.truth_file import KnownCase
 from femubench.core.diagnosis.proof import extend_by
 from femubench.core.diagnosis.verdict import Sufficiency, decide, elsewhere
@@ -58,12 +58,16 @@ def ceiling(case: Case, truth: KnownCase, effects: Mapping[str, Effect]) -> Iter
         yield dict.fromkeys(TIMES, OUTSIDE if truth.causes else SOUND)
         return
     problem, _ = pose_problem(case.model, used, (), 0.0)
+    # What the true states do not show, no model can make visible.
+    agrees = case.reference is not None and not compare_states(used, case.reference).differs
     for column, times in TIMES.items():
         present = ideal_test(problem, changed, used, times)
         if times == 1 or len(present) > len(used):
             before = ideal_test(problem, case.model, present)
             terms = Terms(known, case.tolerance, reference=before, beam=case.beam_share)
             cells = _classified(problem, present, truth, terms, same)
+            if times == 1 and agrees:
+                cells["class"] = INVISIBLE
             yield cells if times == 1 else {column: cells["class"]}
 
 
@@ -89,7 +93,7 @@ def true_model(
             effect, size = effects.get(cause.effect), cause.size
             words = [word for name, word in cause.findings if name == cause.effect]
             places = effect.places(model) if effect is not None and size is not None else ()
-            place = next((p for p in places if any(same(p, word) for word in words)), None)
+            place = next((p for word in words for p in places if same(p, word)), None)
             if effect is None or place is None or len(effect.parameters(model, place)) > 1:
                 break
             changed = effect.extend(changed, place, [size])
@@ -165,8 +169,11 @@ def _classified(
     of = decision.shared or {name for key in decision.group for name in key}
     right = [is_one_of(tuple(p for p in _parts(e) if p[0] in of), "right") for e in stated]
     found |= {"class": MANY, "candidates": len(right)}
+    # More names, or places, than a group may have say nothing.
     if decision.verdict in ("named", "ambiguous") and any(right):
-        found["class"] = NAMEABLE if all(right) else GROUPED
+        found["class"] = (
+            NAMEABLE if all(right) else GROUPED if len(right) <= LARGEST_GROUP else MANY
+        )
     others = (_parts(e) for e in posterior.explanations if e.parts)
     rival = next((parts for parts in others if not is_one_of(parts, "right", "with others")), ())
     return {**found, "rival": " + ".join(f"{effect}@{place}" for effect, place in rival)}

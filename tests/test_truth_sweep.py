@@ -352,7 +352,8 @@ def test_what_data_could_name() -> None:
     case = read_case(ROOT / "scenarios" / "frame-solid")
     seen = case.measurement
     seen = replace(seen, shapes=seen.shapes * np.nan, frequency_std=1e-3 * seen.frequencies)
-    case = replace(case, measurement=seen, reference=seen, tolerance=0.0, model_error=0.0)
+    before = replace(seen, frequencies=1.03 * seen.frequencies)
+    case = replace(case, measurement=seen, reference=before, tolerance=0.0, model_error=0.0)
     effects = {"added-mass": load_plugins().effects["added-mass"]}
 
     def found(place: str, size: float) -> list[str]:
@@ -364,3 +365,5 @@ def test_what_data_could_name() -> None:
     assert found("J1", 0.2) == ["in a group", "in a group"]
     assert found("J1", 1e-4) == ["invisible", "invisible"]
     assert found("nowhere", 0.2) == ["outside", "outside"]
+    case = replace(case, reference=seen)
+    assert found("rung-middle@0.5", 0.2) == ["invisible", "nameable"]
