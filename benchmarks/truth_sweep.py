@@ -4,6 +4,7 @@ python benchmarks/truth_sweep.py run --jobs 2         # appends, goes on where i
 python benchmarks/truth_sweep.py run --reference      # with the measurement before the defect
 python benchmarks/truth_sweep.py run --set opensees   # the second generator; shear: the third
 python benchmarks/truth_sweep.py tables               # of each run: [--reference] [--set SET]
+python benchmarks/truth_sweep.py ceiling              # what the data could name: [--set SET]
 """
 
 from __future__ import annotations
@@ -21,18 +22,20 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from statistics import median
 from types import FrameType
 from typing import Any, TypeVar
 
+import pandas as pd
 from threadpoolctl import threadpool_limits
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the truths are not installed
 
 from blind_sweep import Record
+from ceiling import CLASSES, GROUPED, NAMEABLE, ceiling
 from stated_probabilities import (
     Statement,
     calibration_rows,
@@ -76,6 +79,7 @@ from truths.posing import (
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "femubench-results" / "truth-sweep.jsonl"
 MARK = "truth-sweep"
+CEILING = "sweep-ceiling.csv"
 SURE = 0.99
 HALVES = {"development": False, "held": True}
 # Truths and their structures.
@@ -120,12 +124,14 @@ class Task:
         suite: where the structures are.
         reference: whether it brings the healthy structure's measurement.
         seconds: of processor time that it may take.
+        ideal: whether it is asked what its data could name, and not diagnosed.
     """
 
     folder: Path
     suite: Path
     reference: bool
     seconds: float
+    ideal: bool = False
 
     @property
     def key(self) -> tuple[str, str]:
@@ -149,15 +155,22 @@ def diagnosed(task: Task, key: tuple[str, str]) -> Record:
     begin = time.process_time()
     with tempfile.TemporaryDirectory() as scratch, threadpool_limits(1):
         target = Path(scratch, "case")
-        pose(task.folder, target, task.reference, suite=task.suite)
+        truth = pose(task.folder, target, task.reference, suite=task.suite)
         try:
             with warnings.catch_warnings(record=True) as caught, limited(task.seconds):
                 warnings.simplefilter("default")
-                diagnosis = diagnose(read_case(target))
+                case = read_case(target)
+                if task.ideal:
+                    for cells in ceiling(case, truth, load_plugins().effects):
+                        record |= cells
+                        record["verdict"] = record["class"]
+                else:
+                    diagnosis = diagnose(case)
             record["warnings"] = sorted({str(warning.message)[:80] for warning in caught})
-            record |= record_of(Answer.of(diagnosis))
-            record["chi2"] = list(diagnosis.chi2)
-            record["adequacy_p"] = diagnosis.adequacy_p
+            if diagnosis is not None:
+                record |= record_of(Answer.of(diagnosis))
+                record["chi2"] = list(diagnosis.chi2)
+                record["adequacy_p"] = diagnosis.adequacy_p
         except TooLong:
             record["verdict"] = "too-long"
         except Exception as error:  # a fault of the diagnosis is a finding of the sweep
@@ -165,7 +178,7 @@ def diagnosed(task: Task, key: tuple[str, str]) -> Record:
     record["seconds"] = round(time.process_time() - begin, 2)
     if diagnosis is not None:
         with suppress(TooLong), limited(task.seconds), threadpool_limits(1):
-            record |= _fits(diagnosis, read_truth(task.folder))
+            record |= _fits(diagnosis, truth)
     return record
 
 
@@ -260,6 +273,7 @@ class Scored:
         fits: whether the answer fits worse than the truth, and whether by a fault of the search;
             None where the truth was not fitted.
         seconds: of one core.
+        ceiling: the class of what the data could name; empty where it is not known.
     """
 
     truth: KnownCase
@@ -270,6 +284,7 @@ class Scored:
     deviations: tuple[float, ...] = ()
     fits: tuple[bool, bool] | None = None
     seconds: float = 0.0
+    ceiling: str = ""
 
 
 def scored(records: Mapping[str, Record], truths: Iterable[KnownCase], suite: Path) -> list[Scored]:
@@ -398,6 +413,8 @@ def strict_rows(cases: Sequence[Scored]) -> list[dict[str, str]]:
         return [case for case in cases if case.truth.kind in kinds]
 
     faults = of("data-fault", "input-fault")
+    clear = [case for case in cases if case.ceiling == NAMEABLE]
+    known = [case for case in cases if case.ceiling in (NAMEABLE, GROUPED)]
     named, grouped = ("right",), ("right", "in the group")
     # A pair that is named by half says nothing that is not so.
     untrue = ("wrong", "other place", "with others")
@@ -405,6 +422,8 @@ def strict_rows(cases: Sequence[Scored]) -> list[dict[str, str]]:
         ("one defect: named with its place, alone", of("defect"), named),
         ("one defect: so, or in a group", of("defect"), grouped),
         ("two defects: both so, or in a group", of("pair"), grouped),
+        ("what the data could name: named with its place, alone", clear, named),
+        ("what they could name or group: so, or in a group", known, grouped),
         ("sound: none", of("clean"), ("none",)),
         ("outside the catalogue: flagged", of("outside"), (*grouped, "unknown", "not confirmed")),
         ("fault of data or input: named with its place", faults, named),
@@ -477,10 +496,43 @@ def strict_table(cases: Sequence[Scored]) -> str:
     return as_markdown(rows.values())
 
 
+def ceiling_rows(records: Mapping[str, Record], folders: Iterable[Path]) -> list[dict[str, str]]:
+    """Return one row a truth: what its data could name, and what else would explain them best."""
+    rows = []
+    for folder in folders:
+        if folder.name in records:
+            truth, record = read_truth(folder), records[folder.name]
+            cells = {"class": record["verdict"], **record, "kind": truth.kind}
+            cells["half"] = next(name for name, held in HALVES.items() if held is truth.held)
+            cells["chi2"] = f"{record['chi2']:.4g}" if "chi2" in record else ""
+            columns = "name", "half", "kind", "class", "twice", "chi2", "rival"
+            rows.append({column: str(cells.get(column, "")) for column in columns})
+    return rows
+
+
+def ceiling_table(path: Path) -> str:
+    """Return how many truths are of each class, by set and half; with twice the modes in brackets.
+
+    Arguments:
+        path: of the table with one row a truth.
+    """
+    known = pd.read_csv(path, dtype=str, keep_default_na=False)
+    rows = []
+    for (name, half_of), own in known.groupby(["run", "half"]):
+        counts = {c: f"{(own['class'] == c).sum()} ({(own['twice'] == c).sum()})" for c in CLASSES}
+        rows.append({"set": name, "half": half_of, "truths": str(len(own)), **counts})
+    return as_markdown(rows)
+
+
+def fill(page: Path, text: str, mark: str) -> None:
+    """Write a text between its markers on a page."""
+    page.write_text(filled(page.read_text(encoding="utf-8"), text, mark), encoding="utf-8")
+
+
 def parser() -> argparse.ArgumentParser:
     """Return the command line."""
     found = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    found.add_argument("what", choices=("run", "tables"))
+    found.add_argument("what", choices=("run", "tables", "ceiling"))
     found.add_argument("names", nargs="*", help="cases; all by default")
     found.add_argument("--jobs", type=int, default=2, help="processes")
     found.add_argument("--reference", action="store_true", help="with the healthy structure")
@@ -500,7 +552,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options: Any = known.parse_args(arguments)
     rooms, suite = SETS[options.set]
     options.truths, options.suite = options.truths or rooms, options.suite or suite
-    folders = truth_folders(*options.truths)
+    every = folders = truth_folders(*options.truths)
+    ideal = options.what == "ceiling"
+    options.reference |= ideal
     if unknown := set(options.names) - {folder.name for folder in folders}:
         known.error(f"no case {sorted(unknown)[0]!r} in {', '.join(map(str, options.truths))}")
     if options.names:
@@ -508,25 +562,32 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if options.reference:
         folders = [folder for folder in folders if (folder / HEALTHY).is_file()]
     run_of = ("" if options.set == "solids" else f"-{options.set}") + (
-        "-reference" if options.reference else ""
+        "-ceiling" if ideal else "-reference" if options.reference else ""
     )
     results = options.results or RESULTS.with_stem(RESULTS.stem + run_of)
-    tasks = [Task(f, options.suite, options.reference, options.seconds) for f in folders]
-    if options.what == "run":
+    tasks = [Task(f, options.suite, options.reference, options.seconds, ideal) for f in folders]
+    table = options.data / CEILING
+    if options.what != "tables":
         run(results, tasks, options.jobs)
+        if ideal:
+            write_rows(table, options.set, ceiling_rows(read_records(results), every))
+            fill(options.page, ceiling_table(table), "ceiling")
         return
     truths = [read_truth(folder) for folder in folders]
     keys = dict(task.key for task in tasks)
     records = read_records(results)
     records = {n: r for n, r in records.items() if n in keys and is_of(r, (n, keys[n]))}
     cases = scored(records, truths, options.suite)
+    if options.reference and table.is_file():
+        rows = pd.read_csv(table, dtype=str, keep_default_na=False).query("run == @options.set")
+        classes = dict(zip(rows["name"], rows["class"], strict=True))
+        cases = [replace(c, ceiling=classes.get(c.truth.name, "")) for c in cases]
     if not cases:
         known.error(f"no results in {results}: run the sweep first")
     name = options.set + ("-reference" if options.reference else "")
-    for table, rows in tables(cases, truths).items():
-        write_rows(options.data / f"sweep-{table}.csv", name, rows)
-    page = filled(options.page.read_text(encoding="utf-8"), strict_table(cases), MARK + run_of)
-    options.page.write_text(page, encoding="utf-8")
+    for what, rows in tables(cases, truths).items():
+        write_rows(options.data / f"sweep-{what}.csv", name, rows)
+    fill(options.page, strict_table(cases), MARK + run_of)
     print(f"{len(cases)} of {len(truths)} cases, {options.page}, {options.data}")
 
 

@@ -8,12 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import truth_sweep as sweep
+from ceiling import ceiling
 
 from femubench import read_case
 from femubench.core.challenge.truth_file import KnownCase, TrueCause, is_held
 from femubench.core.diagnosis import diagnose as diagnosing
+from femubench.core.plugin.loader import load_plugins
 from truths.truth_text import truth_text
 
 ROOT = Path(__file__).parents[1]
@@ -342,3 +345,25 @@ def test_a_fault_is_judged_by_the_faults_that_are_named(same: sweep.Same) -> Non
             outcome,
             companions,
         )
+
+
+def test_what_data_could_name() -> None:
+    """Frequencies alone tell a mass in the middle, and no corner from the one opposite."""
+    case = read_case(ROOT / "scenarios" / "frame-solid")
+    seen = case.measurement
+    seen = replace(seen, shapes=seen.shapes * np.nan, frequency_std=1e-3 * seen.frequencies)
+    before = replace(seen, frequencies=1.03 * seen.frequencies)
+    case = replace(case, measurement=seen, reference=before, tolerance=0.0, model_error=0.0)
+    effects = {"added-mass": load_plugins().effects["added-mass"]}
+
+    def found(place: str, size: float) -> list[str]:
+        mass = TrueCause("a mass", "added-mass", place, size=size, unit="kg")
+        cells = list(ceiling(case, truth("defect", mass), effects))
+        return [cells[0]["class"], cells[-1]["twice"]]
+
+    assert found("rung-middle@0.5", 0.2) == ["nameable", "nameable"]
+    assert found("J1", 0.2) == ["in a group", "in a group"]
+    assert found("J1", 1e-4) == ["invisible", "invisible"]
+    assert found("nowhere", 0.2) == ["outside", "outside"]
+    case = replace(case, reference=seen)
+    assert found("rung-middle@0.5", 0.2) == ["invisible", "nameable"]
