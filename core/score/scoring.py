@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
 import scipy.linalg as la
+from msgspec import structs
 
 from femubench.core.case.case import Case, Modification
 from femubench.core.fem.model import Model
@@ -27,6 +28,7 @@ from femubench.core.modal.pairing import LEAST_SENSORS, WINDOW, pair_measured
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block
+from femubench.core.score.bounded_gain import find_candidates, find_tested_modes
 from femubench.core.score.partners import surplus_partners
 from femubench.core.score.predicted_spread import MORE, Spread
 from femubench.core.score.ranking import (
@@ -200,6 +202,15 @@ def reference_of(case: Case) -> Reference:
     """
     modes = _modes_for(case.model, (case.measurement,))
     blocks, choices = _blocks(case, case.model, modes)
+    if "modified" in blocks:
+        tested = [
+            mode
+            for change in case.modifications
+            for mode in find_tested_modes(case.measurement, change.measurement)
+        ]
+        pairs = zip(blocks["modified"].modes, tested, strict=True)
+        linked = tuple(structs.replace(pair, before=mode) for pair, mode in pairs)
+        blocks["modified"] = replace(blocks["modified"], modes=linked)
     return Reference(blocks, zero_tolerance(modes), rigid_modes_of(case.model), choices)
 
 
@@ -297,13 +308,15 @@ def _predict(
             mac=None if np.isnan(likeness) else float(likeness),
             modification=modification,
             predicted_std_hz=deviation,
+            candidates=others,
         )
-        for number, measured, partner, likeness, deviation in zip(
+        for number, measured, partner, likeness, deviation, others in zip(
             measurement.numbers,
             measurement.frequencies,
             pairing.index,
             pairing.mac,
             std,
+            find_candidates(measurement, frequencies, readings, pairing),
             strict=True,
         )
     )
