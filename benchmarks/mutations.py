@@ -102,7 +102,7 @@ core/score/partners.py :: partners
 core/score/predictive.py :: uncertainty
     ANYTHING = 0.01 => ANYTHING = 0.1
     2.0 * density - 1.0 / np.sqrt(np.pi) => 2.0 * density - 1.0 / np.pi
-core/score/twin_skill.py :: twins
+core/score/twin_gain.py :: twins
     frozenset({"timeout", "crashed"}) => frozenset({"crashed"})
     CLEAR, KNOWN = 1.1, 2.0 => CLEAR, KNOWN = 1.01, 2.0
 core/run/store.py :: harness_store resume

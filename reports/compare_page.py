@@ -28,7 +28,7 @@ _BLANK = "\u2800"  # stands for an indent until the table is made, which strips 
 _MOST_LINES = 20  # of a list on the screen
 _LONGEST = 300
 _LEGEND = (
-    "Ratios B / A, less than 1 is better in B: unseen (errors that make the skill); used, higher, "
+    "Ratios B / A, less than 1 is better in B: unseen (errors that make the gain); used, higher, "
     "modified (rms frequency error + 0.05 %); seconds (sums). Means are geometric, over cases and "
     "seeds. lost: results that A has and B has not."
 )

@@ -53,12 +53,12 @@ def feeds_of(index: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _news_text(item: Mapping[str, Any]) -> str:
-    """Return version and skill of who is in the news."""
+    """Return version and gain of who is in the news."""
     stated = f"Version {plain(item['version'])}, femubench {plain(item['femubench'])}: "
-    if item["skill"] is None:
+    if item["gain"] is None:
         return f"{stated}no result on today's files of the cases."
     sure = "" if item["low"] is None else f" (95 %: {interval(item['low'], item['high'])})"
-    return f"{stated}skill {format_fixed(item['skill'], 3, 7)}{sure} on today's cases."
+    return f"{stated}gain {format_fixed(item['gain'], 3, 7)}{sure} on today's cases."
 
 
 def _name(*parts: str) -> str:

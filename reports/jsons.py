@@ -12,7 +12,7 @@ from femubench.results import (
     StudyAxes,
     leaderboard,
     run_to_json,
-    skill_by,
+    gain_by,
     tell_apart,
     unsteady,
 )
@@ -20,7 +20,7 @@ from femubench.results import (
 # Names of the contract, and the columns of the leaderboard that they stand for.
 _FIGURES = {
     **{f"{name}_percent": f"{name}_percent" for name in ("higher", "modified", "crps")},
-    **{name: name for name in ("skill_drawn", "skill_tests", "coverage90", "ok")},
+    **{name: name for name in ("gain_drawn", "gain_tests", "coverage90", "ok")},
     "given_percent": "used_percent",
     "of": "total",
 }
@@ -36,7 +36,7 @@ class JsonReporter:
         """Return strict JSON: what is not a finite number is null."""
         plain = {**run_to_json(run), "leaderboard": board_of(run)}
         if StudyAxes.from_run(run) is not None:
-            cells = skill_by(run).to_dict("records")
+            cells = gain_by(run).to_dict("records")
             plain["cells"] = [{str(name): clean(v) for name, v in row.items()} for row in cells]
         return json.dumps(plain, indent=1, allow_nan=False)
 
@@ -67,8 +67,8 @@ def board_of(run: Run) -> list[dict[str, Any]]:
             "strategy": row["strategy"],
             "rank": clean(row["rank"]),
             "tier": tiers.get(row["strategy"]),
-            "skill": clean(row["skill"]),
-            "interval": [clean(row["skill_low"]), clean(row["skill_high"])],
+            "gain": clean(row["gain"]),
+            "interval": [clean(row["gain_low"]), clean(row["gain_high"])],
             **{name: clean(row[column]) for name, column in _FIGURES.items()},
             "physical": not row["unphysical"],
             **({"twins": twins[row["strategy"]]} if row["strategy"] in twins else {}),

@@ -14,7 +14,7 @@ from femubench.reports.templating import asset, templates
 from femubench.results import rank_items
 
 _MOST_DRAWN = 20
-_LEAST = -1.0  # skill that is drawn; an arrow tells of less
+_LEAST = -1.0  # gain that is drawn; an arrow tells of less
 _LINE = "The line is the 95 % interval. "
 _OTHERS = ("others", "not shown to be worse", "shown to be worse")
 
@@ -61,7 +61,7 @@ def _board_page(index: Data, board: Data) -> str:
         "board", index, board,
         "Leaderboard of updating strategies" + (f": {name}" if name else ""),
         answer=list(_answer(board)),
-        chart=skills_of(board),
+        chart=gains_of(board),
         strategies={item["name"]: item for item in index["strategies"]},
     )  # fmt: skip
 
@@ -71,7 +71,7 @@ def _strategy_page(item: Data, index: Data) -> str:
     ranks = sum(row["rank"] is not None for row in index["boards"][0]["rows"])
     answer = "No rank: the latest version lacks a case of the ranking."
     if item["rank"]:
-        answer = f"Rank {item['rank']} of {ranks} with {_skill_words(latest)}."
+        answer = f"Rank {item['rank']} of {ranks} with {_gain_words(latest)}."
     return _page(
         "strategy", index, item,
         plain(item["name"]) or "a strategy without name",
@@ -87,7 +87,7 @@ def _answer(board: Data) -> Iterator[str]:
     others = [row for row in board["rows"] if _stand(row) in _OTHERS]
     if first:
         who = join_names([plain(row["strategy"]) for row in first])
-        yield f"{who} {'lead' if first[1:] else 'leads'} with {_skill_words(first[0])}."
+        yield f"{who} {'lead' if first[1:] else 'leads'} with {_gain_words(first[0])}."
     else:
         yield "Nobody leads: no strategy has all cases of the ranking."
     near = [plain(row["strategy"]) for row in others if not row["below_best"]]
@@ -106,9 +106,9 @@ def _answer(board: Data) -> Iterator[str]:
     yield f"On {stated} that more than half of the strategies were run on."
 
 
-def _skill_words(row: Data) -> str:
+def _gain_words(row: Data) -> str:
     sure = "" if row["low"] is None else f" (95 % interval {interval(row['low'], row['high'])})"
-    return f"skill {format_fixed(row['skill'], 3, 7)}{sure}"
+    return f"gain {format_fixed(row['gain'], 3, 7)}{sure}"
 
 
 def _on_case(strategies: Iterable[Data], name: str, digest: str) -> list[tuple[Data, Data]]:
@@ -147,12 +147,12 @@ def _machines(machines: Sequence[Data], *, most: int = 3) -> str:
     return "; ".join(names[:most]) + (f" +{len(names) - most}" if len(names) > most else "")
 
 
-def skills_of(board: Data) -> Chart:
-    """Return the skills of a board with their intervals, by what is shown of them."""
-    known = [row for row in board["rows"] if row["skill"] is not None]
+def gains_of(board: Data) -> Chart:
+    """Return the gains of a board with their intervals, by what is shown of them."""
+    known = [row for row in board["rows"] if row["gain"] is not None]
     whose = "every strategy" if len(known) <= _MOST_DRAWN else f"the first {_MOST_DRAWN}"
     labels = (f"{row['rank'] or '–'}  {plain(row['strategy'])}" for row in known)
-    return _chart(f"Skill of {whose}", list(zip(map(_stand, known), labels, known, strict=True)))
+    return _chart(f"Gain of {whose}", list(zip(map(_stand, known), labels, known, strict=True)))
 
 
 def _stand(row: Data) -> str:
@@ -166,7 +166,7 @@ def _stand(row: Data) -> str:
 
 
 def history_of(versions: Sequence[Data]) -> Chart | None:
-    """Return the skill of every version, latest first; None where there is nothing to compare."""
+    """Return the gain of every version, latest first; None where there is nothing to compare."""
     rows = [
         (
             "on all cases" if row["complete"] else "lacks a case",
@@ -174,15 +174,15 @@ def history_of(versions: Sequence[Data]) -> Chart | None:
             row,
         )
         for age, row in enumerate(versions)
-        if row["skill"] is not None
+        if row["gain"] is not None
     ]
-    return _chart("Skill of every version", rows) if len(rows) > 1 else None
+    return _chart("Gain of every version", rows) if len(rows) > 1 else None
 
 
 def _chart(title: str, rows: Sequence[tuple[str, str, Data]]) -> Chart:
-    """Return the first skills with their intervals, given by group and label."""
+    """Return the first gains with their intervals, given by group and label."""
     drawn = rows[:_MOST_DRAWN]
-    ends = [row[key] for _, _, row in drawn for key in ("skill", "low") if row[key] is not None]
+    ends = [row[key] for _, _, row in drawn for key in ("gain", "low") if row[key] is not None]
     series = []
     for group in dict.fromkeys(group for group, _, _ in drawn):
         own = [(label, row) for other, label, row in drawn if other == group]
@@ -190,10 +190,10 @@ def _chart(title: str, rows: Sequence[tuple[str, str, Data]]) -> Chart:
             [None if row[key] is None else max(row[key], _LEAST) for _, row in own]
             for key in ("low", "high")
         )
-        skills = [row["skill"] for _, row in own]
-        series.append(Series(group, skills, [label for label, _ in own], low, high))
+        gains = [row["gain"] for _, row in own]
+        series.append(Series(group, gains, [label for label, _ in own], low, high))
     least = max(min([*ends, 0.0]) - 0.05, _LEAST)
-    x = Axis("skill, part of the error taken away", low=least, high=1.0)
+    x = Axis("gain, part of the error taken away", low=least, high=1.0)
     y = Axis("", names=tuple(label for _, label, _ in drawn))
     sure = any(row["low"] is not None for _, _, row in drawn)
     note = f"{_LINE * sure}1: no error left; 0: as the textbook model, without data."

@@ -38,7 +38,7 @@ from femubench.results import (
     modes_frame,
     ranks_by_floor,
     tell_apart,
-    twin_skills,
+    twin_gains,
 )
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ if TYPE_CHECKING:
 
 
 _FIGURES = {
-    "skill": Column("skill", 5, digits=3),
-    "skill_drawn": Column("from\ndrawn", 5, digits=3),
+    "gain": Column("gain", 5, digits=3),
+    "gain_drawn": Column("from\ndrawn", 5, digits=3),
     "higher_percent": Column("high\n%", 4, digits=2),
     "modified_percent": Column("mod.\n%", 4, digits=2),
     "used_percent": Column("given\n%", 4, digits=2),
@@ -59,7 +59,7 @@ _FIGURES = {
 }
 _ALWAYS = 2 + len(_FIGURES)  # columns that are there whatever is known
 _MORE_FIGURES = {
-    "skill_tests": Column("on\ntests", 5, digits=3),
+    "gain_tests": Column("on\ntests", 5, digits=3),
     "coverage90": Column("in\n90 %", 4, digits=2),
     "crps_percent": Column("CRPS\n%", 4, digits=2),
     "evaluations": Column("eval.", 5),
@@ -71,7 +71,7 @@ _LEGEND = {
     "design change, which no strategy is given, and over the modes that it was given; a mode "
     "without partner counts 100 %; median over the cases, as are par., eval. and s: unknowns that "
     "were free, eigenvalue solutions, wall time",
-    "on tests": "skill on tests alone, no computed truths",
+    "on tests": "gain on tests alone, no computed truths",
     "in 90 %, CRPS": "unseen modes inside the stated 90 % interval, and the continuous ranked "
     "probability score in percent of the frequency, less is better, without a stated uncertainty "
     "the absolute error; means over structures",
@@ -80,7 +80,7 @@ _LEGEND = {
     "!": "unphysical for one of these, or for surplus partners; below all others",
     "*": "some jobs gave no model: ten times the error, left out of the errors shown",
 }
-_SKILL = (
+_GAIN = (
     "1 - r, where r is the geometric mean over structures, each the mean of its blocks of unseen "
     "data, of (rms + 0.05 %) / (rms of the textbook model + 0.05 %). A job that failed, crashed or "
     "timed out counts 10 in r, one that is not applicable as the model that it was given"
@@ -209,7 +209,7 @@ def _board(run: Run, title: str = "") -> Iterator[Passage]:
             _marks(row) + whole(row["rank"]),
             row["strategy"],
             *(row[key] for key in _FIGURES),
-            interval(row["skill_low"], row["skill_high"]),
+            interval(row["gain_low"], row["gain_high"]),
             *(row[key] for key in _MORE_FIGURES),
             str(tiers.get(row["strategy"], NOTHING)),
             letters.get(row["strategy"], ""),
@@ -238,15 +238,15 @@ def _board(run: Run, title: str = "") -> Iterator[Passage]:
 
 
 def _twins(run: Run) -> Iterator[Block]:
-    """Yield the skills on twins next to those on their cases, and who may know these."""
-    found = sorted(twin_skills(run).items(), key=lambda entry: -entry[1].original_skill)
+    """Yield the gains on twins next to those on their cases, and who may know these."""
+    found = sorted(twin_gains(run).items(), key=lambda entry: -entry[1].original_gain)
     if found:
         heads = (Column(head, 8, digits=3) for head in ("on twins", "on cases", "p"))
         rows = [
-            [name + " (knows the cases?)" * own.suspicious, own.skill, own.original_skill, own.p]
+            [name + " (knows the cases?)" * own.suspicious, own.gain, own.original_gain, own.p]
             for name, own in found
         ]
-        said = f"{MEANING} Here: skill on {describe_twins(run)}."
+        said = f"{MEANING} Here: gain on {describe_twins(run)}."
         yield Table([Column("strategy", 30, left=True), *heads], rows, said)
     yield from (f"?: {stated}" for stated in suspicions(run))
 
@@ -276,7 +276,7 @@ def _document(run: Run) -> Iterator[Passage]:
     about = Table([Column("", 9, left=True)] * 2, list(header(run)))
     yield Passage("", [about, *([Items(notes)] if notes else [])])
     yield from _board(run, "Leaderboard")
-    yield Passage("", [Items([("skill", _SKILL), floors_said(run)])])
+    yield Passage("", [Items([("gain", _GAIN), floors_said(run)])])
     rows: list[list[Cell]] = []
     for name in strategies_of(run):
         found = [result.status for result in run.results if result.strategy == name]

@@ -24,7 +24,7 @@ _HEADER = (
     *("run", "started", "seed", "seeds", "jobs", "timeout"),
     *("versions", "machine", "git_commit"),
 )
-_SHOWN = 0.0005  # skill that is printed as more than 0
+_SHOWN = 0.0005  # gain that is printed as more than 0
 _TITLES = {"jobs": "workers", "timeout": "timeout in s", "git_commit": "git commit"}
 
 
@@ -124,11 +124,11 @@ def _yardstick(run: Run) -> str:
 
 
 def lead(run: Run) -> str:
-    """Return what the skill of a run says, and from where its strategies started."""
+    """Return what the gain of a run says, and from where its strategies started."""
     unseen = find_basis(run) == "unseen"
     what = "unseen data" if unseen else "the modes that were given"
     stated = [
-        f"Skill is the part of the {_yardstick(run)} model's error on {what} that a strategy takes "
+        f"Gain is the part of the {_yardstick(run)} model's error on {what} that a strategy takes "
         "away: 1 is all of it, 0 none, less than 0 is worse."
     ]
     if len(run.nominals) > 1:
@@ -155,34 +155,34 @@ def finding(
     best = next((row for row in board if row["ok"] and not row["unphysical"]), None)
     if best is None:
         return ["No strategy gave a possible model."] if board else []
-    name, skill, models = plain(best["strategy"]), best["skill"], f"{_yardstick(run)} models"
+    name, gain, models = plain(best["strategy"]), best["gain"], f"{_yardstick(run)} models"
     sure, data = "", "unseen data" if find_basis(run) == "unseen" else "the given modes"
     if kind := interval_kind(run):
         cases = {structures_of(run).get(case, case) for case in cases_of(run)}
         count = len(seeds_of(run) if kind == "seeds" else cases)
-        ends = interval(best["skill_low"], best["skill_high"])
+        ends = interval(best["gain_low"], best["gain_high"])
         sure = f", 95 % interval {ends} over {count} {kind}"
     first = [plain(row["strategy"]) for row in board if row["rank"] == best["rank"]]
     leads = "leads: it takes" if len(first) == 1 else "share the first rank: each takes"
     stated = [
-        f"{join_names(first)} {leads} away {100.0 * skill:.0f} % of the {models}' error on "
-        f"{data} (skill {skill:.3f}{sure})."
-        if skill >= _SHOWN
-        else f"No strategy improves on the {models} on {data}; the best, {name}, has a skill of "
-        f"{skill:.3f}{sure}.",
+        f"{join_names(first)} {leads} away {100.0 * gain:.0f} % of the {models}' error on "
+        f"{data} (gain {gain:.3f}{sure})."
+        if gain >= _SHOWN
+        else f"No strategy improves on the {models} on {data}; the best, {name}, has a gain of "
+        f"{gain:.3f}{sure}.",
         *_how_sure(name, tiers, len(board)),
     ]
-    if skill >= _SHOWN and best["skill_low"] <= 0.0:
+    if gain >= _SHOWN and best["gain_low"] <= 0.0:
         stated.append(f"Its interval holds 0: an improvement on the {models} is not shown.")
-    idle = [row["skill_drawn"] for row in board if row["strategy"] == run.meta.get("baseline")]
+    idle = [row["gain_drawn"] for row in board if row["strategy"] == run.meta.get("baseline")]
     if idle and math.isfinite(idle[0]):
         stated.append(
             f"Without data the {models} stand at 0 and the models as drawn at {idle[0]:.3f}; "
-            f"started from the latter {name} reaches {best['skill_drawn']:.3f}."
+            f"started from the latter {name} reaches {best['gain_drawn']:.3f}."
         )
-    if math.isfinite(best["skill_tests"]):
+    if math.isfinite(best["gain_tests"]):
         stated.append(
-            f"On tests alone, no computed truths, its skill is {best['skill_tests']:.3f}."
+            f"On tests alone, no computed truths, its gain is {best['gain_tests']:.3f}."
         )
     return [sentence.replace(" -", " \u2212") for sentence in stated]
 

@@ -16,7 +16,7 @@ from femubench.results import leaderboard
 ROOT = Path(__file__).parents[1]
 # Seconds are those of one machine.
 COLUMNS = (
-    *("skill", "skill_drawn", "higher_percent", "modified_percent", "used_percent"),
+    *("gain", "gain_drawn", "higher_percent", "modified_percent", "used_percent"),
     *("rigid_modes_lost", "negative_eigenvalues", "parameters"),
 )
 _ROW = re.compile(r"^\s*([!*]*)(\d+)  (\S+)((?:\s+[\d.–-]+){9})$", re.M)

@@ -307,9 +307,9 @@ def test_thresholds_decide_the_exit_code(
     ("options", "message"),
     [
         (["--fail", "rank>1"], "'rank>1' is no threshold"),
-        (["--fail", "skill<1"], "METRIC>NUMBER"),
-        (["--fail", "skill>1e999"], "METRIC>NUMBER"),
-        (["--fail", "skill>1e"], "METRIC>NUMBER"),
+        (["--fail", "gain<1"], "METRIC>NUMBER"),
+        (["--fail", "gain>1e999"], "METRIC>NUMBER"),
+        (["--fail", "gain>1e"], "METRIC>NUMBER"),
         (["-s", "softr"], "no strategy 'softr'; did you mean 'softer'"),
         (["-f", "pdf"], "'pdf'"),
     ],

@@ -102,27 +102,27 @@ def test_what_the_readme_says_of_the_board(run: Run, rows: dict[str, dict[str, A
     best, second = list(rows)[:2]
     assert best == "diagnosed"
     for name, key, pattern in (
-        (best, "skill", r"leads with (0\.\d+)"),
-        (best, "skill_tests", r"two published tests \((0\.\d+)\)"),
-        (best, "skill_low", r"interval reaches from (-0\.\d+) to"),
-        (best, "skill_high", r"interval reaches from -0\.\d+ to (0\.\d+)"),
-        ("berman", "skill", r"take away (0\.\d+) and 0\.\d+ of"),
-        ("baruch", "skill", r"take away 0\.\d+ and (0\.\d+) of"),
-        (best, "skill_drawn", r"`diagnosed` \((0\.\d+)\), which knows"),
-        ("global", "skill_drawn", r"`global` \((0\.\d+)\), one factor"),
+        (best, "gain", r"leads with (0\.\d+)"),
+        (best, "gain_tests", r"two published tests \((0\.\d+)\)"),
+        (best, "gain_low", r"interval reaches from (-0\.\d+) to"),
+        (best, "gain_high", r"interval reaches from -0\.\d+ to (0\.\d+)"),
+        ("berman", "gain", r"take away (0\.\d+) and 0\.\d+ of"),
+        ("baruch", "gain", r"take away 0\.\d+ and (0\.\d+) of"),
+        (best, "gain_drawn", r"`diagnosed` \((0\.\d+)\), which knows"),
+        ("global", "gain_drawn", r"`global` \((0\.\d+)\), one factor"),
     ):
         (said,) = only(pattern, "README.md")
         assert rows[name][key] == as_printed(said), (name, key)
-    own, rival = only(r"there its skill is (0\.\d+), the next one's (0\.\d+)")
-    assert (rows[best]["skill"], rows[second]["skill"]) == (as_printed(own), as_printed(rival))
+    own, rival = only(r"there its gain is (0\.\d+), the next one's (0\.\d+)")
+    assert (rows[best]["gain"], rows[second]["gain"]) == (as_printed(own), as_printed(rival))
     assert "no strategy is shown to differ from it" in text
     assert set(tell_apart(run, list(rows)).tiers[0]) == set(rows)
-    above = {name for name, row in rows.items() if row["skill_low"] > 1e-9}
+    above = {name for name, row in rows.items() if row["gain_low"] > 1e-9}
     assert above == {"berman", "baruch"}
     data = {name: row for name, row in rows.items() if name not in ("unchanged", "textbook")}
-    past = {name for name, row in data.items() if row["skill_drawn"] > 0.0}
+    past = {name for name, row in data.items() if row["gain_drawn"] > 0.0}
     assert past == {"diagnosed", "global"}
-    worse = [name for name, row in data.items() if row["skill"] < 0.0]
+    worse = [name for name, row in data.items() if row["gain"] < 0.0]
     said, of = only(r"(\S+) of the (\S+) leave it worse", "README.md")
     assert (NUMBERS[said], NUMBERS[of]) == (len(worse), len(data))
 

@@ -249,7 +249,7 @@ def test_an_interrupt_stops_the_workers_and_keeps_what_is_done(
     assert [item.strategy for item in run.results] == ["unchanged"]
     assert run.meta["interrupted"] is True
     table = leaderboard(run).set_index("strategy")
-    assert table.loc["looping", "skill"] == pytest.approx(-9.0)
+    assert table.loc["looping", "gain"] == pytest.approx(-9.0)
 
 
 def test_workers_that_cannot_start_end_the_run(

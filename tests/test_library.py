@@ -97,8 +97,8 @@ class TestEveryCommandOfTheReadme:
         run = femubench.study("study.toml", jobs=2)
         femubench.report(run, "ours.json")
         assert data("ours.json")["cells"][0].keys() == data("theirs.json")["cells"][0].keys()
-        cells = [[cell["skill"] for cell in data(f)["cells"]] for f in ("ours.json", "theirs.json")]
-        assert cells[0] == cells[1] == run.skill_by("noise")["skill"].tolist()
+        cells = [[cell["gain"] for cell in data(f)["cells"]] for f in ("ours.json", "theirs.json")]
+        assert cells[0] == cells[1] == run.gain_by("noise")["gain"].tolist()
         again = femubench.study("study.toml", store="s")
         assert again.meta["run"] == data("theirs.json")["meta"]["run"]
 
@@ -411,7 +411,7 @@ class TestLooks:
             page = shown._repr_html_()  # type: ignore[attr-defined]
             assert page.startswith("<table>")
             assert page.count("<tr>") == page.count("</tr>") > 0
-        assert "skill" in repr(run)
+        assert "gain" in repr(run)
         assert found.verdict in repr(found)
 
     def test_tables_are_escaped(self) -> None:

@@ -68,11 +68,11 @@ def test_the_search_itself_finds_names() -> None:
     assert list(found_in(text, names)) == [(1, "unchanged"), (3, "kabe-rigid"), (4, "frame")]
 
 
-def test_baseline_and_yardstick_are_roles_that_one_strategy_each_has() -> None:
+def test_baseline_and_cost_reference_are_roles_that_one_strategy_each_has() -> None:
     plugins = load_plugins()
     found = plugins.strategies.values()
     assert [s.name for s in found if s.baseline] == ["unchanged"]
-    assert [s.name for s in found if s.yardstick] == ["physical"]
+    assert [s.name for s in found if s.cost_reference] == ["physical"]
     (subject,) = subjects("berman", plugins)
     assert subject.bench.reference is plugins.strategies["physical"]
     other = Plugins(strategies={"berman": plugins.strategies["berman"]})

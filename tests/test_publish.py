@@ -84,7 +84,7 @@ def test_one_run_gives_its_leaderboard(data: Data, site: Site) -> None:
     for item, row in zip(found["strategies"], board, strict=True):
         version = item["versions"][0]
         assert item["rank"] == row["rank"]
-        assert version["skill"] == pytest.approx(row["skill"], rel=1e-12)
+        assert version["gain"] == pytest.approx(row["gain"], rel=1e-12)
         assert version["failures"] == (2 if row["strategy"] == "failing" else 0)
         for block in ("used", "higher", "modified"):
             assert version[f"{block}_percent"] == pytest.approx(
@@ -95,7 +95,7 @@ def test_one_run_gives_its_leaderboard(data: Data, site: Site) -> None:
     (kept,) = (site.folder / "data").glob("*.json")
     assert json.loads(kept.read_text())["meta"]["structures"] == data["meta"]["structures"]
     text = (site.folder / "index.html").read_text()
-    assert f"{found['strategies'][0]['versions'][0]['skill']:.3f}" in text
+    assert f"{found['strategies'][0]['versions'][0]['gain']:.3f}" in text
 
 
 def test_the_same_files_give_the_same_bytes(data: Data, tmp_path: Path) -> None:
@@ -142,11 +142,11 @@ def test_history_has_every_version_and_the_board_the_latest(data: Data, site: Si
         "9.9",
         old["results"][1]["provenance"]["strategy"],
     ]
-    assert softer["versions"][0]["skill"] > softer["versions"][1]["skill"]
+    assert softer["versions"][0]["gain"] > softer["versions"][1]["gain"]
     assert softer["versions"][1]["machines"][0]["cpu"] == "Old <cpu>"
     page = (site.folder / softer["page"]).read_text()
     drawn = Links(page).text.partition("Versions")[0]
-    assert "Skill of every version" in drawn
+    assert "Gain of every version" in drawn
     assert all(
         f"{number}" in drawn and row["last"][:10] in drawn
         for number, row in zip((2, 1), softer["versions"], strict=True)
@@ -169,7 +169,7 @@ def test_older_case_files_are_not_ranked(data: Data, site: Site) -> None:
     first, second = site.strategy("softer")["versions"]
     assert first["comparable"]
     assert not second["comparable"]
-    assert second["skill"] is None
+    assert second["gain"] is None
     assert site.strategy("failing")["rank"] is None
     assert site.index()["cases"][0]["older"] == ["0123"]
     page = (site.folder / site.strategy("softer")["page"]).read_text()
@@ -198,11 +198,11 @@ def test_contradictions_are_kept_and_flagged(data: Data, site: Site) -> None:
     assert {item["case"] for item in conflicts} == {"corner", "other/corner"}
     assert [row["counted"] for row in conflicts[0]["results"]] == [True, False]
     assert len(conflicts[0]["results"][0]["runs"]) == 2
-    skill = site.strategy("softer")["versions"][0]["skill"]
+    gain = site.strategy("softer")["versions"][0]["gain"]
     alone = Site(site.room)
     alone.folder = site.room / "alone"
     alone.add(honest[0])
-    assert skill == alone.strategy("softer")["versions"][0]["skill"]
+    assert gain == alone.strategy("softer")["versions"][0]["gain"]
     assert "contradicted" in (site.folder / "index.html").read_text()
 
 
@@ -470,7 +470,7 @@ def test_a_class_has_a_board_of_its_own(data: Data, site: Site) -> None:
     first = boards["frame"]["rows"][0]
     assert first["strategy"] == "unchanged"
     page = (site.folder / boards["frame"]["page"]).read_text()
-    assert f'data-value="{first["skill"]}"' in page
+    assert f'data-value="{first["gain"]}"' in page
     assert "unchanged leads" in page
     assert f'href="{boards["frame"]["page"]}"' in (site.folder / "index.html").read_text()
     lines = (site.folder / "leaderboard.csv").read_text().splitlines()
@@ -597,6 +597,6 @@ def test_the_board_says_who_is_best_and_how_sure(data: Data, site: Site) -> None
     site.add(data)
     text = Links((site.folder / "index.html").read_text()).text
     best = site.index()["boards"][0]["rows"][0]
-    assert f"softer leads with skill {best['skill']:.3f}." in text
+    assert f"softer leads with gain {best['gain']:.3f}." in text
     assert "Too few structures to say" in text
     assert "On 2 cases of 2 structures" in text

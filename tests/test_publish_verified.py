@@ -186,7 +186,7 @@ EDITS: dict[str, tuple[Edit, str]] = {
     "measured figure of a twin": (_one_mode_of_a_twin, "Hz was not measured"),
     "nominal errors": (_other_nominal, "meta.reference.suite/bracket: not the errors"),
     "score": (lambda d: d["results"][0].update(score=0.01), "results[0].score: score 0.01"),
-    "skill": (lambda d: d["leaderboard"][1].update(skill=0.99), "leaderboard[1].skill: skill 0.99"),
+    "gain": (lambda d: d["leaderboard"][1].update(gain=0.99), "leaderboard[1].gain: gain 0.99"),
     "digest": (_other_files, "meta.cases.frame.digest: other files"),
     "unknown case": (_unknown, "no case 'suite/racket' is installed here"),
     "one result": (lambda d: d["results"].pop(1), "results: 1 jobs are missing"),

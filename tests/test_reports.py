@@ -214,7 +214,7 @@ class TestMarkdown:
         assert found["machine"] == r"platform Linux, cpu\_count 2"
 
     def test_leaderboard(self) -> None:
-        rows = with_header(self.TEXT, "#", "strategy", "skill")
+        rows = with_header(self.TEXT, "#", "strategy", "gain")
         assert [row[:2] for row in rows] == [
             ["1", "good"],
             ["2", "picky"],
@@ -362,9 +362,9 @@ class TestFinding:
         count = len(set(structures_of(run).values()) or run.meta["cases"])
         headline, tier, *_ = self.stated(run)
         assert headline.replace("\u2212", "-") == (
-            f"{best['strategy']} leads: it takes away {100 * best['skill']:.0f} % of the nominal "
-            f"models' error on unseen data (skill {best['skill']:.3f}, 95 % interval "
-            f"{best['skill_low']:.3f} to {best['skill_high']:.3f} over {count} structures)."
+            f"{best['strategy']} leads: it takes away {100 * best['gain']:.0f} % of the nominal "
+            f"models' error on unseen data (gain {best['gain']:.3f}, 95 % interval "
+            f"{best['gain_low']:.3f} to {best['gain_high']:.3f} over {count} structures)."
         )
         first = tell_apart(run, [best["strategy"], *(row["strategy"] for row in others)]).tiers[0]
         assert 5 < len(first) < 60
@@ -376,7 +376,7 @@ class TestFinding:
         assert headline.startswith("No strategy improves on the nominal models on unseen data")
         assert "\u2212" in headline
 
-    def test_equal_skills_share_the_lead(self) -> None:
+    def test_equal_gains_share_the_lead(self) -> None:
         twins = [result(name, 0.1) for name in ("a", "b")]
         assert self.stated(run_of(*twins))[0].startswith("a and b share the first rank: each takes")
 

@@ -329,11 +329,11 @@ def with_blocks(case: str, **errors: float) -> JobResult:
     )
 
 
-def test_skill_is_what_is_taken_away_of_the_error_on_unseen_data() -> None:
+def test_gain_is_what_is_taken_away_of_the_error_on_unseen_data() -> None:
     results = (result("s", rms=1.0), with_blocks("b", used=3.0, higher=4.0))
     row = board(REFERENCE, *results)
     ratios = [1.05 / 2.05, 4.05 / 5.05]
-    assert row["skill"] == pytest.approx(1.0 - math.sqrt(np.prod(ratios)), rel=1e-12)
+    assert row["gain"] == pytest.approx(1.0 - math.sqrt(np.prod(ratios)), rel=1e-12)
     assert row["used_percent"] == 2.0  # the median over the two cases
     assert row["higher_percent"] == 2.5
     assert np.isnan(row["modified_percent"])
@@ -341,7 +341,7 @@ def test_skill_is_what_is_taken_away_of_the_error_on_unseen_data() -> None:
         REFERENCE,
         *(replace(item, blocks={**item.blocks, "used": Block(0.0, None, ())}) for item in results),
     )
-    assert better["skill"] == row["skill"]  # meeting what was given is no skill
+    assert better["gain"] == row["gain"]  # meeting what was given is no gain
 
 
 def test_every_structure_counts_once_however_many_cases_it_has() -> None:
@@ -349,9 +349,9 @@ def test_every_structure_counts_once_however_many_cases_it_has() -> None:
     errors = {"a": 3.0, "b": 3.0, "c": 0.5}
     results = [with_blocks(name, higher=rms) for name, rms in errors.items()]
     apart = board(reference, *results)
-    assert 1.0 - apart["skill"] == pytest.approx((3.05**2 * 0.55) ** (1 / 3) / 1.05)
+    assert 1.0 - apart["gain"] == pytest.approx((3.05**2 * 0.55) ** (1 / 3) / 1.05)
     one = board(reference, *results, structures={"a": "x", "b": "x"})
-    assert 1.0 - one["skill"] == pytest.approx((3.05 * 0.55) ** 0.5 / 1.05)
+    assert 1.0 - one["gain"] == pytest.approx((3.05 * 0.55) ** 0.5 / 1.05)
 
 
 def test_data_that_two_cases_of_a_structure_share_count_once() -> None:
@@ -359,15 +359,15 @@ def test_data_that_two_cases_of_a_structure_share_count_once() -> None:
     results = [with_blocks("a", higher=1.0, modified=4.0), with_blocks("b", modified=4.0)]
     row = board(reference, *results, structures={"a": "x", "b": "x"})
     alone = board({"a": reference["a"]}, results[0])
-    assert row["skill"] == pytest.approx(alone["skill"], rel=1e-14)
+    assert row["gain"] == pytest.approx(alone["gain"], rel=1e-14)
     other = board(reference | {"b": {"modified": 1.1}}, *results, structures={"a": "x", "b": "x"})
-    assert other["skill"] < row["skill"] - 0.05
+    assert other["gain"] < row["gain"] - 0.05
 
 
 @pytest.mark.parametrize("floor", [0.005, 0.2])
 def test_what_is_added_to_all_errors_can_be_chosen(floor: float) -> None:
     run = Run({**META, "reference": {"a": {"higher": 2.0}}}, (with_blocks("a", higher=1.0),))
-    left = 1.0 - leaderboard(run, floor)["skill"][0]
+    left = 1.0 - leaderboard(run, floor)["gain"][0]
     assert left == pytest.approx((1.0 + floor) / (2.0 + floor))
 
 
@@ -387,8 +387,8 @@ def test_a_missing_result_scores_ten_and_a_strategy_without_any_is_there() -> No
     run = Run({**META, "strategies": ["s", "never"]}, (result("s", rms=1.0),))
     table = leaderboard(run).set_index("strategy")
     expected = 1.0 - math.sqrt(1.05 / 2.05 * 10.0)
-    assert table.loc["s", "skill"] == pytest.approx(expected, rel=1e-12)
-    assert table.loc["never", "skill"] == pytest.approx(-9.0)
+    assert table.loc["s", "gain"] == pytest.approx(expected, rel=1e-12)
+    assert table.loc["never", "gain"] == pytest.approx(-9.0)
     assert table.loc["s", ["ok", "total"]].tolist() == [1, 2]
 
 
@@ -397,11 +397,11 @@ def test_a_case_that_holds_nothing_back_counts_only_among_its_like() -> None:
     seen = with_blocks("a", used=0.0, higher=1.0, modified=2.0)
     row = board(reference, seen, result("s", rms=0.0, case="b"))
     expected = 1.0 - math.sqrt((1.05 / 2.05) * (2.05 / 1.05))
-    assert row["skill"] == pytest.approx(expected, rel=1e-12)
+    assert row["gain"] == pytest.approx(expected, rel=1e-12)
     assert row[["ok", "total"]].tolist() == [2, 2]
-    assert board(reference, result("s", case="b"))["skill"] == pytest.approx(-9.0)
+    assert board(reference, result("s", case="b"))["gain"] == pytest.approx(-9.0)
     given = Run({**META, "reference": {"b": {"used": 3.0}}}, (result("s", case="b"),))
-    assert leaderboard(given)["skill"][0] == pytest.approx(1.0 - 1.05 / 3.05)
+    assert leaderboard(given)["gain"][0] == pytest.approx(1.0 - 1.05 / 3.05)
     assert find_basis(given) == "given"
     assert find_basis(Run({**META, "reference": reference}, (seen,))) == "unseen"
 
@@ -410,8 +410,8 @@ def test_tests_stand_apart_from_computed_truths() -> None:
     reference = {"a": {"higher": 1.0}, "b": {"higher": 1.0}}
     results = (with_blocks("a", higher=0.5), with_blocks("b", higher=3.0))
     row = board(reference, *results, classes={"b": ["free"]})
-    assert row["skill_tests"] == pytest.approx(1.0 - 0.55 / 1.05)
-    assert np.isnan(board(reference, *results)["skill_tests"])
+    assert row["gain_tests"] == pytest.approx(1.0 - 0.55 / 1.05)
+    assert np.isnan(board(reference, *results)["gain_tests"])
 
 
 def test_ranks_are_from_the_textbook_model_and_the_start_as_drawn_is_beside() -> None:
@@ -424,8 +424,8 @@ def test_ranks_are_from_the_textbook_model_and_the_start_as_drawn_is_beside() ->
     ]
     run = Run({**META, "reference": reference, **starts}, rank_results(results, reference))
     row = leaderboard(run).iloc[0]
-    assert row["skill"] == pytest.approx(1.0 - math.sqrt(0.55 / 1.05))
-    assert row["skill_drawn"] == pytest.approx(1.0 - math.sqrt(2.05 / 1.05))
+    assert row["gain"] == pytest.approx(1.0 - math.sqrt(0.55 / 1.05))
+    assert row["gain_drawn"] == pytest.approx(1.0 - math.sqrt(2.05 / 1.05))
     assert not row["unphysical"]
     assert row["total"] == 2
     assert [item.rank for item in run.results] == [1, 1, 1]
@@ -449,8 +449,8 @@ def test_who_is_not_applicable_scores_as_the_model_that_was_given() -> None:
     starts = {"starts": {"a": ["textbook", "drawn"]}, "reference": {"a": REFERENCE["a"]}}
     line = replace(result("idle", status="not-applicable"), nominal="textbook")
     row = leaderboard(Run({**META, **starts}, (line, idle))).iloc[0]
-    assert row["skill"] == 0.0
-    assert row["skill_drawn"] == pytest.approx(1.0 - 8.05 / 2.05, rel=1e-14)
+    assert row["gain"] == 0.0
+    assert row["gain_drawn"] == pytest.approx(1.0 - 8.05 / 2.05, rel=1e-14)
     assert np.isnan(row["higher_percent"])  # it is no model of the strategy's
 
 
@@ -471,9 +471,9 @@ def test_several_seeds_give_the_median_and_an_interval() -> None:
     results = [result("s", seed=k, rms=rms) for k, rms in enumerate(errors)]
     meta = {**META, "reference": {"a": REFERENCE["a"]}, "seeds": list(range(5))}
     row = leaderboard(Run(meta, tuple(results))).iloc[0]
-    assert row["skill"] == pytest.approx(1.0 - 3.05 / 2.05, rel=1e-12)
-    assert row["skill_low"] < row["skill"] < row["skill_high"]
+    assert row["gain"] == pytest.approx(1.0 - 3.05 / 2.05, rel=1e-12)
+    assert row["gain_low"] < row["gain"] < row["gain_high"]
     again = leaderboard(Run(meta, tuple(reversed(results)))).iloc[0]
     assert again.to_dict() == pytest.approx(row.to_dict(), nan_ok=True)
     one = leaderboard(Run(META, (result("s"),))).iloc[0]
-    assert np.isnan(one["skill_low"])
+    assert np.isnan(one["gain_low"])

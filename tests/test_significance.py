@@ -233,10 +233,10 @@ class TestScreen:
         assert max(map(len, text.splitlines())) <= 80
         said = " ".join(text.split())
         number = r"(0\.\d{3})"
-        skills = dict(re.findall(rf"\d  (\w+) +{number} ", text))
+        gains = dict(re.findall(rf"\d  (\w+) +{number} ", text))
         found = re.findall(rf"(\w+) +{number} to {number} +1 ", text)
         assert {name for name, *_ in found} == {"first", "second"}
-        assert all(float(low) < float(skills[name]) < float(high) for name, low, high in found)
+        assert all(float(low) < float(gains[name]) < float(high) for name, low, high in found)
         assert "1 of 3 are below" in said.partition("Next to it in tier 1, not shown to differ")[2]
 
     def test_says_why_nothing_is_tested(self) -> None:
@@ -247,8 +247,8 @@ class TestScreen:
         assert "tier 1" not in text
 
 
-class TestSkill:
-    """The interval of a skill in the leaderboard."""
+class TestGain:
+    """The interval of a gain in the leaderboard."""
 
     def test_is_that_of_student_over_structures(self) -> None:
         """Log scores that are normal, so that the interval of Student is the right one."""
@@ -257,9 +257,9 @@ class TestSkill:
         run = run_of({"a": scores}, TWENTY)
         assert interval_kind(run) == "structures"
         (row,) = leaderboard(run).to_dict("records")
-        assert 1.0 - row["skill"] == pytest.approx(np.exp(logs.mean()))
+        assert 1.0 - row["gain"] == pytest.approx(np.exp(logs.mean()))
         half = student.ppf(0.975, 19) * logs.std(ddof=1) / np.sqrt(20)
-        low, high = np.log(1.0 - row["skill_high"]), np.log(1.0 - row["skill_low"])
+        low, high = np.log(1.0 - row["gain_high"]), np.log(1.0 - row["gain_low"])
         assert low == pytest.approx(logs.mean() - half, abs=0.1 * half)
         assert high == pytest.approx(logs.mean() + half, abs=0.1 * half)
 
@@ -270,7 +270,7 @@ class TestSkill:
         def width(sharing: int) -> float:
             labels = {case: f"s{c // sharing}" for c, case in enumerate(TWENTY)}
             (row,) = leaderboard(run_of(scores, labels)).to_dict("records")
-            return float(np.log((1.0 - row["skill_low"]) / (1.0 - row["skill_high"])))
+            return float(np.log((1.0 - row["gain_low"]) / (1.0 - row["gain_high"])))
 
         # Half as many independent ones: wider by the root of two, and a little for Student.
         assert 1.4 < width(2) / width(1) < 1.7

@@ -101,13 +101,13 @@ def test_the_stated_uncertainties() -> None:
 def test_what_the_documents_say_of_the_board() -> None:
     run = stored("suite")
     board = leaderboard(run).set_index("strategy")
-    (skill, low, high), below = board.iloc[0][["skill", "skill_low", "skill_high"]], 12
+    (gain, low, high), below = board.iloc[0][["gain", "gain_low", "gain_high"]], 12
     for page in ("README.md", "docs/scenarios.md"):
         text = text_of(page)
         said = re.search(r"takes away (\d+) %.{0,60}?\((\d+) to (\d+)", text)
         assert said is not None, page
         assert [as_printed(number) for number in said.groups()] == [
-            100.0 * skill,
+            100.0 * gain,
             100.0 * low,
             100.0 * high,
         ]
@@ -116,7 +116,7 @@ def test_what_the_documents_say_of_the_board() -> None:
     assert (len(board) - len(first), first[0]) == (below, "diagnosed")
     assert "textbook" in {name for tier in rest for name in tier}
     data = board.drop(["unchanged", "textbook"])
-    assert int((data["skill"] < 0.0).sum()) == 11
+    assert int((data["gain"] < 0.0).sum()) == 11
 
 
 @pytest.mark.nightly

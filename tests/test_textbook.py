@@ -110,8 +110,8 @@ def test_a_run_starts_from_both_models_and_ranks_from_the_textbook_one(tmp_path:
     assert found[1][:2] == ("frame", "drawn")
     assert found[2:] == [("plain", "textbook", 1.0)]
     row = both.leaderboard.iloc[0]
-    assert row["skill"] == pytest.approx(0.0, abs=1e-9)
-    assert row["skill_drawn"] == pytest.approx(1.0 - (found[1][2] or 0.0) ** 0.5, abs=1e-5)
+    assert row["gain"] == pytest.approx(0.0, abs=1e-9)
+    assert row["gain_drawn"] == pytest.approx(1.0 - (found[1][2] or 0.0) ** 0.5, abs=1e-5)
     assert [item.case for item in both.started_from("drawn")] == ["frame", "plain"]
     again = femubench.rank([case, plain], "unchanged", jobs=1, store=tmp_path, resume=True)
     assert again.results == both.results
@@ -177,8 +177,8 @@ def test_who_is_not_applicable_scores_as_who_leaves_the_model_as_it_is(tmp_path:
     assert own["frame", "declining", "drawn"].score > 1.5
     assert ("suite/bracket", "declining", "drawn") not in own  # matrices have no textbook
     board = run.leaderboard.set_index("strategy")
-    assert board.loc["declining", "skill_drawn"] == pytest.approx(
-        board.loc["unchanged", "skill_drawn"]
+    assert board.loc["declining", "gain_drawn"] == pytest.approx(
+        board.loc["unchanged", "gain_drawn"]
     )
     again = Store(tmp_path).load(run.meta["run"])
     assert again.results == run.results

@@ -51,7 +51,7 @@ from femubench.core.schema.records import run_from_json, run_to_json
 from femubench.core.schema.results import Run
 from femubench.core.score.repeatability import unsteady
 from femubench.core.score.scoring import judge, reference_of
-from femubench.core.score.twin_skill import twin_skills
+from femubench.core.score.twin_gain import twin_gains
 from femubench.core.twin.disguise import disguise_case
 from femubench.core.twin.similarity import Similarity, matrix_factors, similar_case, similar_frame
 from femubench.core.twin.twins import FAMILIES, Twin, again, twin_of, twins_of
@@ -293,14 +293,14 @@ def run() -> Run:
 
 
 def test_who_knows_a_case_by_heart_is_marked(run: Run) -> None:
-    found = twin_skills(run)
-    assert found["memory"].original_skill > 0.8
-    assert found["memory"].skill == pytest.approx(0.0, abs=1e-6)
+    found = twin_gains(run)
+    assert found["memory"].original_gain > 0.8
+    assert found["memory"].gain == pytest.approx(0.0, abs=1e-6)
     assert found["memory"].suspicious
     assert found["memory"].known == ("frame-solid",)
     honest = {name for name, item in found.items() if not item.suspicious}
     assert honest == {"unchanged", "chance", "drawn"}
-    assert found["unchanged"].skill == pytest.approx(found["unchanged"].original_skill, abs=1e-9)
+    assert found["unchanged"].gain == pytest.approx(found["unchanged"].original_gain, abs=1e-9)
 
 
 def test_over_many_structures_the_signs_decide(run: Run) -> None:
@@ -318,7 +318,7 @@ def test_over_many_structures_the_signs_decide(run: Run) -> None:
                 error = {"higher": replace(block, rms_percent=(2.0 + 0.01 * i) * f)}
                 own = {"case": called, "strategy": strategy, "seed": 0, "blocks": error}
                 listed.append(replace(run.results[0], **own))
-    found = twin_skills(Run(meta, tuple(results), tuple(others)))
+    found = twin_gains(Run(meta, tuple(results), tuple(others)))
     assert [found[n].suspicious for n in ("knows", "none", "slightly")] == [True, False, False]
     assert found["knows"].p is not None
     assert found["knows"].p < 0.01
@@ -340,7 +340,7 @@ def test_one_twin_may_be_chance_and_who_is_never_good_knows_nothing(run: Run) ->
             )
             for case, rms in zip(("one", *names), (here, *there), strict=True)
         ]
-        return twin_skills(Run(meta, tuple(jobs[:1]), tuple(jobs[1:])))["s"].suspicious
+        return twin_gains(Run(meta, tuple(jobs[:1]), tuple(jobs[1:])))["s"].suspicious
 
     assert with_scores(0.5, 2.0, 2.0)
     assert not with_scores(0.5, 2.0)
@@ -365,15 +365,15 @@ def test_a_job_that_was_stopped_says_nothing_of_what_a_strategy_knows(run: Run) 
     )
     for status in ("timeout", "crashed"):
         stopped = [replace(answer, case=name, status=status, blocks={}) for name in stated]
-        assert twin_skills(Run(meta, (answer,), tuple(stopped))) == {}
+        assert twin_gains(Run(meta, (answer,), tuple(stopped))) == {}
         some = (*stopped[:2], replace(answer, case="one~3"))
-        found = twin_skills(Run(meta, (answer,), some))["s"]
-        assert found.skill == found.original_skill == pytest.approx(1.0 - 0.55 / 3.05)
+        found = twin_gains(Run(meta, (answer,), some))["s"]
+        assert found.gain == found.original_gain == pytest.approx(1.0 - 0.55 / 3.05)
         assert not found.suspicious
         over = replace(answer, status=status, blocks={})
-        assert twin_skills(Run(meta, (over,), some)) == {}
+        assert twin_gains(Run(meta, (over,), some)) == {}
     failed = [replace(answer, case=name, status="failed", blocks={}) for name in stated]
-    assert twin_skills(Run(meta, (answer,), tuple(failed)))["s"].suspicious
+    assert twin_gains(Run(meta, (answer,), tuple(failed)))["s"].suspicious
 
 
 def test_who_answers_otherwise_every_time_is_found(run: Run) -> None:
@@ -396,14 +396,14 @@ def test_no_figure_of_the_run_has_twins_in_it(run: Run) -> None:
 
 def test_reports_tell_of_twins(run: Run) -> None:
     text = " ".join(str(femubench.report(run)).split())
-    assert "skill on 2 twins of 1 cases, seed 11" in text
-    assert "?: memory knows the cases? skill" in text
+    assert "gain on 2 twins of 1 cases, seed 11" in text
+    assert "?: memory knows the cases? gain" in text
     assert "?: chance gave two answers to one job: frame-solid: another model" in text
     markdown = str(femubench.report(run, style="markdown"))
     assert "## Twins" in markdown
     assert "memory (knows the cases?)" in markdown
     page = str(femubench.report(run, style="html"))
-    assert "knows the cases? skill" in page
+    assert "knows the cases? gain" in page
     assert '"suspicious":true' in page.replace(" ", "")
 
     rows = {
@@ -465,10 +465,10 @@ def test_no_strategy_of_ours_is_marked_where_order_and_rounding_decide() -> None
     names = ["local", "offset", "sparse", "eigensensitivity", "baruch"]
     cases = ["suite/tapered-cantilever", "suite/arch", "frame-solid"]
     run = rank(cases, names, twins=(2, 21), nominal="textbook", jobs=2)
-    found = twin_skills(run)
+    found = twin_gains(run)
     assert sorted(found) == sorted(names)
     assert not any(item.suspicious for item in found.values())
     assert unsteady(run) == {}
-    # Without chance and without a choice among equals the skills are the same.
+    # Without chance and without a choice among equals the gains are the same.
     for name in ("eigensensitivity", "baruch"):
-        assert found[name].skill == pytest.approx(found[name].original_skill, abs=1e-6)
+        assert found[name].gain == pytest.approx(found[name].original_gain, abs=1e-6)

@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 from femubench.core.errors import InputError
 from femubench.core.publish.agreement import Outcome, findings_of, machine_of
 from femubench.core.publish.news import news_of
-from femubench.core.publish.places import Scope, board_on, errors_of, on_case, skill_on
+from femubench.core.publish.places import Scope, board_on, errors_of, on_case, gain_on
 from femubench.core.publish.submissions import Submission, slug
 from femubench.core.schema.results import BLOCKS
 from femubench.core.score.repeatability import unsteady
 from femubench.core.score.statistics import structures_of
-from femubench.core.score.twin_skill import twin_skills
+from femubench.core.score.twin_gain import twin_gains
 
-INDEX_SCHEMA = 2  # since more skill is better
+INDEX_SCHEMA = 2  # since more gain is better
 
 
 class _Version(NamedTuple):
@@ -138,7 +138,7 @@ def _describe(version: _Version, findings: Sequence[Outcome], ground: Scope) -> 
         }
         for case, listed in sorted(groups.items())
     ]
-    figures = skill_on(ground, [case for case in cases if case["ranked"]])
+    figures = gain_on(ground, [case for case in cases if case["ranked"]])
     runs = sorted({run.order: run for item in findings for run in item.runs}.items())
     machines = {machine_of(run): run.run.meta["machine"] for _, run in runs}
     return {
@@ -163,7 +163,7 @@ def _marks(strategy: str, findings: Iterable[Outcome]) -> list[str]:
     marks = []
     if not all(any(run.verified for run in item.runs) for item in listed):
         marks.append("unverified")
-    twins = [twin_skills(run.run).get(strategy) for run in runs]
+    twins = [twin_gains(run.run).get(strategy) for run in runs]
     if any(found is not None and found.suspicious for found in twins):
         marks.append("knows the cases?")
     if any(strategy in unsteady(run.run) for run in runs):

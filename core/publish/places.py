@@ -87,12 +87,12 @@ def board_on(ground: Scope, entrants: Mapping[str, Sequence[Outcome]]) -> dict[s
             on_case(listed, ground.references[case, ground.current[case]], ground.shares.get(case))
             for case, listed in sorted(groups.items())
         ]
-    figures = {name: skill_on(ground, counted) for name, counted in rows.items()}
+    figures = {name: gain_on(ground, counted) for name, counted in rows.items()}
 
     def order(name: str) -> tuple[tuple[float, ...], float, str]:
         row = figures[name]
         tier = not row["complete"], row["unphysical"], -row["covered"]
-        return tier, 0.0 if row["skill"] is None else 1.0 - row["skill"], name
+        return tier, 0.0 if row["gain"] is None else 1.0 - row["gain"], name
 
     listed = in_order(rows, order)
     sound = [n for _, n in listed if figures[n]["complete"] and not figures[n]["unphysical"]]
@@ -135,8 +135,8 @@ def logs_of(ground: Scope, counted: Iterable[Mapping[str, Any]]) -> dict[str, fl
     return found
 
 
-def skill_on(ground: Scope, counted: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return what results on cases come to: skill with its interval, errors, failures.
+def gain_on(ground: Scope, counted: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what results on cases come to: gain with its interval, errors, failures.
 
     Arguments:
         counted: from `on_case`, those that count.
@@ -148,7 +148,7 @@ def skill_on(ground: Scope, counted: Sequence[Mapping[str, Any]]) -> dict[str, A
     low, high = interval_over_structures(np.array(logs)) if wide else (None, None)
     left = geometric_mean([c["score"] for c in counted], weights) if sum(weights) else None
     return {
-        "skill": None if left is None else 1.0 - left,
+        "gain": None if left is None else 1.0 - left,
         "low": None if high is None else 1.0 - high,
         "high": None if low is None else 1.0 - low,
         **{

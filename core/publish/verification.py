@@ -227,17 +227,17 @@ def _check_result(result: JobResult, known: _Known, file: Path, key: str) -> Non
 
 
 def _check_board(run: Run, board: object, file: Path) -> None:
-    """Check the skills of the leaderboard that comes with a run, where one does."""
+    """Check the gains of the leaderboard that comes with a run, where one does."""
     if board is None:
         return
-    skills: dict[str, float] = dict(zip(*map(leaderboard(run).get, _STATED), strict=True))
+    gains: dict[str, float] = dict(zip(*map(leaderboard(run).get, _STATED), strict=True))
     rows: Iterable[object] = board if isinstance(board, list) else [board]
     for number, row in enumerate(rows):
-        name, skill = (row.get(key) if isinstance(row, dict) else None for key in _STATED)
-        own = skills.get(name) if isinstance(name, str) else None
-        if own is None or not isinstance(skill, (int, float)) or not _near(skill, own):
-            what = f"skill {skill!r}, the results give {own!r}"[:200]
-            _refuse(file, what, f"leaderboard[{number}].skill", "what its results give")
+        name, gain = (row.get(key) if isinstance(row, dict) else None for key in _STATED)
+        own = gains.get(name) if isinstance(name, str) else None
+        if own is None or not isinstance(gain, (int, float)) or not _near(gain, own):
+            what = f"gain {gain!r}, the results give {own!r}"[:200]
+            _refuse(file, what, f"leaderboard[{number}].gain", "what its results give")
 
 
-_STATED = "strategy", "skill"
+_STATED = "strategy", "gain"

@@ -36,9 +36,8 @@ from femubench.core.schema.results import (
     Nominal,
     Run,
     origins_of,
-    rate,
 )
-from femubench.core.score.ranking import scores_and_ranks
+from femubench.core.score.ranking import Scale, rate_results
 
 JobName = tuple[str, str, int, Nominal]
 
@@ -193,7 +192,7 @@ class Store:
 
     @pause_collection()
     def load(self, run_id: str | None = None) -> Run:
-        """Return a run with scores and ranks, its results in the order of its jobs.
+        """Return a run with gains and ranks, its results in the order of its jobs.
 
         What is damaged is left out; ``meta["notes"]`` say so, and which jobs have no result. A run
         that never ended has ``meta["finished"]`` None.
@@ -222,10 +221,8 @@ class Store:
         known, missing = meta.get("notes"), note_missing_jobs(meta, everything)
         notes = [*(known if isinstance(known, list) else []), *notes_of(faults, self.folder)]
         notes += [*self.notes_of_old_files(), *([missing] if missing else [])]
-        reference = meta.get("reference") or None
-        found = scores_and_ranks(listed, reference, meta.get("baseline"))
-        for result, score, rank in zip(listed, *found, strict=True):
-            rate(result, score, rank)
+        if meta.get("rule"):
+            rate_results(listed, Scale.of(meta))
         return Run({**meta, "notes": notes}, tuple(listed), companions)
 
     @pause_collection()

@@ -19,7 +19,7 @@ Percent = Annotated[float, Meta(ge=0, le=1e150)]
 Mac = Annotated[float, Meta(ge=-1e-6, le=1 + 1e-6)]
 Weight = Annotated[float, Meta(ge=0, le=1e100)]
 Seconds = Annotated[float, Meta(ge=0, le=sys.float_info.max)]
-Score = Annotated[float, Meta(gt=0, le=1e150)]
+GainFigure = Annotated[float, Meta(ge=-1, le=1)]
 Rank = Annotated[int, Meta(ge=1, le=2**63 - 1)]
 Real = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
 if TYPE_CHECKING:

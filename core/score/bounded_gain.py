@@ -73,10 +73,11 @@ class Rule:
             InputError: when the run was made before there was one.
         """
         stated = meta.get("rule")
-        if not stated:
-            what = f"run {meta.get('run')} keeps too little to be scored by this rule"
+        names = [f.name for f in fields(cls)]
+        if not stated or not meta.get("models") or not set(names) <= set(stated):
+            what = f"run {meta.get('run')} keeps no candidate partners, which its gains rest on"
             raise InputError(what, expected="a run of this version: run it again")
-        return cls(**{f.name: float(stated[f.name]) for f in fields(cls)})
+        return cls().changed(f"{name}={stated[name]}" for name in names)
 
     def changed(self, words: Iterable[str]) -> Rule:
         """Return the rule with other numbers.

@@ -71,7 +71,7 @@ class ExhibitSource(Protocol):
 def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]:
     """Return everything that the page of a run shows.
 
-    Errors, scores and skills are those of the run to the last digit; other numbers are rounded.
+    Errors, scores and gains are those of the run to the last digit; other numbers are rounded.
 
     Arguments:
         exhibits: what the store has to draw.

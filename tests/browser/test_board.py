@@ -29,7 +29,7 @@ from femubench.results import (
 BLOCKS = ("used", "higher", "modified")
 ROUNDED = {"seconds": 1e-3}  # figures that the page holds with fewer digits
 KEYS = (
-    *("rank", "skill", "skill_tests", "used_percent", "higher_percent", "modified_percent"),
+    *("rank", "gain", "gain_tests", "used_percent", "higher_percent", "modified_percent"),
     *("coverage90", "crps_percent", "parameters", "seconds"),
 )
 
@@ -133,7 +133,7 @@ def test_the_headline_and_the_lines_below_are_made_from_the_figures(page: Page, 
     # One seed on two structures: no interval, no test.
     assert page.locator("h1").inner_text() == (
         "No strategy improves on the textbook models on unseen data; the best, "
-        f"{best['strategy']}, has a skill of {best['skill']:.3f}."
+        f"{best['strategy']}, has a gain of {best['gain']:.3f}."
     ).replace("-", "\u2212")
     assert page.locator("p.finding").inner_text().startswith("Whether the others differ")
     foot = page.locator("footer").inner_text()
@@ -148,7 +148,7 @@ def test_who_leads_is_seen_without_scrolling(page: Page) -> None:
         assert box is not None
         assert box["y"] + box["height"] <= 900
     chart = page.locator("figure.chart").first.text_content() or ""
-    for words in ("Skill of every strategy on unseen data", "unchanged", "without data"):
+    for words in ("Gain of every strategy on unseen data", "unchanged", "without data"):
         assert words in chart
 
 
@@ -199,7 +199,7 @@ def test_who_was_not_applicable_stands_where_the_run_says(
     assert_shows(page, run)
     tick(page, "scenarios", "hframe", "frame-solid")
     assert_shows(page, part(run, cases={"frame"}))
-    assert shown(page)["local"]["skill"] == pytest.approx(1.0 - 1.5, abs=0.02)
+    assert shown(page)["local"]["gain"] == pytest.approx(1.0 - 1.5, abs=0.02)
 
 
 def stated_run() -> Run:
@@ -296,10 +296,10 @@ def test_names_and_the_baseline_stay_in_view(
 
 
 def test_sorts_by_mouse_and_keyboard(page: Page) -> None:
-    skill = {name: row["skill"] for name, row in shown(page).items()}
-    falling = sorted(skill, key=lambda name: -(skill[name] or 0.0))
+    gain = {name: row["gain"] for name, row in shown(page).items()}
+    falling = sorted(gain, key=lambda name: -(gain[name] or 0.0))
     assert order(page) != falling  # unphysical ones stand below
-    head = page.locator("th[data-key=skill]")
+    head = page.locator("th[data-key=gain]")
     head.locator("button").click()
     assert (order(page), head.get_attribute("aria-sort")) == (falling, "descending")
     head.locator("button").focus()
@@ -308,7 +308,7 @@ def test_sorts_by_mouse_and_keyboard(page: Page) -> None:
     name = page.locator("th[data-key=strategy]")
     name.locator("button").focus()
     page.keyboard.press("Space")
-    assert order(page) == sorted(skill)
+    assert order(page) == sorted(gain)
     assert name.get_attribute("aria-sort") == "ascending"
     assert head.get_attribute("aria-sort") is None
 
@@ -373,7 +373,7 @@ def test_charts_tell_their_values_by_keyboard(page: Page) -> None:
     first = readout.inner_text()
     page.keyboard.press("ArrowRight")
     assert before != first != readout.inner_text()
-    assert "skill, part of the error taken away" in first
+    assert "gain, part of the error taken away" in first
 
 
 def test_intervals_of_a_part_are_over_its_structures(
@@ -391,12 +391,12 @@ def test_intervals_of_a_part_are_over_its_structures(
     page.wait_for_selector("html[data-ready=yes]")
 
     def intervals() -> dict[str, list[float]]:
-        read = "() => bench.board.rows().map((r) => [r.strategy, [r.skill_low, r.skill_high]])"
+        read = "() => bench.board.rows().map((r) => [r.strategy, [r.gain_low, r.gain_high]])"
         return dict(page.evaluate(read))
 
     def expected(whole: Run) -> dict[str, list[float]]:
         rows = leaderboard(whole).to_dict("records")
-        return {row["strategy"]: [row["skill_low"], row["skill_high"]] for row in rows}
+        return {row["strategy"]: [row["gain_low"], row["gain_high"]] for row in rows}
 
     assert "over structures" in page.locator("#board-table thead").inner_text()
     assert intervals() == {name: pytest.approx(ends) for name, ends in expected(run).items()}
@@ -417,8 +417,8 @@ def test_both_nominal_models_stand_side_by_side(
     page.wait_for_selector("html[data-ready=yes]")
     board = leaderboard(read_run(data)).set_index("strategy")
     for name, row in shown(page).items():
-        assert row["skill_drawn"] == pytest.approx(board.loc[name, "skill_drawn"])
-        assert row["skill_drawn"] < -1.0 < row["skill"]
+        assert row["gain_drawn"] == pytest.approx(board.loc[name, "gain_drawn"])
+        assert row["gain_drawn"] < -1.0 < row["gain"]
     assert "Ranks are from the textbook models" in page.locator("p.lead").inner_text()
     view_case = view(file, "#case/frame").page
     text = view_case.locator("table.case-frequencies").inner_text()

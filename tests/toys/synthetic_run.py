@@ -40,14 +40,14 @@ def synthetic_run(
     named = [*names, *(f"strategy-{n:03d}" for n in range(len(names), strategies - 1)), "unchanged"]
     cases = case_names(scenarios)
     reference = {case: _nominal(random, number) for number, case in enumerate(cases)}
-    skills = np.geomspace(0.05, 1.5, len(named))
+    gains = np.geomspace(0.05, 1.5, len(named))
     drawn = tuple(range(1, seeds + 1)) if seeds > 1 else (0,)
     results = [
-        _result(random, case, name, seed, reference[case], 1.0 if name == "unchanged" else skill)
+        _result(random, case, name, seed, reference[case], 1.0 if name == "unchanged" else gain)
         if name == "unchanged" or random.random() >= failing
         else _failure(random, case, name, seed)
         for case in cases
-        for name, skill in zip(named, skills, strict=True)
+        for name, gain in zip(named, gains, strict=True)
         for seed in drawn
     ]
     meta = {
@@ -98,11 +98,11 @@ def _result(
     strategy: str,
     seed: int,
     nominal: dict[str, float],
-    skill: float,
+    gain: float,
 ) -> JobResult:
     still = strategy == "unchanged"
-    factor = 1.0 if still else skill * random.lognormal(0.0, 0.6)
-    negative = 0 if still else int(skill > 1.0 and random.random() < 0.1)
+    factor = 1.0 if still else gain * random.lognormal(0.0, 0.6)
+    negative = 0 if still else int(gain > 1.0 and random.random() < 0.1)
     return JobResult(
         case=case,
         strategy=strategy,

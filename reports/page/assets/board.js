@@ -9,19 +9,19 @@
   bench.errorLeft = ({ logs }, place) => (logs[0][place] === null ? null : bench.median(logs.map((own) => Math.exp(own[place]))));
   const twinsOf = (row) => data.strategies[row.index].twins;
 
-  // A column: key, title, hint, what makes its cell of a row; words are left, and figures of skill sort downwards first.
+  // A column: key, title, hint, what makes its cell of a row; words are left, and figures of gain sort downwards first.
   const figure = (key, title, hint, say, more) => ({ key, title, hint, cell: (row) => cell(row[key], say), right: true, ...more });
-  const skill = (key, title, hint) => (key === "skill" || data.board.some((row) => row[key] !== null)) && figure(key, title, hint, share, { down: true });
+  const gain = (key, title, hint) => (key === "gain" || data.board.some((row) => row[key] !== null)) && figure(key, title, hint, share, { down: true });
   const COLUMNS = [
     figure("rank", "Rank", null, count),
     { key: "strategy", title: "Strategy", cell: nameCell },
-    skill("skill", "Skill", `part of the ${ranking.yardstick}'s error on ${data.scored_on} that is taken away: 1 is all of it, 0 none, less than 0 is worse; more is better`),
-    { title: "95 % interval", right: true, cell: ({ skill_low: low, skill_high: high }) => el("td", { class: "right range", "data-low": low ?? "", "data-high": high ?? "" }, low === null ? "–" : `${share(low)} to ${share(high)}`) },
-    skill("skill_drawn", "From drawn", `skill of the start from the models as drawn, against the ${ranking.yardstick}s too`),
-    skill("skill_tests", "On tests", "skill on tests alone, without computed truths"),
-    data.strategies.some(({ twins }) => twins) && { key: "twins", title: "On twins", right: true, down: true, cell: (row) => cell(twinsOf(row)?.skill, (v) => (twinsOf(row) ? `${share(v)} (${share(twinsOf(row).original_skill)})` : number(v))),
-      hint: "skill on similar structures under other names, drawn when the run began; next to it, in brackets, on the cases that have such twins" },
-    ...data.blocks.map((block, k) => figure(`${block}_percent`, `${bench.blockName(k)} rms, %`, `rms frequency error of the ${block === "used" ? "modes that were given; no part of the skill" : `${block} modes`}; median over the cases`, small, { block: k })),
+    gain("gain", "Gain", `part of the ${ranking.yardstick}'s error on ${data.scored_on} that is taken away: 1 is all of it, 0 none, less than 0 is worse; more is better`),
+    { title: "95 % interval", right: true, cell: ({ gain_low: low, gain_high: high }) => el("td", { class: "right range", "data-low": low ?? "", "data-high": high ?? "" }, low === null ? "–" : `${share(low)} to ${share(high)}`) },
+    gain("gain_drawn", "From drawn", `gain of the start from the models as drawn, against the ${ranking.yardstick}s too`),
+    gain("gain_tests", "On tests", "gain on tests alone, without computed truths"),
+    data.strategies.some(({ twins }) => twins) && { key: "twins", title: "On twins", right: true, down: true, cell: (row) => cell(twinsOf(row)?.gain, (v) => (twinsOf(row) ? `${share(v)} (${share(twinsOf(row).original_gain)})` : number(v))),
+      hint: "gain on similar structures under other names, drawn when the run began; next to it, in brackets, on the cases that have such twins" },
+    ...data.blocks.map((block, k) => figure(`${block}_percent`, `${bench.blockName(k)} rms, %`, `rms frequency error of the ${block === "used" ? "modes that were given; no part of the gain" : `${block} modes`}; median over the cases`, small, { block: k })),
     figure("coverage90", "In 90 %", "share of unseen modes in the 90 % interval that the strategy states", share),
     figure("crps_percent", "CRPS, %", "continuous ranked probability score of unseen modes in percent of the frequency, mean over the structures; the absolute error where no uncertainty is stated", small),
     { key: "flags", title: "Flags", cell: flagCell },
@@ -124,7 +124,7 @@
       parts.heads[k].hidden = hidden(column);
     });
     const [changed, fewer] = [!ranking.isWhole(state.filter), rows.length < data.strategies.length];
-    const anew = changed ? "Skills, intervals, errors and ranks are computed anew for these" : "Ranks are among these";
+    const anew = changed ? "Gains, intervals, errors and ranks are computed anew for these" : "Ranks are among these";
     parts.status.textContent = `${rows.length} of ${bench.plural(data.strategies.length, "strategy", "strategies")}, ${rows[0]?.cases.length ?? 0} of ${bench.plural(data.cases.length, "case")}, ${blocks.length} of ${bench.plural(data.blocks.length, "block")}.`
       + (changed || fewer ? ` ${anew}; the tiers and groups are those of the whole run.` : "");
     parts.status.classList.toggle("changed", changed || fewer);

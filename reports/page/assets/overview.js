@@ -1,4 +1,4 @@
-// Charts of the run page: skills with intervals, calibration, profiles, cost, mean ranks with groups.
+// Charts of the run page: gains with intervals, calibration, profiles, cost, mean ranks with groups.
 {
   const { el, data, ranking } = bench;
   const MOST_CURVES = 8;
@@ -16,20 +16,20 @@
   }
   const left = (rows, shown) => (rows.length > shown.length ? ` Drawn: ${shown.length} of ${rows.length}; filter the strategies to see others.` : "");
 
-  function skills(rows) {
+  function gains(rows) {
     const shown = first(rows, MOST_ROWS);
     const nameOf = (row) => `${row.strategy}${tiers.length > 1 && tierOf.has(row.index) ? `, tier ${tierOf.get(row.index)}` : ""}${row.unphysical ? " ▲" : ""}`;
     const names = shown.map(nameOf);
     const kind = ranking.intervalKind(rows);
-    const drawn = shown.filter((row) => row.skill_drawn !== null);
+    const drawn = shown.filter((row) => row.gain_drawn !== null);
     const given = `${ranking.yardstick}s`;
     return bench.draw({
-      kind: "interval", title: `Skill of every strategy on ${data.scored_on}`,
+      kind: "interval", title: `Gain of every strategy on ${data.scored_on}`,
       note: `${kind && `The line is the 95 % interval over ${kind}. `}0: the ${given}, which no data have changed; 1: no error left.${shown.some((row) => row.unphysical) ? " ▲: unphysical." : ""}${left(rows, shown)}`,
-      x: { label: "skill, part of the error taken away", unit: "1", high: 1 }, y: { names }, marks: [{ axis: "x", value: 0, label: "without data" }],
+      x: { label: "gain, part of the error taken away", unit: "1", high: 1 }, y: { names }, marks: [{ axis: "x", value: 0, label: "without data" }],
       series: [
-        { name: `from the ${given}`, names, x: shown.map((row) => row.skill), y: names, low: shown.map((row) => row.skill_low), high: shown.map((row) => row.skill_high) },
-        ...(drawn.length ? [{ name: "from the models as drawn", role: "nominal", x: drawn.map((row) => row.skill_drawn), y: drawn.map(nameOf), names: drawn.map(nameOf) }] : []),
+        { name: `from the ${given}`, names, x: shown.map((row) => row.gain), y: names, low: shown.map((row) => row.gain_low), high: shown.map((row) => row.gain_high) },
+        ...(drawn.length ? [{ name: "from the models as drawn", role: "nominal", x: drawn.map((row) => row.gain_drawn), y: drawn.map(nameOf), names: drawn.map(nameOf) }] : []),
       ],
     });
   }
@@ -75,11 +75,11 @@
     if (!found.length) return null;
     const series = [["physical", false, 2], ["unphysical", true, 1]].map(([name, unphysical, style]) => {
       const own = found.filter((row) => row.unphysical === unphysical);
-      return { name, style, x: own.map((row) => row.seconds), y: own.map((row) => 1 - row.skill), names: own.map((row) => row.strategy) };
+      return { name, style, x: own.map((row) => row.seconds), y: own.map((row) => 1 - row.gain), names: own.map((row) => row.strategy) };
     });
     return bench.draw({
       kind: "scatter", title: "Accuracy against cost",
-      note: `What is left of the error (1 − skill; 1 = the ${ranking.yardstick}) against wall time, median over the cases. Low and left is good.`,
+      note: `What is left of the error (1 − gain; 1 = the ${ranking.yardstick}) against wall time, median over the cases. Low and left is good.`,
       x: { label: "wall time, median over the cases", unit: "s", log: true }, y: { label: "error left", unit: "1", log: true },
       marks: [{ axis: "y", value: 1, label: ranking.yardstick }], series: series.filter((s) => s.x.length),
     });
@@ -116,7 +116,7 @@
   bench.overview = {
     tierOf,
     letters: (s) => lettersOf.get(s) ?? (groups.length ? "alone" : "–"),
-    top: (rows) => [skills(rows), calibration(rows)].filter(Boolean),
+    top: (rows) => [gains(rows), calibration(rows)].filter(Boolean),
     figures: (rows, filter) => [profile(rows, filter), cost(rows), (whole ??= comparison())].filter(Boolean),
   };
 }

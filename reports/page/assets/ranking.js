@@ -1,4 +1,4 @@
-// Scores, skills and ranks of any part of a run, by the rules of docs/scoring.md. Without a filter the
+// Scores, gains and ranks of any part of a run, by the rules of docs/scoring.md. Without a filter the
 // figures are those of the run's own leaderboard.
 {
   const RESAMPLES = 1999;
@@ -58,7 +58,7 @@
     });
     return Array.from(sums, (sum, i) => (weights[i] ? sum / weights[i] : null));
   }
-  const skillOf = (logs) => 1 - Math.exp(d3.mean(logs));
+  const gainOf = (logs) => 1 - Math.exp(d3.mean(logs));
 
   function rowOf(s, grid) {
     const { cases, structures, units, blocks } = grid;
@@ -66,23 +66,23 @@
     const logs = seeds.map((seed) => units.map(({ c, k }) => logScore(resultAt(s, c, seed), k)));
     const structured = (weight) => logs.map((own) => means(own, units, (unit) => unit.structure, structures.length, weight));
     const perStructure = structured();
-    const skills = perStructure.map(skillOf);
-    const tests = grid.tests && structured((unit) => (grid.tests.has(unit.c) ? unit.weight : 0)).map(skillOf);
+    const gains = perStructure.map(gainOf);
+    const tests = grid.tests && structured((unit) => (grid.tests.has(unit.c) ? unit.weight : 0)).map(gainOf);
     const results = (byStrategy.get(s) ?? []).filter((r) => place.has(r.c));
     const fine = results.filter((r) => r.status === "ok");
     const strategy = data.strategies[s].name;
     const forecasts = fine.flatMap((r) => blocks.flatMap((k) => (r.forecast[k] ? [{ c: r.c, ...r.forecast[k] }] : [])));
     const row = {
-      index: s, strategy, rank: 0, skill: median(skills), skill_low: null, skill_high: null,
-      skill_drawn: (grid.whole && data.board.find((own) => own.strategy === strategy)?.skill_drawn) ?? null,
-      skill_tests: tests && Number.isFinite(tests[0]) ? median(tests) : null,
+      index: s, strategy, rank: 0, gain: median(gains), gain_low: null, gain_high: null,
+      gain_drawn: (grid.whole && data.board.find((own) => own.strategy === strategy)?.gain_drawn) ?? null,
+      gain_tests: tests && Number.isFinite(tests[0]) ? median(tests) : null,
       rigid_modes_lost: d3.sum(fine, (r) => r.lost), negative_eigenvalues: d3.sum(fine, (r) => r.negative),
       parameters: middle(fine, (r) => r.parameters), seconds: middle(fine, (r) => r.seconds),
       ...Object.fromEntries(data.blocks.map((block, k) => [`${block}_percent`, middle(fine, (r) => r.rms[k])])),
       ok: fine.length, not_applicable: results.filter((r) => r.status === "not-applicable").length,
       total: cases.length * seeds.length, unphysical: results.some((r) => r.unphysical),
       logs: logs.map((own) => means(own, units, (unit) => place.get(unit.c), cases.length)),
-      perStructure, skills, results, cases, structures,
+      perStructure, gains, results, cases, structures,
       stated: forecasts.filter(({ levels }) => levels), crps_percent: byStructure(forecasts, ({ crps }) => crps),
     };
     return { ...row, coverage90: covered(row, 0.9) };
@@ -102,13 +102,13 @@
     return median(d3.rollups(valued, (own) => median(own.map(value)), (r) => r.c).map(([, own]) => own));
   }
   // Put physical strategies first, then unphysical ones, then who never gave a model; those whose sorted
-  // skills lie no further apart than a tie share a rank, in the order of their names.
+  // gains lie no further apart than a tie share a rank, in the order of their names.
   function ranked(rows) {
     const level = (r) => (r.ok + r.not_applicable === 0 ? 2 : 0) + (r.unphysical ? 1 : 0);
-    rows.sort((a, b) => level(a) - level(b) || b.skill - a.skill);
+    rows.sort((a, b) => level(a) - level(b) || b.gain - a.gain);
     rows.forEach((row, k) => {
       const before = rows[k - 1];
-      const tied = before && level(row) === level(before) && before.skill - row.skill <= data.tie * (1 - row.skill);
+      const tied = before && level(row) === level(before) && before.gain - row.gain <= data.tie * (1 - row.gain);
       row.rank = tied ? before.rank : k + 1;
     });
     return rows.sort((a, b) => a.rank - b.rank || (a.strategy < b.strategy ? -1 : 1));
@@ -124,14 +124,14 @@
       const left = new Float64Array(RESAMPLES);
       for (let t = 0; t < drawn.length; t += 1) left[Math.floor(t / n)] += own[drawn[t]];
       const tail = data.statistics.tails[n];
-      [row.skill_low, row.skill_high] = ends(left, [1 - tail, tail]).map((log) => 1 - Math.exp(log));
+      [row.gain_low, row.gain_high] = ends(left, [1 - tail, tail]).map((log) => 1 - Math.exp(log));
     }
   }
   function overSeeds(rows) {
     for (const row of rows) {
       const random = d3.randomLcg(20260 + row.index);
-      const drawn = Float64Array.from({ length: RESAMPLES }, () => median(row.skills.map(() => row.skills[Math.floor(random() * row.skills.length)])));
-      [row.skill_low, row.skill_high] = ends(drawn, [0.025, 0.975]);
+      const drawn = Float64Array.from({ length: RESAMPLES }, () => median(row.gains.map(() => row.gains[Math.floor(random() * row.gains.length)])));
+      [row.gain_low, row.gain_high] = ends(drawn, [0.025, 0.975]);
     }
   }
   const ends = (drawn, tails) => tails.map((q) => d3.quantileSorted(drawn.sort(), q));
@@ -143,7 +143,7 @@
   function intervals(rows, filter) {
     const kind = intervalKind(rows);
     const given = new Map(data.board.map((row) => [row.strategy, row]));
-    if (kind && isWhole(filter)) for (const row of rows) ({ skill_low: row.skill_low, skill_high: row.skill_high } = given.get(row.strategy) ?? row);
+    if (kind && isWhole(filter)) for (const row of rows) ({ gain_low: row.gain_low, gain_high: row.gain_high } = given.get(row.strategy) ?? row);
     else if (kind === "seeds") overSeeds(rows);
     else if (kind === "structures") overStructures(rows);
   }
