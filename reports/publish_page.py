@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from femubench.plot import Axis, Chart, Mark, Series
-from femubench.reports.cells import format_fixed, interval, join_names, plain, shorten_text
+from femubench.reports.cells import format_fixed, interval, plain, shorten_text
 from femubench.reports.feed import feeds_of, headline_of
+from femubench.reports.summary import headline
 from femubench.reports.svg import drawing
 from femubench.reports.templating import asset, templates
 from femubench.results import rank_items
 
 _MOST_DRAWN = 20
-_LEAST = -1.0  # gain that is drawn; an arrow tells of less
+_LEAST = -1.0  # the least gain that there is
 _LINE = "The line is the 95 % interval. "
-_OTHERS = ("others", "not shown to be worse", "shown to be worse")
 
 Data = Mapping[str, Any]
 
@@ -30,7 +31,12 @@ def pages_of(index: Data) -> dict[str, str]:
     pages = {board["page"]: _board_page(index, board) for board in index["boards"]}
     releases = {item["name"]: _release(item["versions"][0]) for item in index["strategies"]}
     pages["leaderboard.csv"] = _csv(
-        {"class": kind, **row, **releases[row["strategy"]], "marks": "; ".join(_flags(row))}
+        {
+            "class": kind,
+            **{k: " ".join(v) if isinstance(v, list) else v for k, v in row.items()},
+            **releases[row["strategy"]],
+            "marks": "; ".join(_flags(row)),
+        }
         for kind, rows in ((board["class"], board["rows"]) for board in index["boards"])
         for row in rows
     )
@@ -83,27 +89,24 @@ def _strategy_page(item: Data, index: Data) -> str:
 
 def _answer(board: Data) -> Iterator[str]:
     """Yield who is best, how sure that is, and on what."""
-    first = [row for row in board["rows"] if row["rank"] == 1]
-    others = [row for row in board["rows"] if _stand(row) in _OTHERS]
-    if first:
-        who = join_names([plain(row["strategy"]) for row in first])
-        yield f"{who} {'lead' if first[1:] else 'leads'} with {_gain_words(first[0])}."
+    rows = [
+        {**row, "gain_low": _number(row["low"]), "gain_high": _number(row["high"])}
+        for row in board["rows"]
+        if row["complete"]
+    ]
+    over = f"{board['structures']} structures" * any(row["low"] is not None for row in rows)
+    said = headline(rows, "Above the given band", "handbooks", board["structures"], over)
+    if any(row["rank"] == 1 for row in rows):
+        yield from said
     else:
         yield "Nobody leads: no strategy has all cases of the ranking."
-    near = [plain(row["strategy"]) for row in others if not row["below_best"]]
-    if others and not board["tested"]:
-        yield "Too few structures to say whether the others are worse by more than chance."
-    elif others:
-        below = len(others) - len(near)
-        more = f" and {len(near) - 3} more" if len(near) > 3 else ""
-        rest = f"; not shown of {', '.join(near[:3])}{more}" if near else ""
-        yield f"Shown to be worse by more than chance: {below} of {len(others)} others{rest}."
-    unphysical = sum(_stand(row) == "unphysical" for row in board["rows"])
-    if unphysical:
-        yield f"Below them for unphysical models: {unphysical}."
     cases, structures = len(board["cases"]), board["structures"]
     stated = f"{cases} case{'s' * (cases != 1)} of {structures} structure{'s' * (structures != 1)}"
     yield f"On {stated} that more than half of the strategies were run on."
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
 def _gain_words(row: Data) -> str:
@@ -122,7 +125,7 @@ def _on_case(strategies: Iterable[Data], name: str, digest: str) -> list[tuple[D
 
     def order(entry: tuple[Data, Data]) -> tuple[tuple[bool], float, str]:
         item, row = entry
-        return (bool(row["unphysical"] or row["conflict"]),), row["score"], item["name"]
+        return (bool(row["conflict"]),), -row["gain"], item["name"]
 
     return [entry for _, entry in rank_items(found, order)]
 
@@ -148,21 +151,22 @@ def _machines(machines: Sequence[Data], *, most: int = 3) -> str:
 
 
 def gains_of(board: Data) -> Chart:
-    """Return the gains of a board with their intervals, by what is shown of them."""
+    """Return the gains of a board with their intervals."""
     known = [row for row in board["rows"] if row["gain"] is not None]
     whose = "every strategy" if len(known) <= _MOST_DRAWN else f"the first {_MOST_DRAWN}"
-    labels = (f"{row['rank'] or '–'}  {plain(row['strategy'])}" for row in known)
+    labels = (
+        f"{row['rank'] or ('=' if row['yardstick'] else '–')}  {plain(row['strategy'])}"
+        for row in known
+    )
     return _chart(f"Gain of {whose}", list(zip(map(_stand, known), labels, known, strict=True)))
 
 
 def _stand(row: Data) -> str:
     if not row["complete"]:
         return "lacks a case"
-    if row["unphysical"]:
-        return "unphysical"
-    if row["rank"] == 1:
-        return "best"
-    return _OTHERS[(None, False, True).index(row["below_best"])]
+    if row["yardstick"]:
+        return "yardsticks"
+    return "best" if row["rank"] == 1 else "others"
 
 
 def history_of(versions: Sequence[Data]) -> Chart | None:
@@ -193,10 +197,10 @@ def _chart(title: str, rows: Sequence[tuple[str, str, Data]]) -> Chart:
         gains = [row["gain"] for _, row in own]
         series.append(Series(group, gains, [label for label, _ in own], low, high))
     least = max(min([*ends, 0.0]) - 0.05, _LEAST)
-    x = Axis("gain, part of the error taken away", low=least, high=1.0)
+    x = Axis("gain over the textbook models", low=least, high=1.0)
     y = Axis("", names=tuple(label for _, label, _ in drawn))
     sure = any(row["low"] is not None for _, _, row in drawn)
-    note = f"{_LINE * sure}1: no error left; 0: as the textbook model, without data."
+    note = f"{_LINE * sure}1: no error left; 0: as the textbook models, without data."
     marks = (Mark("x", 0.0, "textbook model"),)
     return Chart("interval", title, x, y, tuple(series), marks, note=note)
 

@@ -45,7 +45,8 @@ def fail_option(what: str) -> options.Option:
 )  # fmt: skip
 @fail_option(
     "Exit with 1 if X is exceeded by the loss of gain, a ratio B/A (used, higher, modified, "
-    "seconds) or the number of lost results: failures. May be repeated. Default: loss>0.01 and failures>0."
+    "seconds) or the number of lost results: failures. May be repeated. Default: loss>0.01 and "
+    "failures>0."
 )
 @options.style(
     "terminal", "markdown", "html", "json", dest="form", what="What is printed or written."

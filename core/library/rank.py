@@ -39,7 +39,9 @@ from femubench.core.schema.run_options import (
     check_keywords,
     split_keywords,
 )
+from femubench.core.score.bounded_gain import Rule
 from femubench.core.score.leaderboard import is_test, leaderboard
+from femubench.core.score.ranking import rank_results
 from femubench.core.study.gain import gain_by
 from femubench.core.twin.twins import Twin, twins_of
 
@@ -115,6 +117,25 @@ class Run(results.Run):
         """Return one row a strategy, best first."""
         return leaderboard(self)
 
+    def scored_by(self, words: Iterable[str]) -> Run:
+        """Return the run scored by a rule with other numbers.
+
+        Arguments:
+            words: ``KEY=VALUE`` each, fields of `results.Rule`; none for the rule that it has.
+
+        Raises:
+            InputError: for a field that there is none of, a value out of its bounds, or a run that
+                keeps too little to be scored again.
+
+        Examples:
+            >>> Run.of(run).scored_by(["cap=0.2"]).leaderboard["gain"].round(2).tolist()
+            [0.24, -0.64]
+        """
+        if not (listed := list(words)):
+            return self
+        meta = {**self.meta, "rule": Rule.of(self.meta).changed(listed).to_json()}
+        return Run(meta, rank_results(self.results, meta), self.companions)
+
     def gain_by(self, *axes: str) -> pd.DataFrame:
         """Return one row a cell of a study; see `femubench.results.gain_by`."""
         return gain_by(self, *axes)
@@ -125,7 +146,7 @@ class Run(results.Run):
         return [
             *super().rows(),
             *(
-                (f"{row['rank']}. {row['strategy']}", f"gain {row['gain']:.3f}")
+                (f"{row['rank']:.0f}. {row['strategy']}", f"gain {row['gain']:.3f}")
                 for row in board
                 if row["rank"] == row["rank"]
             ),

@@ -32,8 +32,8 @@ from femubench.core.schema.run_options import (
     check_keywords,
     split_keywords,
 )
-from femubench.core.score.repeatability import unsteady
 from femubench.core.score.ranking import list_models, rank_results
+from femubench.core.score.repeatability import unsteady
 from femubench.core.score.scoring import Reference, reference_of
 
 

@@ -61,7 +61,7 @@ class GainTable:
         structures: of each case, by its place among them.
         expected: jobs of every strategy, those on cases that do not count with them.
         values: `FIGURES` by strategy, (cases, seeds, figures); what is missing counts as the model
-            that was given.
+            that was given, and on twins not at all.
     """
 
     scale: Scale
@@ -106,10 +106,16 @@ class GainTable:
         found: dict[tuple[str, str, int], list[FloatArray]] = defaultdict(list)
         for result in listed:
             case = result.case if origins is None else origins.get(result.case, "")
-            values = _figures(scale, result.case, scale.errors(result)) if case in cases else None
-            if values is not None:
-                found[result.strategy, case, result.seed].append(values)
-        given = {case: _figures(scale, case, scale.start(case, nominal)) for case in held}
+            if case in cases:
+                figures = _figures(scale, result.case, scale.errors(result))
+                found[result.strategy, case, result.seed].append(figures)
+        # Who did not run on a twin has no gain there.
+        given = {
+            case: _figures(scale, case, scale.start(case, nominal))
+            if origins is None
+            else np.full(len(FIGURES), math.nan)
+            for case in held
+        }
         order = tuple(sorted(seeds))
         values = {
             name: np.array(
@@ -146,7 +152,7 @@ class GainTable:
 
     def gains(self, name: str) -> FloatArray:
         """Return the gain of a strategy on every structure, mean over the seeds, (structures,)."""
-        return np.asarray(self.by_structure(self.values[name])[:, :, 0].mean(axis=1))
+        return mean_known(np.moveaxis(self.by_structure(self.values[name])[:, :, 0], 1, 0))
 
     @property
     def interval(self) -> str:
@@ -183,7 +189,8 @@ class Standings:
             rows = [own.cases.index(case) for case in twins.cases]
             for name, values in counted.items():
                 other = values.copy()
-                other[rows] = twins.values[name]
+                there = np.isfinite(twins.values[name][:, :, :1])
+                other[rows] = np.where(there, twins.values[name], values[rows])
                 counted[name] = min((values, other), key=lambda item: _mean_gain(own, item))
         gains = {n: own.by_structure(v)[:, :, 0].mean(axis=1) for n, v in counted.items()}
         return cls(own, counted, tell_apart(gains))
@@ -194,10 +201,7 @@ def _mean_gain(table: GainTable, values: FloatArray) -> float:
 
 
 def _figures(scale: Scale, case: str, errors: ModelErrors) -> FloatArray:
-    gain = scale.gain(case, errors)
-    percent = 100.0 * errors.error, 100.0 * errors.band
-    found = (gain.gain, gain.error, gain.change, *percent, errors.shape, errors.false_modes)
-    return np.array(found, dtype=float)
+    return np.array(list(scale.figures(case, errors).values()))
 
 
 def mean_known(values: FloatArray) -> FloatArray:

@@ -99,6 +99,19 @@ class Scale:
             return start
         return measure_errors(result.blocks, self.blocks[result.case], self.rule)
 
+    def figures(self, case: str, errors: ModelErrors) -> dict[str, float]:
+        """Return what is averaged over seeds, cases and structures, by the name of its column."""
+        gain = self.gain(case, errors)
+        return {
+            "gain": gain.gain,
+            "error_gain": gain.error,
+            "change_gain": gain.change,
+            "error_percent": 100.0 * errors.error,
+            "band_percent": 100.0 * errors.band,
+            "shape_error": errors.shape,
+            "false_modes": float(errors.false_modes),
+        }
+
     def gain(self, case: str, errors: ModelErrors) -> Gain:
         """Return what a model with these errors gains over the textbook one of a case."""
         return find_gain(errors, self.textbook[case], self.rule)
@@ -161,8 +174,8 @@ def rate_results(results: Sequence[JobResult], scale: Scale) -> None:
             gain = scale.gain(result.case, scale.errors(result)).gain
             group = result.case, result.seed, result.nominal
             groups.setdefault(group, []).append((gain, result))
-    for group in groups.values():
-        for rank, (gain, result) in rank_items(group, _order):
+    for listed in groups.values():
+        for rank, (gain, result) in rank_items(listed, _order):
             rate(result, None if math.isnan(gain) else gain, rank)
 
 
@@ -171,7 +184,7 @@ def _order(item: tuple[float, JobResult]) -> tuple[tuple[bool, ...], float, str]
     return (math.isnan(gain),), 0.0 if math.isnan(gain) else -gain, result.strategy
 
 
-def list_models(models: Mapping[str, Mapping[Nominal, Mapping[str, Block]]]) -> dict[str, Any]:
+def list_models(models: Models) -> dict[str, Any]:
     """Return what nominal models predict as the meta data of a run have it."""
     plain: dict[str, Any] = msgspec.to_builtins(models)
     order = {name: place for place, name in enumerate(BLOCKS)}

@@ -73,14 +73,17 @@ def twin_gains(run: Run) -> dict[str, TwinGain]:
     own = GainTable.of(
         run, (r for r in run.ranked if r.status not in _STOPPED), run.nominals[0], origins
     )
-    names = [name for name in own.names if any(result.strategy == name for result in ran)]
-    lost = {name: own.gains(name) - twins.gains(name) for name in names}
+    names = [n for n in own.names if np.isfinite(twins.gains(n)).any()]
+    pairs = {name: (own.gains(name), twins.gains(name)) for name in names}
+    there = {name: np.isfinite(after) for name, (_, after) in pairs.items()}
+    pairs = {name: (a[there[name]], b[there[name]]) for name, (a, b) in pairs.items()}
+    lost = {name: before - after for name, (before, after) in pairs.items()}
     kinds = run.meta["twins"].get("kinds") or {}
     known = {name: _known(run, name, ran, kinds) for name in names}
     return {
         item.strategy: TwinGain(
-            gain=float(twins.gains(item.strategy).mean()),
-            original_gain=float(own.gains(item.strategy).mean()),
+            gain=float(pairs[item.strategy][1].mean()),
+            original_gain=float(pairs[item.strategy][0].mean()),
             p=item.p,
             worse=item.p is not None
             and item.p < _LEVEL
