@@ -27,7 +27,7 @@ from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult
 from femubench.core.study.conditions import vary_case
 from femubench.core.study.study_file import read_study
-from femubench.results import leaderboard, results_frame, gain_by
+from femubench.results import gain_by, leaderboard, results_frame
 from tests.test_cli import put_case
 
 SENSORS = "label,x,y,z,direction\n" + "".join(f"s{i},{i / 5},0,0,z\n" for i in range(1, 6))

@@ -70,16 +70,15 @@ def twin_gains(run: Run) -> dict[str, TwinGain]:
         return {}
     ran = [r for r in run.companions if r.case in origins and r.status not in _STOPPED]
     twins = GainTable.of(run, ran, run.nominals[0], origins)
-    own = GainTable.of(
-        run, (r for r in run.ranked if r.status not in _STOPPED), run.nominals[0], origins
-    )
+    first = [r for r in run.ranked if r.status not in _STOPPED]
+    own = GainTable.of(run, first, run.nominals[0], {case: case for case in origins.values()})
     names = [n for n in own.names if np.isfinite(twins.gains(n)).any()]
     pairs = {name: (own.gains(name), twins.gains(name)) for name in names}
-    there = {name: np.isfinite(after) for name, (_, after) in pairs.items()}
-    pairs = {name: (a[there[name]], b[there[name]]) for name, (a, b) in pairs.items()}
+    there = {name: np.isfinite(before - after) for name, (before, after) in pairs.items()}
+    pairs = {n: (a[there[n]], b[there[n]]) for n, (a, b) in pairs.items() if there[n].any()}
     lost = {name: before - after for name, (before, after) in pairs.items()}
     kinds = run.meta["twins"].get("kinds") or {}
-    known = {name: _known(run, name, ran, kinds) for name in names}
+    known = {name: _known(run, name, ran, kinds) for name in pairs}
     return {
         item.strategy: TwinGain(
             gain=float(pairs[item.strategy][1].mean()),
