@@ -184,5 +184,6 @@ def test_a_rule_goes_to_json_and_back_with_what_was_varied() -> None:
     plain: Mapping[str, Any] = varied.to_json()
     assert (plain["version"], RULE.to_json()["version"]) == ("1 mac cap", "1")
     assert Rule.of({"rule": plain}) == varied
-    with pytest.raises(InputError, match="run it again"):
-        Rule.of({"run": "old"})
+    assert Rule.of({"run": "old"}) == RULE
+    with pytest.raises(InputError, match=r"from 0\.3 to 1"):
+        Rule.of({"rule": {**plain, "mac": 7.0}})

@@ -106,17 +106,17 @@ def test_every_way_a_job_can_end(
     assert (result.reason == "") == (status == "ok")
     assert "\n" not in result.reason
     assert bool(result.blocks) == (status == "ok")
-    assert result.score == 10.0 or status == "ok"
+    assert result.gain == 0.0 or status == "ok"
 
 
-def test_results_come_in_order_with_scores_and_ranks(everything: dict[str, Any]) -> None:
+def test_results_come_in_order_with_gains_and_ranks(everything: dict[str, Any]) -> None:
     run = everything["run"]
     assert [item.strategy for item in run.results] == run.meta["strategies"]
     assert run.meta["baseline"] == "unchanged"
     found = {item.strategy: item for item in run.results}
-    assert found["unchanged"].score == pytest.approx(1.0, abs=1e-12)
+    assert found["unchanged"].gain == pytest.approx(0.0, abs=1e-12)
     assert found["unchanged"].rigid_body_modes == 3
-    assert found["softer"].score < 0.5
+    assert found["softer"].gain > 0.5
     assert (found["softer"].rank, found["unchanged"].rank) == (1, 2)
     assert found["grounded"].unphysical
     models = [item for item in run.results if item.status in ("ok", "not-applicable")]
@@ -215,7 +215,7 @@ def test_what_a_case_lacks_is_not_applicable(everything: dict[str, Any]) -> None
     found = [item for item in everything["calm"].results if item.case == "plain"]
     softer = [item for item in found if item.strategy == "softer"]
     assert {item.status for item in softer} == {"not-applicable"}
-    assert {item.score for item in softer} == {1.0}
+    assert {item.gain for item in softer} == {0.0}
     row = leaderboard(everything["calm"]).set_index("strategy").loc["softer"]
     assert row[["ok", "not_applicable", "total"]].tolist() == [2, 2, 4]
 
@@ -224,7 +224,7 @@ def test_the_same_run_gives_the_same_figures(everything: dict[str, Any]) -> None
     case = everything["case"]
     again = run_jobs([case], [toys.Softer()], jobs=1)
     first = next(item for item in everything["run"].results if item.strategy == "softer")
-    keep = ("blocks", "score", "diagnostics", "parameters")
+    keep = ("blocks", "gain", "diagnostics", "parameters")
     assert all(getattr(again.results[0], name) == getattr(first, name) for name in keep)
 
 
@@ -280,7 +280,6 @@ def test_a_model_that_cannot_be_solved_has_failed() -> None:
     )
     assert result.status == "failed"
     assert result.reason
-    assert np.isclose(result.score, 10.0)
 
 
 def test_a_process_that_a_strategy_started_ends_with_it(tmp_path: Path) -> None:

@@ -75,7 +75,7 @@ class TestEveryCommandOfTheReadme:
         assert femubench.report(run, "ours.json") == Path("ours.json")
         ours, theirs = data("ours.json"), data("results.json")
         assert ours.keys() == theirs.keys()
-        assert [r["score"] for r in ours["results"]] == [r["score"] for r in theirs["results"]]
+        assert [r["gain"] for r in ours["results"]] == [r["gain"] for r in theirs["results"]]
         assert ours["meta"]["request"] == theirs["meta"]["request"]
 
     def test_run_with_noise_and_run_resume(self) -> None:
@@ -113,9 +113,9 @@ class TestEveryCommandOfTheReadme:
     def test_compare(self) -> None:
         a = femubench.rank("rod", TWO, jobs=2, store="s")
         b = femubench.rank("rod", TWO, jobs=2, store="s")
-        words = ("compare", a.meta["run"], b.meta["run"], "--store", "s", "--fail", "unseen>1.2")
+        words = ("compare", a.meta["run"], b.meta["run"], "--store", "s", "--fail", "loss>0.2")
         call(*words, "-f", "json", "-o", "theirs.json")
-        found = femubench.compare(a, b.meta["run"], fail="unseen>1.2", store="s")
+        found = femubench.compare(a, b.meta["run"], fail="loss>0.2", store="s")
         assert not found.worse
         femubench.report(found, "ours.json")
         assert data("ours.json") == data("theirs.json")

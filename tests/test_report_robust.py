@@ -263,7 +263,7 @@ class TestFormats:
         table = parquet.read_table(folder / f"{RUN_ID}.parquet")
         assert json.loads(table.schema.metadata[b"femubench"]) == {"run": RUN_ID, "notes": []}
         expected = results_frame(Store(folder).load())
-        assert table.to_pandas()["score"].tolist() == expected["score"].tolist()
+        assert table.to_pandas()["gain"].tolist() == expected["gain"].tolist()
         assert table.column_names == list(expected.columns)
 
     def test_parquet_without_its_library_is_one_line(

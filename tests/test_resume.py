@@ -36,7 +36,7 @@ def stable(run: Run) -> dict[tuple[str, str, int], dict[str, Any]]:
     """What of a run does not depend on when and how often it was interrupted."""
     from femubench.core.schema.records import result_to_json
 
-    volatile = {"seconds", "rank", "score"}
+    volatile = {"seconds", "rank", "gain"}
     return {
         (item.case, item.strategy, item.seed): {
             name: value for name, value in result_to_json(item).items() if name not in volatile

@@ -284,7 +284,7 @@ def test_ranks_go_by_gain_alone() -> None:
     assert places == [
         ("zeta", 1), ("odd", 3), ("alpha", 1), ("gone", 3), ("worse", 5), ("zeta", 1),
     ]  # fmt: skip
-    assert rank_results(found, {}) == found  # a run without a rule stays as it is
+    assert rank_results(found, {}) == found  # of a run without models they stay as they are
 
 
 def test_equal_gains_share_a_rank_whatever_their_rounding() -> None:
@@ -394,7 +394,7 @@ def test_several_seeds_of_few_structures_give_an_interval_over_seeds() -> None:
 
 def test_a_run_without_what_its_gains_rest_on_is_to_be_run_again() -> None:
     old = Run({"run": "old", "reference": {"a": {"higher": 2.0}}}, (result(higher=1.0),))
-    with pytest.raises(InputError, match=r"run old keeps no candidate partners.*run it again"):
+    with pytest.raises(InputError, match=r"keeps no candidate partners of case 'a'.*run it again"):
         leaderboard(old)
     lacking = scored.run(ERRORS, [result("c", higher=1.0)])
     with pytest.raises(InputError, match=r"case 'c'.*run it again"):

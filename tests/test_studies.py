@@ -262,7 +262,7 @@ class TestResume:
         assert seen == list(range(1, 9))
         assert store.runs() == (early.meta["run"],)
         whole = run_plan(plan, 2, Store("calm"))
-        fields = ("status", "score", "key", "blocks", "diagnostics")
+        fields = ("status", "gain", "key", "blocks", "diagnostics")
         assert values(resumed, *fields) == values(whole, *fields)
         assert resumed.gain_by().equals(
             whole.gain_by().assign(seconds=resumed.gain_by()["seconds"])

@@ -259,7 +259,7 @@ def test_meta_data_are_checked(key: str, value: object) -> None:
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("seed", -1), ("seed", 2**63), ("score", 0.0), ("score", -1.0), ("rank", 0),
+        ("seed", -1), ("seed", 2**63), ("gain", 1.5), ("gain", -1.5), ("rank", 0),
         ("status", "fine"), ("case", "x" * 1001), ("reason", "x" * 100_001), ("seconds", -1),
         ("evaluations", 10**30), ("used", {"rms_percent": 1e200, "modes": []}),
         ("used", {"rms_percent": 1, "modes": [{"measured_hz": 0, "predicted_hz": 1, "mac": 1}]}),

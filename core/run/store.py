@@ -221,8 +221,7 @@ class Store:
         known, missing = meta.get("notes"), note_missing_jobs(meta, everything)
         notes = [*(known if isinstance(known, list) else []), *notes_of(faults, self.folder)]
         notes += [*self.notes_of_old_files(), *([missing] if missing else [])]
-        if meta.get("rule"):
-            rate_results(listed, Scale.of(meta))
+        rate_results(listed, Scale.of(meta))
         return Run({**meta, "notes": notes}, tuple(listed), companions)
 
     @pause_collection()

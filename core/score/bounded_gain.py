@@ -67,17 +67,13 @@ class Rule:
 
     @classmethod
     def of(cls, meta: Mapping[str, Any]) -> Rule:
-        """Return the rule of a run.
+        """Return the rule of a run; of one that states none, that of this version.
 
         Raises:
-            InputError: when the run was made before there was one.
+            InputError: for a number that is out of its bounds.
         """
-        stated = meta.get("rule")
-        names = [f.name for f in fields(cls)]
-        if not stated or not meta.get("models") or not set(names) <= set(stated):
-            what = f"run {meta.get('run')} keeps no candidate partners, which its gains rest on"
-            raise InputError(what, expected="a run of this version: run it again")
-        return cls().changed(f"{name}={stated[name]}" for name in names)
+        stated = {k: v for k, v in (meta.get("rule") or {}).items() if k != "version"}
+        return cls().changed(f"{name}={value}" for name, value in stated.items())
 
     def changed(self, words: Iterable[str]) -> Rule:
         """Return the rule with other numbers.

@@ -269,6 +269,8 @@ def list_rows(run: Run) -> list[dict[str, Any]]:
         InputError: when the run keeps too little to be scored.
     """
     standings = Standings.of(run)
+    if not standings.own.cases:
+        return []
     by_name: dict[str, list[JobResult]] = {name: [] for name in standings.own.names}
     for result in run.ranked:
         by_name[result.strategy].append(result)

@@ -44,10 +44,10 @@ class Scale:
 
     @classmethod
     def of(cls, meta: Mapping[str, Any]) -> Scale:
-        """Return the scale of a run.
+        """Return the scale of a run; one made before there was a rule gives it no case.
 
         Raises:
-            InputError: when the run was made before there was a rule.
+            InputError: for a rule, or models, that are none.
         """
         rule = Rule.of(meta)
         listed = {**(meta.get("models") or {}), **((meta.get("twins") or {}).get("models") or {})}
@@ -85,10 +85,10 @@ class Scale:
         """Return the errors of a model that a strategy was given.
 
         Raises:
-            InputError: when the run does not keep it.
+            InputError: when the run does not keep it, as one made before there was a rule.
         """
         if case not in self.textbook:
-            what = f"what the textbook model of case {case!r} predicts is missing"
+            what = f"the run keeps no candidate partners of case {case!r}, on which gains rest"
             raise InputError(what, expected="a run of this version: run it again")
         return self.starts.get((case, nominal), self.textbook[case])
 
@@ -153,7 +153,7 @@ def rank_results(results: Iterable[JobResult], meta: Mapping[str, Any]) -> tuple
 
     Arguments:
         results: in any order, which is kept.
-        meta: of their run; where it has no rule, they stay as they are.
+        meta: of their run; results on a case whose models it does not keep stay as they are.
 
     Examples:
         >>> ranked = results.rank_results(run.results, run.meta)
@@ -161,8 +161,7 @@ def rank_results(results: Iterable[JobResult], meta: Mapping[str, Any]) -> tuple
         [(-0.64, 2), (0.24, 1)]
     """
     listed = [replace(result) for result in results]
-    if meta.get("rule"):
-        rate_results(listed, Scale.of(meta))
+    rate_results(listed, Scale.of(meta))
     return tuple(listed)
 
 
