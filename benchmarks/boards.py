@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import textwrap
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,8 @@ from femubench import Run
 from femubench.core.display import count_noun
 from femubench.core.schema.run_options import StartModels
 from femubench.reports.runs import board_text
-from femubench.results import run_to_json
+from femubench.reports.summary import finding
+from femubench.results import list_rows, run_to_json
 
 ROOT = Path(__file__).parents[1]
 _BEGIN, _END = "<!-- {} -->\n", "<!-- /{} -->"
@@ -72,7 +74,11 @@ def brief(data: Any) -> Any:  # noqa: ANN401 - JSON data of any form
         return float(f"{data:.7g}")
     if isinstance(data, dict):
         needed = ("predicted_hz", "mac", "modes")
-        return {k: brief(v) for k, v in data.items() if k in needed or v not in (None, "", [], {})}
+        return {
+            k: v if k == "rule" else brief(v)
+            for k, v in data.items()
+            if k in needed or v not in (None, "", [], {})
+        }
     return [brief(item) for item in data] if isinstance(data, list) else data
 
 
@@ -87,6 +93,15 @@ def put(name: str, text: str, page: Path) -> None:
     if not mark or not end:
         raise ValueError(f"{page} has no marks {name!r}")
     page.write_text(f"{before}{mark}{text}\n{end}{after}", encoding="utf-8")
+
+
+def said_of_the_suite(run: Run) -> str:
+    """Return what the README says of the suite, wrapped."""
+    count = len(run.meta["cases"])
+    where = "[the board](docs/scenarios.md#all-strategies-on-all-structures)"
+    said = " ".join(finding(run, list_rows(run)))
+    text = f"On all {count} structures of the suite ({where}, `bench run suite`): {said}"
+    return textwrap.fill(text, 118, break_long_words=False, break_on_hyphens=False)
 
 
 def main() -> None:
@@ -104,6 +119,8 @@ def main() -> None:
     run = slim(run)
     text = json.dumps(brief(run_to_json(run)), separators=(",", ":"))
     file_of(words.board).write_text(text.replace('{"case"', '\n{"case"') + "\n", encoding="utf-8")
+    if words.board == "suite":
+        put("suite-finding", said_of_the_suite(run), ROOT / "README.md")
     put("leaderboard", f"```\n{board_text(run)}\n```", ROOT / board.page)
     print(f"{count_noun(len(run.results), 'job')} in {file_of(words.board)}")
 

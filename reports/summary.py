@@ -217,6 +217,7 @@ def _how_sure(
     worse = [name for name in others if name in best["better_than"]]
     if others:
         yield f"It is shown to be better than {len(worse)} of {len(others)} other strategies."
+    none = []
     for row in lines:
         above = [
             plain(other["strategy"]) for other in board
@@ -225,7 +226,9 @@ def _how_sure(
         if above:
             yield f"Shown to be better than {row['yardstick']}: {first_of(above, 4)}."
         else:
-            yield f"No strategy is shown to be better than {row['yardstick']}."
+            none.append(plain(row["yardstick"]))
+    if none:
+        yield f"No strategy is shown to be better than {' or '.join(none)}."
 
 
 def _percent(value: float) -> str:

@@ -103,7 +103,7 @@ class Rule:
 
 # Beyond these a run keeps no candidates, or a share is none.
 _BOUNDS = {
-    "window": (0.0, math.log(2.0)),
+    "window": (0.0, 0.6932),
     "mac": (LEAST_KEPT_MAC, 1.0),
     "same_mac": (LEAST_KEPT_MAC, 1.0),
     "floor": (1e-6, 1.0),

@@ -18,7 +18,7 @@
     const counted = held.length ? held : cases;
     const tested = counted.filter((c) => data.cases[c].test);
     const tests = tested.length && tested.length < counted.length ? tested : null;
-    return { cases, counted, tests, structures: [...new Set(counted.map(structureOf))], whole: isWhole(filter), blocks: filter.blocks };
+    return { cases, counted, tests, structures: [...new Set(counted.map(structureOf))], whole: isWhole(filter) };
   }
   // Return the mean over seeds, then over the cases of every structure; what is missing counts as the
   // model that was given.
@@ -28,7 +28,7 @@
   }
 
   function rowOf(s, grid) {
-    const { cases, counted, structures, blocks } = grid;
+    const { cases, counted, structures } = grid;
     const place = new Map(cases.map((c, i) => [c, i]));
     const per = Object.fromEntries(FIGURES.map((name) => [name, byStructure(s, counted, name)]));
     const textbook = d3.rollups(counted, (same) => mean(same.map((c) => data.cases[c].textbook_percent)), structureOf).map(([, value]) => value);
@@ -36,7 +36,7 @@
     const results = (byStrategy.get(s) ?? []).filter((r) => place.has(r.c));
     const fine = results.filter((r) => r.status === "ok");
     const { name: strategy, yardstick } = data.strategies[s];
-    const forecasts = fine.flatMap((r) => blocks.flatMap((k) => (r.forecast[k] ? [{ c: r.c, ...r.forecast[k] }] : [])));
+    const forecasts = fine.flatMap((r) => d3.range(data.blocks.length).flatMap((k) => (r.forecast[k] ? [{ c: r.c, ...r.forecast[k] }] : [])));
     const given = data.board.find((own) => own.strategy === strategy);
     const row = {
       index: s, strategy, yardstick, rank: null, gain_low: null, gain_high: null, gain_drawn: null,
