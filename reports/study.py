@@ -17,8 +17,8 @@ _MOST_COLUMNS = 9
 _SHORT = {"sensors_left_out": "left out"}
 _COUNTED = (
     "A cell is a leaderboard of its own: every structure counts once, a job that failed or is "
-    "missing counts ten times the error of the textbook model, and with several seeds gain is "
-    "the median over them. !: a model lost rigid-body modes or has negative eigenvalues."
+    "missing counts as the model that was given, and with several seeds gain is the mean over "
+    "them. !: a model lost rigid-body modes or has negative eigenvalues."
 )
 _PICTURE = (
     "White: 0, as the textbook model, which uses no measurement; blue: better, red: worse. "

@@ -33,8 +33,8 @@ def heat_map(
     White is 0, what the textbook model predicts without any measurement; the scale ends at 0.25,
     0.5 or 1 both ways, and what is less has its last red. Every cell has its number as far as there
     is room.
-    Hatched: a job at least failed or is missing, which counts as ten times the error. Grey: the
-    strategy is applicable to no job of the cell.
+    Hatched: a job at least failed or is missing, which counts as the model that was given. Grey:
+    the strategy is applicable to no job of the cell.
 
     Arguments:
         run: of a study, or any other.

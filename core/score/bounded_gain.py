@@ -1,7 +1,7 @@
 """The rule of the boards: what a model gains over the textbook one out of the given band.
 
-The rule was fixed in version 1, before any structure was made to decide on it. Whoever varies it
-says so: its numbers and its version stand in every run.
+The rule was fixed in version 1, before any structure was made to decide on it. Its numbers and its
+version stand in every run, and the version names the numbers that are not its own.
 """
 
 from __future__ import annotations
