@@ -76,7 +76,9 @@ def _strategy_page(item: Data, index: Data) -> str:
     latest = item["versions"][0]
     ranks = sum(row["rank"] is not None for row in index["boards"][0]["rows"])
     answer = "No rank: the latest version lacks a case of the ranking."
-    if item["rank"]:
+    if latest["yardstick"]:
+        answer = f"A yardstick, without rank: {plain(latest['yardstick'])}."
+    elif item["rank"]:
         answer = f"Rank {item['rank']} of {ranks} with {_gain_words(latest)}."
     return _page(
         "strategy", index, item,

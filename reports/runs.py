@@ -206,8 +206,11 @@ def _board(run: Run, title: str = "") -> Iterator[Passage]:
     known = [
         key
         for key, head in heads.items()
-        if {head.text(line[key]) for line in listed} - {NOTHING, ""}
-        and (tested or key not in ("better_than", "worse_than"))
+        if key in ("#", "strategy", "gain")
+        or (
+            {head.text(line[key]) for line in listed} - {NOTHING, ""}
+            and (tested or key not in ("better_than", "worse_than"))
+        )
     ]
     table = Table(
         [heads[key] for key in known], [[line[key] for key in known] for line in listed], names=1

@@ -177,8 +177,9 @@ def headline(
         structures: their number.
         over: what the intervals are over; empty where there are none.
     """
-    best = [row for row in board if row["rank"] == 1]
-    if not best or not any(row["answered"] for row in board if not row["yardstick"]):
+    # Who never gave a model may share the first rank with who gave back the one that was given.
+    best = [row for row in board if row["rank"] == 1 and row["answered"]]
+    if not best:
         return ["No strategy gave a possible model."] if board else []
     lines = [row for row in board if row["yardstick"]]
     first, percent = best[0], [f"{models} are {_percent(best[0]['textbook_percent'])} off"]

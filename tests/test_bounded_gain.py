@@ -145,11 +145,11 @@ def test_weights_are_heights_of_peaks_in_a_filtered_response() -> None:
     # The partner, the same shape at half the height, one across, one out of the window.
     readings = np.hstack([shape, 0.5 * shape, np.array([[3.0], [0.0], [-1.0]]), shape])
     frequencies = np.array([100.0, 110.0, 120.0, 210.0])
-    pairing = Pairing(np.array([0]), np.array([1.0]), np.array([1]))
+    pairing = Pairing(np.array([0]), np.array([1.0]))
     (found,) = find_candidates(measurement, frequencies, readings, pairing)
     assert found == (Candidate(110.0, pytest.approx(0.25), pytest.approx(1.0)),)
     # What is a partner is no candidate, and without a shape there are none.
-    alone = Pairing(np.array([0]), np.array([np.nan]), np.array([1]))
+    alone = Pairing(np.array([0]), np.array([np.nan]))
     assert find_candidates(measurement, frequencies, readings, alone) == [()]
 
 

@@ -51,7 +51,7 @@ def _leaders(present: Mapping[str, Mapping[str, Any]]) -> list[str]:
     sound = {
         name: version
         for name, version in present.items()
-        if version["complete"] and version["gain"] is not None and not version["yardstick"]
+        if version["complete"] and version["answered"] and not version["yardstick"]
     }
     listed = rank_items(sound, lambda name: ((), -sound[name]["gain"], name))
     return [name for rank, name in listed if rank == 1]

@@ -187,8 +187,8 @@ def _stated(
     results = [outcome.result for listed in counted.values() for outcome in listed]
     return {
         "strategy": strategy,
-        "yardstick": ground.yardsticks.get(strategy, ""),
         "rank": row["rank"],
+        "yardstick": ground.yardsticks.get(strategy, ""),
         **{name: known(name) for name in FIGURES},
         "low": known("gain_low"),
         "high": known("gain_high"),

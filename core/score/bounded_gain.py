@@ -230,7 +230,8 @@ def measure_errors(
     for name in ("used", "higher", "modified"):
         for mode in _modes(blocks, name):
             where = name if name != "modified" else "above" if mode.measured_hz > top else "band"
-            found = _find_partners(mode, rule, rule.above * highest[mode.modification])
+            state = highest.get(mode.modification, mode.measured_hz)
+            found = _find_partners(mode, rule, rule.above * state)
             parts[where].append(_mean_error(mode, found, rule.cap))
             false |= {(mode.modification, c.hz) for c in found[1:] if c.weight >= rule.visible}
             if name != "used" and mode.mac is not None:

@@ -117,7 +117,7 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
             _result(found, cases.index(found.case), strategies.index(found.strategy), scale)
             for found in run.results
         ],
-        "board": [{str(key): clean(value) for key, value in row.items()} for row in board],
+        "board": list(map(_cleaned, board)),
         "statistics": {
             "pairs": [
                 [strategies.index(a), strategies.index(b), round_figures(p, 4)]
@@ -134,6 +134,11 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
         "papers": papers_of(run),
         "downloads": downloads,
     }
+
+
+def _cleaned(figures: _Named) -> dict[str, Any]:
+    """Return figures as they are, null for what is not known."""
+    return {name: clean(value) for name, value in figures.items()}
 
 
 def _strategies(run: Run) -> list[dict[str, Any]]:
@@ -166,7 +171,7 @@ def _case(run: Run, case: str, exhibits: ExhibitSource | None, scale: Scale) -> 
         "name": case,
         "scenario": case.partition("/")[0],
         "structure": structures_of(run).get(case, case),
-        "start": plain_data(scale.figures(case, scale.start(case, run.nominals[0]))),
+        "start": _cleaned(scale.figures(case, scale.start(case, run.nominals[0]))),
         "textbook_percent": clean(100.0 * scale.textbook[case].error),
         "counts": scale.holds_back(case) or find_basis(run) == "given",
         "test": is_test((run.meta.get("classes") or {}).get(case)),
@@ -185,7 +190,7 @@ def _result(result: JobResult, case: int, strategy: int, scale: Scale) -> dict[s
         "seed": result.seed,
         "status": result.status,
         "reason": shorten_text(plain(result.reason), _LONGEST_REASON),
-        **plain_data(scale.figures(result.case, scale.errors(result))),
+        **_cleaned(scale.figures(result.case, scale.errors(result))),
         "answered": result.answered,
         "rms": [None if block is None else clean(block.rms_percent) for block in blocks],
         "seconds": round_figures(result.seconds, 4),

@@ -170,7 +170,7 @@ def test_the_best_is_seen_without_scrolling(view: Callable[..., Any], large: Pat
     for place in (".answer", "figure svg", "figcaption"):
         box = page.locator(place).first.bounding_box()
         assert box["y"] + box["height"] <= 900
-    assert " with gain 0." in page.locator(".answer").inner_text()
+    assert "Its gain is 0." in page.locator(".answer").inner_text()
 
 
 @pytest.mark.nightly
