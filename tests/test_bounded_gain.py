@@ -12,7 +12,7 @@ import pytest
 from femubench import InputError, Measurement
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.pairing import Pairing
-from femubench.core.schema.paired_modes import Candidate, ModeBefore
+from femubench.core.schema.paired_modes import ModeBefore, PartnerCandidate
 from femubench.core.schema.results import Block
 from femubench.core.score.bounded_gain import (
     ModelErrors,
@@ -90,20 +90,20 @@ def test_a_gain_is_bounded_and_does_not_jump_where_errors_are_small(
 
 
 def test_a_false_mode_next_to_a_partner_takes_part_by_what_sensors_see_of_it() -> None:
-    def error(*others: Candidate) -> tuple[float, int]:
+    def error(*others: PartnerCandidate) -> tuple[float, int]:
         own = {**TEXTBOOK, "higher": Block(0.0, None, (mode(2, 200.0, 200.0, candidates=others),))}
         found = measure_errors(own, TEXTBOOK, RULE)
         return 2 * found.error - math.log(200 / 190), found.false_modes
 
     assert error() == (pytest.approx(0.0, abs=1e-12), 0)
     near = math.log(1.05)
-    assert error(Candidate(210.0, 1.0, 0.9)) == (pytest.approx(near / 2), 1)
-    assert error(Candidate(210.0, 0.05, 0.9)) == (pytest.approx(near * 0.05 / 1.05), 0)
+    assert error(PartnerCandidate(210.0, 1.0, 0.9)) == (pytest.approx(near / 2), 1)
+    assert error(PartnerCandidate(210.0, 0.05, 0.9)) == (pytest.approx(near * 0.05 / 1.05), 0)
     # Another shape, and a frequency that the test did not reach.
-    assert error(Candidate(210.0, 1.0, 0.49)) == (pytest.approx(0.0, abs=1e-12), 0)
-    assert error(Candidate(221.0, 1.0, 0.9)) == (pytest.approx(0.0, abs=1e-12), 0)
+    assert error(PartnerCandidate(210.0, 1.0, 0.49)) == (pytest.approx(0.0, abs=1e-12), 0)
+    assert error(PartnerCandidate(221.0, 1.0, 0.9)) == (pytest.approx(0.0, abs=1e-12), 0)
     # Two at either side of the truth are no better than one at it, nor than their centre.
-    low, high = Candidate(190.0, 1.0, 0.9), Candidate(210.0, 1.0, 0.9)
+    low, high = PartnerCandidate(190.0, 1.0, 0.9), PartnerCandidate(210.0, 1.0, 0.9)
     assert error(low, high)[0] > 0.03
 
 
@@ -147,7 +147,7 @@ def test_weights_are_heights_of_peaks_in_a_filtered_response() -> None:
     frequencies = np.array([100.0, 110.0, 120.0, 210.0])
     pairing = Pairing(np.array([0]), np.array([1.0]))
     (found,) = find_candidates(measurement, frequencies, readings, pairing)
-    assert found == (Candidate(110.0, pytest.approx(0.25), pytest.approx(1.0)),)
+    assert found == (PartnerCandidate(110.0, pytest.approx(0.25), pytest.approx(1.0)),)
     # What is a partner is no candidate, and without a shape there are none.
     alone = Pairing(np.array([0]), np.array([np.nan]))
     assert find_candidates(measurement, frequencies, readings, alone) == [()]

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scored
 
 from femubench.core.errors import InputError
 from femubench.core.run.frames import modes_frame, results_frame, run_from_json, run_to_json
@@ -54,8 +53,14 @@ META = {
     "seed": 0,
     "seeds": [0],
     "reference": {"corner": {"used": 6.0, "modified": 50.0}},
-    "models": {"corner": {"drawn": scored.plain(GOOD.blocks)}},
 }
+
+
+def with_models() -> dict[str, Any]:
+    """Return the meta data with what the results are measured by."""
+    import scored  # not where a process of its own reads this file
+
+    return {**META, "models": {"corner": {"drawn": scored.plain(GOOD.blocks)}}}
 
 
 def stored(
@@ -305,7 +310,8 @@ def test_many_writers_do_not_mix_their_records(tmp_path: Path) -> None:
 
 
 def test_json_is_the_contract_and_comes_back() -> None:
-    run = Run(META, rank_results([GOOD, BAD], META))
+    meta = with_models()
+    run = Run(meta, rank_results([GOOD, BAD], meta))
     data = run_to_json(run)
     text = json.dumps(data, allow_nan=False)
     first, second = json.loads(text)["results"]
@@ -343,7 +349,7 @@ def test_wrong_json_is_refused_with_its_place(change: dict[str, Any], key: str) 
 
 
 def test_one_row_a_job() -> None:
-    frame = results_frame(Run(META, rank_results([GOOD, BAD], META)))
+    frame = results_frame(Run(META, rank_results([GOOD, BAD], with_models())))
     assert frame["strategy"].tolist() == ["softer", "failing"]
     assert frame["used_percent"].tolist()[0] == 3.0
     assert np.isnan(frame["used_percent"].tolist()[1])

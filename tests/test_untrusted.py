@@ -328,6 +328,7 @@ def test_a_name_neither_breaks_the_screen_nor_the_document(tmp_path: Path) -> No
         result["reason"] = EVIL if result["status"] != "ok" else ""
     data["meta"] |= {"strategies": [EVIL], "cases": {EVIL: {"title": EVIL}}, "run": f"../{EVIL}"}
     data["meta"] |= {"citations": {EVIL: EVIL}, "machine": {EVIL: EVIL}, "reference": None}
+    data["meta"]["models"] = {EVIL: data["meta"]["models"]["frame"]}
     file = tmp_path / "run.json"
     file.write_text(json.dumps(data))
     for name in ("terminal", "markdown"):

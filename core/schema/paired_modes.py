@@ -15,7 +15,7 @@ from femubench.core.schema.bounds import (
 )
 
 
-class Candidate(Struct, frozen=True, gc=False, array_like=True):
+class PartnerCandidate(Struct, frozen=True, gc=False, array_like=True):
     """A mode of a model that may stand for a measured one, and is the partner of no other.
 
     Arguments:
@@ -64,5 +64,5 @@ class PairedMode(Struct, frozen=True, gc=False, omit_defaults=True):
     mac: Mac | None
     modification: Text | None = None
     predicted_std_hz: StdHertz | None = None
-    candidates: tuple[Candidate, ...] = ()
+    candidates: tuple[PartnerCandidate, ...] = ()
     before: ModeBefore | None = None

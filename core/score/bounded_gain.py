@@ -17,7 +17,7 @@ from femubench.core.errors import InputError
 from femubench.core.modal.correlation import mac
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import LEAST_SENSORS, Pairing
-from femubench.core.schema.paired_modes import Candidate, ModeBefore, PairedMode
+from femubench.core.schema.paired_modes import ModeBefore, PairedMode, PartnerCandidate
 from femubench.core.schema.results import Block
 from femubench.core.typing import FloatArray
 
@@ -135,7 +135,7 @@ class ModelErrors:
 
 
 @dataclass(frozen=True)
-class Gain:
+class CaseGain:
     """What a model gains over the textbook model of its case, each in [-1, 1].
 
     Arguments:
@@ -151,7 +151,7 @@ class Gain:
 
 def find_candidates(
     measurement: Measurement, frequencies: FloatArray, readings: FloatArray, pairing: Pairing
-) -> list[tuple[Candidate, ...]]:
+) -> list[tuple[PartnerCandidate, ...]]:
     """Return by measured mode the predicted ones that may stand for it, but are nobody's partner.
 
     The weight w = (phi_i' r_j)^2 / (phi_i' phi_i) is the height of the peak of mode j in a response
@@ -177,7 +177,7 @@ def find_candidates(
         weights = {j: float(heights[i, j] / heights[i, partner]) for j in columns}
         found.append(
             tuple(
-                Candidate(float(frequencies[j]), weight, float(likeness[i, j]))
+                PartnerCandidate(float(frequencies[j]), weight, float(likeness[i, j]))
                 for j, weight in weights.items()
                 if np.isfinite(weight)
             )
@@ -244,7 +244,7 @@ def measure_errors(
     return ModelErrors(error, change, _mean(parts["band"]), _mean(shapes), len(false))
 
 
-def find_gain(own: ModelErrors, textbook: ModelErrors, rule: Rule) -> Gain:
+def find_gain(own: ModelErrors, textbook: ModelErrors, rule: Rule) -> CaseGain:
     """Return what a model gains: the part of the textbook model's error that it removes.
 
     (R - E) / max(R, E, floor), which is minus the part of its own error that it adds where that is
@@ -261,10 +261,10 @@ def find_gain(own: ModelErrors, textbook: ModelErrors, rule: Rule) -> Gain:
     known = [(part, share) for part, share in zip(parts, shares, strict=True) if part == part]
     total = sum(share for _, share in known)
     gain = sum(part * share for part, share in known) / total if total else math.nan
-    return Gain(gain, *parts)
+    return CaseGain(gain, *parts)
 
 
-def _find_partners(mode: PairedMode, rule: Rule, highest: float) -> list[Candidate]:
+def _find_partners(mode: PairedMode, rule: Rule, highest: float) -> list[PartnerCandidate]:
     """Return the partner of a measured mode, then what else of the model may stand for it."""
     if mode.predicted_hz is None:
         return []
@@ -275,10 +275,10 @@ def _find_partners(mode: PairedMode, rule: Rule, highest: float) -> list[Candida
         and other.hz <= highest
         and abs(math.log(other.hz / mode.measured_hz)) <= rule.window
     )
-    return [Candidate(mode.predicted_hz, 1.0, 1.0), *others]
+    return [PartnerCandidate(mode.predicted_hz, 1.0, 1.0), *others]
 
 
-def _mean_error(mode: PairedMode, found: list[Candidate], cap: float) -> float:
+def _mean_error(mode: PairedMode, found: list[PartnerCandidate], cap: float) -> float:
     """Return the weighted mean error of a mode; the cap without a partner of a real frequency."""
     if not found or found[0].hz <= 0.0:
         return cap

@@ -11,9 +11,10 @@ import msgspec
 
 from femubench.core.errors import InputError
 from femubench.core.garbage import pause_collection
+from femubench.core.schema.records import to_plain
 from femubench.core.schema.results import BLOCKS, UNSEEN, Block, JobResult, Nominal, rate
 from femubench.core.score.bounded_gain import (
-    Gain,
+    CaseGain,
     ModelErrors,
     Rule,
     find_gain,
@@ -112,7 +113,7 @@ class Scale:
             "false_modes": float(errors.false_modes),
         }
 
-    def gain(self, case: str, errors: ModelErrors) -> Gain:
+    def gain(self, case: str, errors: ModelErrors) -> CaseGain:
         """Return what a model with these errors gains over the textbook one of a case."""
         return find_gain(errors, self.textbook[case], self.rule)
 
@@ -158,7 +159,7 @@ def rank_results(results: Iterable[JobResult], meta: Mapping[str, Any]) -> tuple
     Examples:
         >>> ranked = results.rank_results(run.results, run.meta)
         >>> [(round(one.gain, 2), one.rank) for one in ranked]
-        [(-0.64, 2), (0.24, 1)]
+        [(-0.67, 2), (0.6, 1)]
     """
     listed = [replace(result) for result in results]
     rate_results(listed, Scale.of(meta))
@@ -185,7 +186,7 @@ def _order(item: tuple[float, JobResult]) -> tuple[tuple[bool, ...], float, str]
 
 def list_models(models: Models) -> dict[str, Any]:
     """Return what nominal models predict as the meta data of a run have it."""
-    plain: dict[str, Any] = msgspec.to_builtins(models)
+    plain: dict[str, Any] = to_plain(models)
     order = {name: place for place, name in enumerate(BLOCKS)}
     return {
         case: {n: dict(sorted(own.items(), key=lambda b: order[b[0]])) for n, own in known.items()}

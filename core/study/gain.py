@@ -42,7 +42,7 @@ def gain_by(run: Run, *axes: str) -> pd.DataFrame:
 
     Examples:
         >>> results.gain_by(run, "strategy")["gain"].round(2).tolist()
-        [-0.64, 0.24]
+        [-0.67, 0.6]
     """
     import pandas as pd
 

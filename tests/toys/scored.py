@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from femubench.core.schema.records import to_plain
 from femubench.results import Block, JobResult, PairedMode, Rule, Run, rank_results
 
 HERTZ = {"used": 100.0, "higher": 200.0, "modified": 300.0}
@@ -54,9 +55,8 @@ def meta(errors: Mapping[str, Mapping[str, float]], **more: Any) -> dict[str, An
 
 def plain(found: Mapping[str, Block]) -> dict[str, Any]:
     """Return blocks as the meta data of a run have them."""
-    import msgspec
-
-    return {name: msgspec.to_builtins(block) for name, block in found.items()}
+    made: dict[str, Any] = to_plain(found)
+    return made
 
 
 def run(

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from msgspec import structs, to_builtins
 
-from femubench.core.schema.paired_modes import Candidate, ModeBefore
+from femubench.core.schema.paired_modes import ModeBefore, PartnerCandidate
 from femubench.results import Block, JobResult, PairedMode, Rule, Run, rank_results
 
 BLOCKS = ("used", "higher", "modified")
@@ -167,11 +167,13 @@ def _block(random: np.random.Generator, name: str, percent: float) -> Block:
     return Block(percent, sum(macs) / len(macs), modes)
 
 
-def _others(random: np.random.Generator, hertz: float) -> tuple[Candidate, ...]:
+def _others(random: np.random.Generator, hertz: float) -> tuple[PartnerCandidate, ...]:
     """Return now and then another mode that may stand for the measured one."""
     if random.random() > 0.1:
         return ()
-    return (Candidate(hertz * float(random.uniform(0.9, 1.1)), float(random.uniform(0, 1)), 0.8),)
+    return (
+        PartnerCandidate(hertz * float(random.uniform(0.9, 1.1)), float(random.uniform(0, 1)), 0.8),
+    )
 
 
 def _parameters(random: np.random.Generator) -> tuple[dict[str, object], ...]:
