@@ -2,7 +2,6 @@
 
 python benchmarks/boards.py default      # README.md; minutes on two cores
 python benchmarks/boards.py suite        # docs/scenarios.md
-python benchmarks/boards.py noise        # docs/scoring.md
 python benchmarks/boards.py default --from run.json    # of a run that is there
 """
 
@@ -39,20 +38,17 @@ class Board:
     Arguments:
         page: where it stands, between marks of its name.
         cases: words of `bench run`; the default set where there are none.
-        seeds: draws of noise; None for the data as recorded.
         nominal: the models that strategies start from.
     """
 
     page: str
     cases: tuple[str, ...] = ()
-    seeds: int | None = None
     nominal: StartModels = "both"
 
 
 BOARDS = {
     "default": Board("README.md"),
     "suite": Board("docs/scenarios.md", ("suite",), nominal="textbook"),
-    "noise": Board("docs/scoring.md", ("frame", "hframe", "frame-solid", "hframe-solid"), 3),
 }
 
 
@@ -115,7 +111,7 @@ def main() -> None:
     if words.file:
         run = femubench.read_run(words.file)
     else:
-        run = femubench.rank(board.cases, seeds=board.seeds, nominal=board.nominal, jobs=words.jobs)
+        run = femubench.rank(board.cases, nominal=board.nominal, jobs=words.jobs)
     run = slim(run)
     text = json.dumps(brief(run_to_json(run)), separators=(",", ":"))
     file_of(words.board).write_text(text.replace('{"case"', '\n{"case"') + "\n", encoding="utf-8")

@@ -233,20 +233,15 @@ def searched(x: FloatArray) -> Maker:
 
 
 def search(problems: Sequence[Problem]) -> Maker:
-    """Return the best maker on some structures, by Nelder and Mead from two starts."""
+    """Return the best maker on some structures, by Nelder and Mead from `shifted`."""
+    start = np.array([0.5, 0.0, 0.0])
     steps = np.vstack([np.zeros(3), np.diag([0.3, 0.5, 2.0])])
 
     def loss(x: FloatArray) -> float:
         return -mean_gain(problems, searched(x))["gain"]
 
-    found = [
-        minimize(
-            loss, start, method="Nelder-Mead",
-            options={"maxfev": 40, "initial_simplex": start + steps},
-        )
-        for start in (np.array([0.5, 0.0, 0.0]), np.array([1.0, -0.5, 3.0]))
-    ]  # fmt: skip
-    best = min(found, key=lambda one: float(one.fun)).x
+    options = {"maxfev": 25, "initial_simplex": start + steps}
+    best = minimize(loss, start, method="Nelder-Mead", options=options).x
     print(f"searched: share {best[0]:.2f}, slope {best[1]:.2f}, width {best[2]:.2f} %")
     return searched(best)
 

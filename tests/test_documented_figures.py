@@ -1,8 +1,8 @@
 """The figures of README and docs that one run, one reproduction and a committed file give.
 
 Figures of single pages stand in tests of their own: tables of docs/effects.md in test_effects_docs,
-the tutorial's in test_tutorial, those of the papers in test_papers_*; docs/scoring.md in
-test_sweep_noise, docs/diagnosis-accuracy.md in test_sweep_diagnosis.
+the tutorial's in test_tutorial, those of the papers in test_papers_*; docs/scoring.md and
+docs/scenarios.md in test_suite, docs/diagnosis-accuracy.md in test_sweep_diagnosis.
 """
 
 from __future__ import annotations

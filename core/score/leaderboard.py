@@ -251,8 +251,8 @@ def leaderboard(run: Run) -> pd.DataFrame:
         InputError: when the run keeps too little to be scored.
 
     Examples:
-        >>> results.leaderboard(run)[["strategy", "gain"]].round(2).values.tolist()
-        [['global', 0.6], ['unchanged', -0.67]]
+        >>> results.leaderboard(run)["gain"].round(2).tolist()
+        [0.6, -0.67]
     """
     import pandas as pd
 
