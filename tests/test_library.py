@@ -134,7 +134,9 @@ class TestEveryCommandOfTheReadme:
         change_data(file, '"status":"ok"', '"status":"oj"')
         lost, missing = femubench.read_run(store="s").meta["notes"]
         assert "sqlite:2: damaged" in lost
-        assert missing.startswith("1 of 2 jobs are missing and score as failures: rod unchanged")
+        assert missing.startswith(
+            "1 of 2 jobs are missing and count as the model that was given: rod unchanged"
+        )
         call("store", "repair", "--store", "s")
         assert femubench.read_run(store="s").meta["notes"] == [missing]
 

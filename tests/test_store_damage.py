@@ -134,7 +134,7 @@ def test_the_jobs_that_are_missing_are_named(ended: bool, tmp_path: Path) -> Non
             break
         edit(file, f"DELETE FROM records WHERE number = {place}", *end)
         name = f"corner {lost.strategy} seed {lost.seed} drawn"
-        said = "1 of 6 jobs are missing and score as failures: "
+        said = "1 of 6 jobs are missing and count as the model that was given: "
         said = said if ended else "the run has not ended: 5 of 6 jobs are there; not run: "
         assert store.load().meta["notes"][-1] == said + name
         file.write_bytes(whole)
@@ -348,7 +348,10 @@ def test_a_report_leaves_out_what_is_damaged(tmp_path: Path) -> None:
     done = CliRunner().invoke(bench, words)
     assert len(done.stdout.splitlines()) == len(RESULTS)
     assert "sqlite:2: damaged" in done.stderr
-    assert "1 of 6 jobs are missing and score as failures: corner a seed 0 drawn" in done.stderr
+    assert (
+        "1 of 6 jobs are missing and count as the model that was given: corner a seed 0 drawn"
+        in done.stderr
+    )
 
 
 def test_a_comparison_tells_what_is_damaged(tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def note_missing_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> 
     Examples:
         >>> meta = {"cases": {"rod": {}}, "strategies": ["mine"], "seeds": [0]}
         >>> results.note_missing_jobs(meta, ())
-        '1 of 1 jobs are missing and score as failures: rod mine seed 0 drawn'
+        '1 of 1 jobs are missing and count as the model that was given: rod mine seed 0 drawn'
     """
     starts = meta.get("starts") or {}
     models = {case: starts.get(case, NOMINALS[:1]) for case in meta.get("cases") or {}}
@@ -89,7 +89,7 @@ def note_missing_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> 
     if "finished" in meta and (meta["finished"] is None or meta.get("interrupted") is True):
         how = "has not ended" if meta["finished"] is None else "was interrupted"
         return f"the run {how}: {len(there)} of {planned} jobs are there; not run: {first}"
-    return f"{lost} of {planned} jobs are missing and score as failures: {first}"
+    return f"{lost} of {planned} jobs are missing and count as the model that was given: {first}"
 
 
 def _is_old(file: Path) -> bool:

@@ -95,7 +95,7 @@
     return bench.draw({
       kind: "scatter", title: "Which strategies differ by more than chance",
       note: `${apart} of ${bench.plural(pairs.length, "pair")} differ. ${note} For the whole run whatever the filter.`,
-      x: { label: "shown to be better than so many lines", low: 0 }, y: { label: "shown to be worse than", low: 0 },
+      x: { label: "lines that it is shown to be better than", unit: "1", low: 0 }, y: { label: "lines that it is shown to be worse than", unit: "1", low: 0 },
       series: [{ name: "lines of the board", x: rows.map((row) => row.better_than.length), y: rows.map((row) => row.worse_than.length), names }],
     });
   }
