@@ -33,7 +33,7 @@ VARIED = {
     "above": (1.0, 1.5),
     "same_mac": (0.7, 0.9),
 }
-TRIALS = 400
+TRIALS = 200
 
 
 def ranks_of(run: Run) -> dict[str, int]:

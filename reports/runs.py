@@ -177,7 +177,8 @@ def board_text(run: Run) -> str:
 
 def _marks(row: Mapping[Any, Any]) -> str:
     """Return what must not be overlooked: yardsticks, lost physics, and jobs without a model."""
-    return "=" * bool(row["yardstick"]) + "!" * row["unphysical"] + "*" * (row["ok"] < row["total"])
+    marks = {"=": row["yardstick"], "!": row["unphysical"], "*": row["ok"] < row["total"]}
+    return "".join(mark for mark, is_so in marks.items() if is_so)
 
 
 def _cells(row: Mapping[Any, Any]) -> dict[str, Cell]:
