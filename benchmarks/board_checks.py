@@ -15,9 +15,10 @@ import pandas as pd
 
 import femubench
 from femubench import Run
+from femubench.core.score.leaderboard import GainTable
 from femubench.core.score.statistics import tell_apart
 from femubench.core.typing import FloatArray
-from femubench.results import Standings, leaderboard, structures_of
+from femubench.results import Rule, leaderboard, structures_of
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data"
@@ -38,10 +39,10 @@ TRIALS = 200
 
 def ranks_of(run: Run) -> dict[str, int]:
     """Return the place of every line of a board, yardsticks among them, by gain."""
-    board = leaderboard(run)
-    return dict(
-        zip(board["strategy"], board["gain"].rank(ascending=False, method="min"), strict=True)
-    )
+    table = GainTable.of(run, run.ranked, run.nominals[0])
+    gains = pd.Series({name: float(table.gains(name).mean()) for name in table.names})
+    ranks: dict[str, int] = gains.round(6).rank(ascending=False, method="min").to_dict()
+    return ranks
 
 
 def without(run: Run) -> Iterator[tuple[str, Run]]:
@@ -54,7 +55,7 @@ def without(run: Run) -> Iterator[tuple[str, Run]]:
         yield structure, Run(meta, tuple(r for r in run.results if r.case in kept))
 
 
-def vary(run: femubench.Run) -> pd.DataFrame:
+def vary(run: Run) -> pd.DataFrame:
     """Return the place of every line by the rule, without one structure, and by varied rules."""
     board = leaderboard(run).set_index("strategy")
     base = ranks_of(run)
@@ -67,7 +68,8 @@ def vary(run: femubench.Run) -> pd.DataFrame:
     }
     for name, values in VARIED.items():
         for value in values:
-            varied = run.scored_by([f"{name}={value}"])
+            rule = Rule().changed([f"{name}={value}"]).to_json()
+            varied = Run({**run.meta, "rule": rule}, run.results)
             found[f"{name}={value:.3g}"] = pd.Series(ranks_of(varied))
     table = pd.DataFrame(found).loc[board.index]
     whole = [column for column in table if column != "gain"]
@@ -96,12 +98,10 @@ def error_rate(gains: Mapping[str, FloatArray], true: list[str], trials: int = T
 
 def families(run: Run) -> pd.DataFrame:
     """Return the error rate of the family under complete and partial nulls."""
-    standings = Standings.of(run)
-    gains = {name: standings.own.gains(name) for name in standings.own.names}
+    table = GainTable.of(run, run.ranked, run.nominals[0])
+    gains = {name: table.gains(name) for name in table.names}
     order = sorted(gains, key=lambda name: -float(gains[name].mean()))
-    half = len(order) // 2
-    kept = {"none": [], "better half": order[:half], "worse half": order[half:],
-            "every other": order[::2]}  # fmt: skip
+    kept: dict[str, list[str]] = {"none": [], "better half": order[: len(order) // 2]}
     rows = [
         {"true_differences_of": name, "permuted": len(order) - len(true),
          "trials": TRIALS, "error_rate": error_rate(gains, true)}

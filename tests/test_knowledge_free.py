@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 import numpy as np
 import pytest
+from printed_boards import as_printed, text_of
 
 from benchmarks.knowledge_free import (
     CENTRES,
@@ -34,6 +36,14 @@ def test_pickets_lose_against_their_centre_and_nothing_beats_shifted_by_much() -
     assert max(gains.values()) <= gains["shifted"] + 0.02
     for name, centre in CENTRES.items():
         assert gains[name] < gains[centre] - 0.05, name
+    said = re.findall(
+        r"`shifted` gains (\S+), moved by the whole ratio (\S+), `meet` (\S+), and models with "
+        r"pickets (\S+) to (\S+), each less",
+        text_of("docs/scoring.md"),
+    )
+    pickets = [gains[name] for name in CENTRES]
+    figures = [gains["shifted"], gains["drift"], gains["meet"], max(pickets), min(pickets)]
+    assert [as_printed(text) for text in said[0]] == figures
     # A share of the ratios is no knowledge, and the best one is not far from a half.
     shares = [
         mean_gain(problems(*SOME), searched(np.array([share, 0.0, 0.0])))["gain"]
