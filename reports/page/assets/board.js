@@ -14,7 +14,7 @@
   const gain = (key, title, hint) => (key === "gain" || known(key)) && figure(key, title, hint, share, { down: true });
   const percent = (value) => (Number.isFinite(value) ? `${Math.round(100 * value)}` : "–");
   const COLUMNS = [
-    { key: "rank", title: "Rank", right: true, hint: "yardsticks, which know nothing of the structure, have none", cell: (row) => cell(row.rank, (v) => (row.yardstick ? "=" : count(v))) },
+    { key: "rank", title: "Rank", right: true, hint: "yardsticks, which know nothing of the structure, have none", cell: (row) => cell(row.rank, (v) => (row.yardstick ? "=" : count(v)), { "data-sort": row.place }) },
     { key: "strategy", title: "Strategy", cell: nameCell },
     gain("gain", "Gain", `what the models gain over the ${ranking.yardstick}s on ${data.scored_on}, -1 to 1: mean of the two gains to the right; a job without a possible model counts as the model that was given`),
     { title: "95 % interval", right: true, cell: ({ gain_low: low, gain_high: high }) => el("td", { class: "right range", "data-low": low ?? "", "data-high": high ?? "" }, low === null ? "–" : `${share(low)} to ${share(high)}`) },

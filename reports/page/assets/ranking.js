@@ -83,7 +83,8 @@
     };
     for (const [row, rank] of ties(rows.filter((row) => !row.yardstick))) row.rank = rank;
     const order = ties(rows);
-    return rows.sort((a, b) => order.get(a) - order.get(b) || (a.strategy < b.strategy ? -1 : 1));
+    rows.sort((a, b) => order.get(a) - order.get(b) || (a.strategy < b.strategy ? -1 : 1));
+    return rows.map((row, place) => ({ ...row, place }));
   }
 
   // Resample values, the same draws for every strategy, and fill the 95 % intervals of their means in.
