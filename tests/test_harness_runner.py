@@ -119,12 +119,8 @@ def test_results_come_in_order_with_gains_and_ranks(everything: dict[str, Any]) 
     assert found["softer"].gain > 0.5
     assert (found["softer"].rank, found["unchanged"].rank) == (1, 2)
     assert found["grounded"].unphysical
-    models = [item for item in run.results if item.status in ("ok", "not-applicable")]
-    assert found["grounded"].rank == len(models)
-    assert found["softer"].evaluations == 1
-    assert found["looping"].seconds == 1.0
-    lost = [item for item in run.results if item.status not in ("ok", "not-applicable")]
-    assert {item.rank for item in lost} == {len(models) + 1}  # all of them score 10
+    # An impossible model leaves the user with the one that was given.
+    assert (found["grounded"].rank, found["grounded"].gain) == (2, 0.0)
 
 
 def test_progress_counts_every_job_once(everything: dict[str, Any]) -> None:
@@ -249,7 +245,7 @@ def test_an_interrupt_stops_the_workers_and_keeps_what_is_done(
     assert [item.strategy for item in run.results] == ["unchanged"]
     assert run.meta["interrupted"] is True
     table = leaderboard(run).set_index("strategy")
-    assert table.loc["looping", "gain"] == pytest.approx(-9.0)
+    assert table.loc["looping", "gain"] == 0.0
 
 
 def test_workers_that_cannot_start_end_the_run(
