@@ -121,6 +121,10 @@ def test_results_come_in_order_with_gains_and_ranks(everything: dict[str, Any]) 
     assert found["grounded"].unphysical
     # An impossible model leaves the user with the one that was given.
     assert (found["grounded"].rank, found["grounded"].gain) == (2, 0.0)
+    assert found["softer"].evaluations == 1
+    assert found["looping"].seconds == 1.0
+    lost = [item for item in run.results if item.status not in ("ok", "not-applicable")]
+    assert {(item.rank, item.gain) for item in lost} == {(2, 0.0)}
 
 
 def test_progress_counts_every_job_once(everything: dict[str, Any]) -> None:
