@@ -200,7 +200,10 @@ EDITS: dict[str, tuple[Edit, str]] = {
         lambda d: d["meta"]["structures"].update({"suite/bracket": "frame"}),
         "meta.structures.suite/bracket",
     ),
-    "yardstick": (lambda d: d["meta"].update(yardstick="drawn"), "meta.yardstick"),
+    "yardstick": (
+        lambda d: d["meta"].update(yardstick="drawn"),
+        "meta.models.suite/bracket.drawn: missing",
+    ),
     "a job twice": (
         lambda d: d["companions"].append(d["companions"][0]),
         "results: 0 jobs are missing",
