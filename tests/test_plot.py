@@ -77,7 +77,8 @@ def run(**changes: Any) -> Run:
     results = tuple(
         JobResult(
             "toy", name, 0, "ok", seconds=0.1 * 10**k, history=histories[name],
-            negative_eigenvalues=int(name == "odd"), blocks=scored.blocks(used=100.0 * np.log1p(0.01 * (1.0 + k))),
+            negative_eigenvalues=int(name == "odd"),
+            blocks=scored.blocks(used=100.0 * np.log1p(0.01 * (1.0 + k))),
         )
         for k, name in enumerate(histories)
     )  # fmt: skip

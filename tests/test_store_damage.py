@@ -39,7 +39,6 @@ RESULTS = tuple(
         "ok",
         seconds=0.25 * seed,
         blocks={"used": Block(3.0 + seed, 0.9, (PairedMode(1, 100.0, 101.0 + seed, 0.99),))},
-        score=1.0,
         parameters=({"name": "E", "before": 1.0, "after": 0.9, "unit": "", "std": None},),
         history=({"residual": 0.5 / (1 + seed)},),
         key=f"{seed}{strategy}" * 8,
