@@ -30,7 +30,10 @@ from femubench.core.schema.results import Block, JobResult, Run
 
 FLIPS = 300
 RUN = "20260101T000000Z-000000"
-META = {"run": RUN, "seeds": [*range(3)], "cases": {"corner": {}}, "strategies": ["a", "b"]}
+META: dict[str, Any] = {
+    **{"run": RUN, "seeds": [*range(3)], "cases": {"corner": {}}, "strategies": ["a", "b"]},
+    "models": {"corner": {"drawn": {"used": {"rms_percent": 2.0, "modes": []}}}},
+}
 RESULTS = tuple(
     JobResult(
         "corner",

@@ -80,6 +80,7 @@ class Scale:
 
     def holds_back(self, case: str) -> bool:
         """Tell whether a case has data that no strategy is given."""
+        self.start(case, "drawn")  # of one that is not kept it says so
         return any(name in UNSEEN for name in self.blocks[case])
 
     def start(self, case: str, nominal: Nominal) -> ModelErrors:
