@@ -2,7 +2,6 @@
 
 python benchmarks/boards.py default      # README.md; minutes on two cores
 python benchmarks/boards.py suite        # docs/scenarios.md
-python benchmarks/boards.py noise        # docs/scoring.md
 python benchmarks/boards.py default --from run.json    # of a run that is there
 """
 
@@ -10,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import textwrap
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,14 +17,17 @@ from typing import Any
 import femubench
 from femubench import Run
 from femubench.core.display import count_noun
-from femubench.reports.runs import board_text, floors_said
-from femubench.results import run_to_json
+from femubench.core.schema.run_options import StartModels
+from femubench.reports.runs import board_text
+from femubench.reports.summary import finding
+from femubench.results import list_rows, run_to_json
 
 ROOT = Path(__file__).parents[1]
 _BEGIN, _END = "<!-- {} -->\n", "<!-- /{} -->"
 _META = (
     *("run", "started", "seed", "seeds", "versions", "machine", "cases", "strategies", "baseline"),
-    *("structures", "classes", "yardstick", "starts", "alike", "reference"),
+    *("structures", "classes", "yardstick", "yardsticks", "starts", "alike", "reference"),
+    *("rule", "models"),
 )
 
 
@@ -35,20 +38,17 @@ class Board:
     Arguments:
         page: where it stands, between marks of its name.
         cases: words of `bench run`; the default set where there are none.
-        seeds: draws of noise; None for the data as recorded.
-        modes: whether the frequencies are kept too.
+        nominal: the models that strategies start from.
     """
 
     page: str
     cases: tuple[str, ...] = ()
-    seeds: int | None = None
-    modes: bool = False
+    nominal: StartModels = "both"
 
 
 BOARDS = {
-    "default": Board("README.md", modes=True),
-    "suite": Board("docs/scenarios.md", ("suite",)),
-    "noise": Board("docs/scoring.md", ("frame", "hframe", "frame-solid", "hframe-solid"), 3),
+    "default": Board("README.md"),
+    "suite": Board("docs/scenarios.md", ("suite",), nominal="textbook"),
 }
 
 
@@ -57,26 +57,24 @@ def file_of(name: str) -> Path:
     return ROOT / "docs" / "figures" / f"board-{name}.json"
 
 
-def slim(run: Run, *, modes: bool) -> Run:
+def slim(run: Run) -> Run:
     """Return a run with what a leaderboard rests on."""
     bare = {"parameters": (), "history": (), "diagnostics": {}, "traceback": "", "key": ""}
-    kept = []
-    for result in run.results:
-        blocks = dict(result.blocks)
-        # An uncertainty is scored mode by mode.
-        if not modes and not any(m.predicted_std_hz for b in blocks.values() for m in b.modes):
-            blocks = {name: replace(block, modes=()) for name, block in blocks.items()}
-        kept.append(replace(result, blocks=blocks, provenance={}, **bare))
+    kept = [replace(result, provenance={}, **bare) for result in run.results]
     return Run({name: run.meta[name] for name in _META if name in run.meta}, tuple(kept))
 
 
 def brief(data: Any) -> Any:  # noqa: ANN401 - JSON data of any form
-    """Return plain data with eight digits, and without what a reader takes for granted."""
+    """Return plain data with seven digits, and without what a reader takes for granted."""
     if isinstance(data, float):
-        return float(f"{data:.8g}")
+        return float(f"{data:.7g}")
     if isinstance(data, dict):
         needed = ("predicted_hz", "mac", "modes")
-        return {k: brief(v) for k, v in data.items() if k in needed or v not in (None, "", [], {})}
+        return {
+            k: v if k == "rule" else brief(v)
+            for k, v in data.items()
+            if k in needed or v not in (None, "", [], {})
+        }
     return [brief(item) for item in data] if isinstance(data, list) else data
 
 
@@ -93,6 +91,15 @@ def put(name: str, text: str, page: Path) -> None:
     page.write_text(f"{before}{mark}{text}\n{end}{after}", encoding="utf-8")
 
 
+def said_of_the_suite(run: Run) -> str:
+    """Return what the README says of the suite, wrapped."""
+    count = len(run.meta["cases"])
+    where = "[the board](docs/scenarios.md#all-strategies-on-all-structures)"
+    said = " ".join(finding(run, list_rows(run)))
+    text = f"On all {count} structures of the suite ({where}, `bench run suite`): {said}"
+    return textwrap.fill(text, 118, break_long_words=False, break_on_hyphens=False)
+
+
 def main() -> None:
     """Run a board, keep it and print it into its page."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -104,14 +111,13 @@ def main() -> None:
     if words.file:
         run = femubench.read_run(words.file)
     else:
-        run = femubench.rank(board.cases, seeds=board.seeds, jobs=words.jobs)
-    run = slim(run, modes=board.modes)
+        run = femubench.rank(board.cases, nominal=board.nominal, jobs=words.jobs)
+    run = slim(run)
     text = json.dumps(brief(run_to_json(run)), separators=(",", ":"))
     file_of(words.board).write_text(text.replace('{"case"', '\n{"case"') + "\n", encoding="utf-8")
+    if words.board == "suite":
+        put("suite-finding", said_of_the_suite(run), ROOT / "README.md")
     put("leaderboard", f"```\n{board_text(run)}\n```", ROOT / board.page)
-    if words.board == "default":
-        label, said = floors_said(run)
-        put("floors", f"**{label}**: {said}", ROOT / "docs" / "scoring.md")
     print(f"{count_noun(len(run.results), 'job')} in {file_of(words.board)}")
 
 

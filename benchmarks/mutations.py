@@ -91,20 +91,19 @@ core/score/scoring.py :: scoring
     _SAME_MOTION = 0.9 => _SAME_MOTION = 0.1
     mode.predicted_hz <= 0.0 => mode.predicted_hz == 0.0
 core/score/ranking.py :: scoring
-    OFFSET_PERCENT = 0.05 => OFFSET_PERCENT = 0.0
-    SCORE_OF_FAILURE = 10.0 => SCORE_OF_FAILURE = 1.0
     TIE = 1e-6 => TIE = 1e-2
-core/score/counting.py :: scoring
-    1.0 / often[data] => 1.0
-core/score/partners.py :: partners
-    _MOST = 2.0 / 3.0 => _MOST = 3.0
-    _ALWAYS = 1 => _ALWAYS = 0
+core/score/bounded_gain.py :: bounded_gain
+    cap: float = math.log(1.4) => cap: float = math.log(2.0)
+    max(r, e, rule.floor) => max(r, rule.floor)
+    float(heights[i, j] / heights[i, partner]) => 1.0
+    & ~taken => & True
+    c.weight >= rule.visible => c.weight >= 0.0
 core/score/predictive.py :: uncertainty
     ANYTHING = 0.01 => ANYTHING = 0.1
     2.0 * density - 1.0 / np.sqrt(np.pi) => 2.0 * density - 1.0 / np.pi
-core/score/twin_skill.py :: twins
+core/score/twin_gain.py :: twins
     frozenset({"timeout", "crashed"}) => frozenset({"crashed"})
-    CLEAR, KNOWN = 1.1, 2.0 => CLEAR, KNOWN = 1.01, 2.0
+    CLEAR, KNOWN = 0.1, 2.0 => CLEAR, KNOWN = 0.001, 2.0
 core/run/store.py :: harness_store resume
     or record.status in DONE or known => or True or known
 core/run/model_checks.py :: harness_jobs

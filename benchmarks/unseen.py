@@ -9,38 +9,28 @@ import numpy as np
 
 from femubench import Run
 from femubench.core.schema.results import UNSEEN
-from femubench.core.score.statistics import interval_over_structures
-from femubench.results import (
-    FEWEST,
-    OFFSET_PERCENT,
-    SCORE_OF_FAILURE,
-    JobResult,
-    structures_of,
-)
+from femubench.core.score.statistics import interval_of_mean
+from femubench.results import FEWEST, JobResult, structures_of
+
+OFFSET_PERCENT = 0.05  # added to both errors: one that is met must not decide everything
 
 
 def unseen_logs(run: Run, zero: str = "textbook") -> dict[str, dict[str, float]]:
     """Return ln of the error over that of a strategy that is there, by strategy and structure.
 
-    Geometric means over the unseen blocks of all cases and seeds of a structure. A failure counts
-    as in the ranking; what a strategy does not apply to stays as it was.
+    Geometric means over the unseen blocks of all cases and seeds of a structure. Without a model it
+    stays as it was.
 
     Arguments:
         run: with the strategy `zero` in it.
         zero: whose errors are the unit.
     """
-    structures, reference = structures_of(run), run.meta["reference"]
+    structures = structures_of(run)
     unit = {r.case: _errors(r) for r in run.results if r.strategy == zero}
     found: dict[str, dict[str, list[float]]] = {}
     for result in run.results:
         base = unit[result.case]
-        if result.status == "not-applicable":
-            known = {**reference[result.case], **result.start_percent}
-            own = {name: known[name] for name in base}
-        elif result.status == "ok":
-            own = _errors(result)
-        else:
-            own = {name: SCORE_OF_FAILURE * error for name, error in base.items()}
+        own = _errors(result) if result.status == "ok" else base
         rows = found.setdefault(result.strategy, {})
         structure = structures.get(result.case, result.case)
         rows.setdefault(structure, []).extend(
@@ -68,5 +58,5 @@ def interval(logs: Iterable[float]) -> str:
     values = np.array(list(logs))
     if len(values) < FEWEST:
         return "-"
-    low, high = interval_over_structures(values)
+    low, high = np.exp(interval_of_mean(values))
     return f"{low:.2f} to {high:.2f}"

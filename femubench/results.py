@@ -16,22 +16,18 @@ from femubench.core.run.store import Store as Store, note_missing_jobs as note_m
 from femubench.core.schema.paired_modes import PairedMode as PairedMode
 from femubench.core.schema.results import Block as Block, JobResult as JobResult, Run as Run
 from femubench.core.score import predictive as predictive
-from femubench.core.score.counting import (
-    block_weights as block_weights,
-    choose_blocks as choose_blocks,
-)
+from femubench.core.score.bounded_gain import Rule as Rule
 from femubench.core.score.leaderboard import (
-    FLOORS as FLOORS,
+    Standings as Standings,
     find_basis as find_basis,
     interval_kind as interval_kind,
     is_test as is_test,
     leaderboard as leaderboard,
-    ranks_by_floor as ranks_by_floor,
+    list_rows as list_rows,
 )
 from femubench.core.score.ranking import (
-    OFFSET_PERCENT as OFFSET_PERCENT,
-    SCORE_OF_FAILURE as SCORE_OF_FAILURE,
     TIE as TIE,
+    Scale as Scale,
     rank_items as rank_items,
     rank_results as rank_results,
 )
@@ -44,12 +40,12 @@ from femubench.core.score.scoring import (
 from femubench.core.score.statistics import (
     FEWEST as FEWEST,
     METHOD as METHOD,
+    flip_signs as flip_signs,
     interval_tail as interval_tail,
     structures_of as structures_of,
-    tell_apart as tell_apart,
 )
-from femubench.core.score.twin_skill import TwinSkill as TwinSkill, twin_skills as twin_skills
+from femubench.core.score.twin_gain import TwinGain as TwinGain, twin_gains as twin_gains
 from femubench.core.study.axes import StudyAxes as StudyAxes
-from femubench.core.study.skill import skill_by as skill_by
+from femubench.core.study.gain import gain_by as gain_by
 
 __all__ = [name for name in dir() if not name.startswith("_")]

@@ -23,28 +23,28 @@ from femubench.reports.svg import drawing
 from femubench.reports.terminal import to_terminal
 from femubench.results import METHOD
 
-_RATIOS = ("unseen", "used", "higher", "modified", "seconds")
+_VALUES = ("loss", "used", "higher", "modified", "seconds")
 _BLANK = "\u2800"  # stands for an indent until the table is made, which strips all white space
 _MOST_LINES = 20  # of a list on the screen
 _LONGEST = 300
 _LEGEND = (
-    "Ratios B / A, less than 1 is better in B: unseen (errors that make the skill); used, higher, "
-    "modified (rms frequency error + 0.05 %); seconds (sums). Means are geometric, over cases and "
-    "seeds. lost: results that A has and B has not."
+    "loss: gain in A less that in B, mean over structures. Ratios B / A, less than 1 is better in "
+    "B: used, higher, modified (rms frequency error + 0.05 %, geometric means over cases and "
+    "seeds); seconds (sums). lost: results that A has and B has not."
 )
 _TELLING = "Scenarios where nothing differs are left out."
-_EVIDENCE = f"{METHOD} The interval of the mean ratio is by bootstrap over structures."
+_EVIDENCE = f"{METHOD} The interval of the mean difference is by bootstrap over structures."
 _FOREST = (
-    "Mean ratio of the errors, B / A, logarithmic, with its 95 % interval. The line is at no "
-    "change; the table has the figures."
+    "Mean difference of the gains, B - A, with its 95 % interval. The line is at no change; the "
+    "table has the figures."
 )
 _SAYS = {"lost": "lost", "gained": "gained", "other": "changed"}
 _PROOF = (
     Column("strategy", 20, left=True),
     Column("differing", 9),
-    Column("ratio", 6, digits=3),
+    Column("gain B - A", 10, digits=3),
     Column("95 % interval", 15, left=True),
-    Column("p (Holm)", 8, say=lambda p: NOTHING if p is None else f"{p:.2g}"),
+    Column("p", 8, say=lambda p: NOTHING if p is None else f"{p:.2g}"),
     Column("B is", 10, left=True, wrap=True),
 )
 
@@ -110,19 +110,19 @@ def _sections(data: Mapping[str, Any], *, screen: bool = False) -> Iterator[Pass
     cells = []
     for row in data["rows"]:
         name, scenario, values = plain(row["strategy"]), row["scenario"], row["values"]
-        same = not any(_arrow(key, values[key]) for key in _RATIOS[:-1])
+        same = not any(_arrow(key, values[key]) for key in _VALUES[:-1])
         if screen and scenario is not None and same and not values["failures"]:
             continue
         if scenario is not None:
             name = 2 * _BLANK + plain(scenario) if screen else f"{name}, {plain(scenario)}"
-        cells.append([name, row["jobs"], *map(values.get, _RATIOS), values["failures"]])
-    says = (None if screen else partial(_ratio_text, key) for key in _RATIOS)
+        cells.append([name, row["jobs"], *map(values.get, _VALUES), values["failures"]])
+    says = (None if screen else partial(_value_text, key) for key in _VALUES)
     figures = [
         Column(key, max(len(key), 6), digits=2 if key == "seconds" else 3, say=say)
-        for key, say in zip(_RATIOS, says, strict=True)
+        for key, say in zip(_VALUES, says, strict=True)
     ]
     columns = [Column("strategy", 22, left=True), Column("jobs", 4), *figures, Column("lost", 4)]
-    yield Passage("Ratios", [Table(columns, cells), legend])
+    yield Passage("Loss and ratios", [Table(columns, cells), legend])
     yield from _listed("Only in A", _jobs(data["only_before"]), screen)
     yield from _listed("Only in B", _jobs(data["only_after"]), screen)
     yield from _listed("Not compared: other case files", _jobs(data["other_cases"]), screen)
@@ -140,26 +140,27 @@ def _listed(title: str, lines: Iterable[str], screen: bool) -> Iterator[Passage]
 
 
 def _drawn(evidence: Sequence[Mapping[str, Any]]) -> list[Block]:
-    listed = [item for item in evidence if item["ratio"] is not None]
+    listed = [item for item in evidence if item["difference"] is not None]
     series = []
     for verdict in dict.fromkeys(item["verdict"] for item in listed):
         own = [item for item in listed if item["verdict"] == verdict]
-        ratio, low, high = ([item[key] for item in own] for key in ("ratio", "low", "high"))
-        series.append(Series(verdict, ratio, [plain(o["strategy"]) for o in own], low, high))
-    axes = Axis("mean ratio of the errors, B / A", log=True), Axis("strategy")
+        change, low, high = ([o[key] for o in own] for key in ("difference", "low", "high"))
+        series.append(Series(verdict, change, [plain(o["strategy"]) for o in own], low, high))
+    axes = Axis("mean difference of the gains, B - A"), Axis("strategy")
     shown = drawing(
-        Chart("interval", "B over A", *axes, tuple(series), (Mark("x", 1.0, "no change"),)), _FOREST
+        Chart("interval", "B over A", *axes, tuple(series), (Mark("x", 0.0, "no change"),)), _FOREST
     )
     return [Drawing("B over A", _FOREST, shown)] if shown else []
 
 
-def _ratio_text(name: str, ratio: float | None) -> str:
-    return format_fixed(ratio, 2 if name == "seconds" else 3, 6) + _arrow(name, ratio)
+def _value_text(name: str, value: float | None) -> str:
+    return format_fixed(value, 2 if name == "seconds" else 3, 6) + _arrow(name, value)
 
 
-def _arrow(name: str, ratio: float | None) -> str:
-    """Return where a ratio went, nothing where it stayed; times scatter."""
-    off, room = (ratio or 1.0) - 1.0, 0.25 if name == "seconds" else 5e-4
+def _arrow(name: str, value: float | None) -> str:
+    """Return where a value went, nothing where it stayed; times scatter."""
+    still = 0.0 if name == "loss" else 1.0
+    off, room = (still if value is None else value) - still, 0.25 if name == "seconds" else 5e-4
     return " \u25b2" if off > room else " \u25bc" if off < -room else ""
 
 
@@ -168,10 +169,17 @@ def _proof(item: Mapping[str, Any]) -> list[Cell]:
     ends = (
         None
         if low is None or high is None
-        else f"{format_fixed(low, 3, 6)} - {format_fixed(high, 3, 6)}"
+        else f"{format_fixed(low, 3, 6)} to {format_fixed(high, 3, 6)}"
     )
     differing = f"{item['differing']} of {item['structures']}"
-    return [item["strategy"], differing, item["ratio"], ends or NOTHING, item["p"], item["verdict"]]
+    return [
+        item["strategy"],
+        differing,
+        item["difference"],
+        ends or NOTHING,
+        item["p"],
+        item["verdict"],
+    ]
 
 
 def _change(item: Mapping[str, Any]) -> str:

@@ -53,12 +53,18 @@ def feeds_of(index: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _news_text(item: Mapping[str, Any]) -> str:
-    """Return version and skill of who is in the news."""
+    """Return version and gain of who is in the news."""
     stated = f"Version {plain(item['version'])}, femubench {plain(item['femubench'])}: "
-    if item["skill"] is None:
+    if item["gain"] is None:
         return f"{stated}no result on today's files of the cases."
     sure = "" if item["low"] is None else f" (95 %: {interval(item['low'], item['high'])})"
-    return f"{stated}skill {format_fixed(item['skill'], 3, 7)}{sure} on today's cases."
+    off = ""
+    if item["error_percent"] is not None:
+        off = (
+            f", {item['error_percent']:.1f} % off out of the given band, "
+            f"handbooks {item['textbook_percent']:.1f} %,"
+        )
+    return f"{stated}gain {format_fixed(item['gain'], 3, 7)}{sure}{off} on today's cases."
 
 
 def _name(*parts: str) -> str:

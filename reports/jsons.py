@@ -6,21 +6,28 @@ import json
 from typing import Any
 
 from femubench.reports.page.rounding import clean
+from femubench.reports.summary import finding
 from femubench.reports.twins import twins_by_strategy
 from femubench.results import (
     Run,
     StudyAxes,
-    leaderboard,
+    gain_by,
+    list_rows,
     run_to_json,
-    skill_by,
-    tell_apart,
     unsteady,
 )
 
-# Names of the contract, and the columns of the leaderboard that they stand for.
+# Columns of the leaderboard that are figures, under the names of the contract.
 _FIGURES = {
-    **{f"{name}_percent": f"{name}_percent" for name in ("higher", "modified", "crps")},
-    **{name: name for name in ("skill_drawn", "skill_tests", "coverage90", "ok")},
+    **{
+        name: name
+        for name in (
+            *("error_percent", "textbook_percent", "better_share", "worse_share", "error_gain"),
+            *("change_gain", "gain_drawn", "gain_tests", "band_percent", "shape_error"),
+            *("false_modes", "higher_percent", "modified_percent", "crps_percent", "coverage90"),
+            *("answered", "ok"),
+        )
+    },
     "given_percent": "used_percent",
     "of": "total",
 }
@@ -34,9 +41,10 @@ class JsonReporter:
 
     def render(self, run: Run) -> str:
         """Return strict JSON: what is not a finite number is null."""
-        plain = {**run_to_json(run), "leaderboard": board_of(run)}
+        board = board_of(run)
+        plain = {**run_to_json(run), "finding": finding(run, list_rows(run)), "leaderboard": board}
         if StudyAxes.from_run(run) is not None:
-            cells = skill_by(run).to_dict("records")
+            cells = gain_by(run).to_dict("records")
             plain["cells"] = [{str(name): clean(v) for name, v in row.items()} for row in cells]
         return json.dumps(plain, indent=1, allow_nan=False)
 
@@ -59,20 +67,20 @@ class JsonLinesReporter:
 
 def board_of(run: Run) -> list[dict[str, Any]]:
     """Return the rows of the leaderboard as plain data, best first."""
-    board = leaderboard(run)
-    tiers = tell_apart(run, list(board["strategy"])).tier_of()
     twins, differing = twins_by_strategy(run), unsteady(run)
     return [
         {
             "strategy": row["strategy"],
-            "rank": clean(row["rank"]),
-            "tier": tiers.get(row["strategy"]),
-            "skill": clean(row["skill"]),
-            "interval": [clean(row["skill_low"]), clean(row["skill_high"])],
+            "rank": row["rank"],
+            "yardstick": row["yardstick"] or None,
+            "gain": clean(row["gain"]),
+            "interval": [clean(row["gain_low"]), clean(row["gain_high"])],
             **{name: clean(row[column]) for name, column in _FIGURES.items()},
+            "better_than": list(row["better_than"]),
+            "worse_than": list(row["worse_than"]),
             "physical": not row["unphysical"],
             **({"twins": twins[row["strategy"]]} if row["strategy"] in twins else {}),
             **({"unsteady": differing[row["strategy"]]} if row["strategy"] in differing else {}),
         }
-        for row in board.to_dict("records")
+        for row in list_rows(run)
     ]

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from femubench.plot import Axis, Chart, Mark, Series
-from femubench.reports.cells import format_fixed, interval, join_names, plain, shorten_text
+from femubench.reports.cells import format_fixed, interval, plain, shorten_text
 from femubench.reports.feed import feeds_of, headline_of
+from femubench.reports.summary import headline
 from femubench.reports.svg import drawing
 from femubench.reports.templating import asset, templates
 from femubench.results import rank_items
 
 _MOST_DRAWN = 20
-_LEAST = -1.0  # skill that is drawn; an arrow tells of less
+_LEAST = -1.0  # the least gain that there is
 _LINE = "The line is the 95 % interval. "
-_OTHERS = ("others", "not shown to be worse", "shown to be worse")
 
 Data = Mapping[str, Any]
 
@@ -30,7 +31,12 @@ def pages_of(index: Data) -> dict[str, str]:
     pages = {board["page"]: _board_page(index, board) for board in index["boards"]}
     releases = {item["name"]: _release(item["versions"][0]) for item in index["strategies"]}
     pages["leaderboard.csv"] = _csv(
-        {"class": kind, **row, **releases[row["strategy"]], "marks": "; ".join(_flags(row))}
+        {
+            "class": kind,
+            **{k: " ".join(v) if isinstance(v, list) else v for k, v in row.items()},
+            **releases[row["strategy"]],
+            "marks": "; ".join(_flags(row)),
+        }
         for kind, rows in ((board["class"], board["rows"]) for board in index["boards"])
         for row in rows
     )
@@ -61,7 +67,7 @@ def _board_page(index: Data, board: Data) -> str:
         "board", index, board,
         "Leaderboard of updating strategies" + (f": {name}" if name else ""),
         answer=list(_answer(board)),
-        chart=skills_of(board),
+        chart=gains_of(board),
         strategies={item["name"]: item for item in index["strategies"]},
     )  # fmt: skip
 
@@ -70,8 +76,10 @@ def _strategy_page(item: Data, index: Data) -> str:
     latest = item["versions"][0]
     ranks = sum(row["rank"] is not None for row in index["boards"][0]["rows"])
     answer = "No rank: the latest version lacks a case of the ranking."
-    if item["rank"]:
-        answer = f"Rank {item['rank']} of {ranks} with {_skill_words(latest)}."
+    if latest["yardstick"]:
+        answer = f"A yardstick, without rank: {plain(latest['yardstick'])}."
+    elif item["rank"]:
+        answer = f"Rank {item['rank']} of {ranks} with {_gain_words(latest)}."
     return _page(
         "strategy", index, item,
         plain(item["name"]) or "a strategy without name",
@@ -83,32 +91,29 @@ def _strategy_page(item: Data, index: Data) -> str:
 
 def _answer(board: Data) -> Iterator[str]:
     """Yield who is best, how sure that is, and on what."""
-    first = [row for row in board["rows"] if row["rank"] == 1]
-    others = [row for row in board["rows"] if _stand(row) in _OTHERS]
-    if first:
-        who = join_names([plain(row["strategy"]) for row in first])
-        yield f"{who} {'lead' if first[1:] else 'leads'} with {_skill_words(first[0])}."
+    rows = [
+        {**row, "gain_low": _number(row["low"]), "gain_high": _number(row["high"])}
+        for row in board["rows"]
+        if row["complete"]
+    ]
+    over = f"{board['structures']} structures" * any(row["low"] is not None for row in rows)
+    said = headline(rows, "Above the given band", "handbooks", board["structures"], over)
+    if any(row["rank"] == 1 for row in rows):
+        yield from said
     else:
         yield "Nobody leads: no strategy has all cases of the ranking."
-    near = [plain(row["strategy"]) for row in others if not row["below_best"]]
-    if others and not board["tested"]:
-        yield "Too few structures to say whether the others are worse by more than chance."
-    elif others:
-        below = len(others) - len(near)
-        more = f" and {len(near) - 3} more" if len(near) > 3 else ""
-        rest = f"; not shown of {', '.join(near[:3])}{more}" if near else ""
-        yield f"Shown to be worse by more than chance: {below} of {len(others)} others{rest}."
-    unphysical = sum(_stand(row) == "unphysical" for row in board["rows"])
-    if unphysical:
-        yield f"Below them for unphysical models: {unphysical}."
     cases, structures = len(board["cases"]), board["structures"]
     stated = f"{cases} case{'s' * (cases != 1)} of {structures} structure{'s' * (structures != 1)}"
     yield f"On {stated} that more than half of the strategies were run on."
 
 
-def _skill_words(row: Data) -> str:
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _gain_words(row: Data) -> str:
     sure = "" if row["low"] is None else f" (95 % interval {interval(row['low'], row['high'])})"
-    return f"skill {format_fixed(row['skill'], 3, 7)}{sure}"
+    return f"gain {format_fixed(row['gain'], 3, 7)}{sure}"
 
 
 def _on_case(strategies: Iterable[Data], name: str, digest: str) -> list[tuple[Data, Data]]:
@@ -122,7 +127,7 @@ def _on_case(strategies: Iterable[Data], name: str, digest: str) -> list[tuple[D
 
     def order(entry: tuple[Data, Data]) -> tuple[tuple[bool], float, str]:
         item, row = entry
-        return (bool(row["unphysical"] or row["conflict"]),), row["score"], item["name"]
+        return (bool(row["conflict"]),), -row["gain"], item["name"]
 
     return [entry for _, entry in rank_items(found, order)]
 
@@ -147,26 +152,27 @@ def _machines(machines: Sequence[Data], *, most: int = 3) -> str:
     return "; ".join(names[:most]) + (f" +{len(names) - most}" if len(names) > most else "")
 
 
-def skills_of(board: Data) -> Chart:
-    """Return the skills of a board with their intervals, by what is shown of them."""
-    known = [row for row in board["rows"] if row["skill"] is not None]
+def gains_of(board: Data) -> Chart:
+    """Return the gains of a board with their intervals."""
+    known = [row for row in board["rows"] if row["gain"] is not None]
     whose = "every strategy" if len(known) <= _MOST_DRAWN else f"the first {_MOST_DRAWN}"
-    labels = (f"{row['rank'] or '–'}  {plain(row['strategy'])}" for row in known)
-    return _chart(f"Skill of {whose}", list(zip(map(_stand, known), labels, known, strict=True)))
+    labels = (
+        f"{row['rank'] or ('=' if row['yardstick'] else '–')}  {plain(row['strategy'])}"
+        for row in known
+    )
+    return _chart(f"Gain of {whose}", list(zip(map(_stand, known), labels, known, strict=True)))
 
 
 def _stand(row: Data) -> str:
     if not row["complete"]:
         return "lacks a case"
-    if row["unphysical"]:
-        return "unphysical"
-    if row["rank"] == 1:
-        return "best"
-    return _OTHERS[(None, False, True).index(row["below_best"])]
+    if row["yardstick"]:
+        return "yardsticks"
+    return "best" if row["rank"] == 1 else "others"
 
 
 def history_of(versions: Sequence[Data]) -> Chart | None:
-    """Return the skill of every version, latest first; None where there is nothing to compare."""
+    """Return the gain of every version, latest first; None where there is nothing to compare."""
     rows = [
         (
             "on all cases" if row["complete"] else "lacks a case",
@@ -174,15 +180,15 @@ def history_of(versions: Sequence[Data]) -> Chart | None:
             row,
         )
         for age, row in enumerate(versions)
-        if row["skill"] is not None
+        if row["gain"] is not None
     ]
-    return _chart("Skill of every version", rows) if len(rows) > 1 else None
+    return _chart("Gain of every version", rows) if len(rows) > 1 else None
 
 
 def _chart(title: str, rows: Sequence[tuple[str, str, Data]]) -> Chart:
-    """Return the first skills with their intervals, given by group and label."""
+    """Return the first gains with their intervals, given by group and label."""
     drawn = rows[:_MOST_DRAWN]
-    ends = [row[key] for _, _, row in drawn for key in ("skill", "low") if row[key] is not None]
+    ends = [row[key] for _, _, row in drawn for key in ("gain", "low") if row[key] is not None]
     series = []
     for group in dict.fromkeys(group for group, _, _ in drawn):
         own = [(label, row) for other, label, row in drawn if other == group]
@@ -190,13 +196,13 @@ def _chart(title: str, rows: Sequence[tuple[str, str, Data]]) -> Chart:
             [None if row[key] is None else max(row[key], _LEAST) for _, row in own]
             for key in ("low", "high")
         )
-        skills = [row["skill"] for _, row in own]
-        series.append(Series(group, skills, [label for label, _ in own], low, high))
+        gains = [row["gain"] for _, row in own]
+        series.append(Series(group, gains, [label for label, _ in own], low, high))
     least = max(min([*ends, 0.0]) - 0.05, _LEAST)
-    x = Axis("skill, part of the error taken away", low=least, high=1.0)
+    x = Axis("gain over the textbook models", low=least, high=1.0)
     y = Axis("", names=tuple(label for _, label, _ in drawn))
     sure = any(row["low"] is not None for _, _, row in drawn)
-    note = f"{_LINE * sure}1: no error left; 0: as the textbook model, without data."
+    note = f"{_LINE * sure}1: no error left; 0: as the textbook models, without data."
     marks = (Mark("x", 0.0, "textbook model"),)
     return Chart("interval", title, x, y, tuple(series), marks, note=note)
 

@@ -28,17 +28,14 @@ from femubench.reports.summary import (
 from femubench.reports.terminal import to_terminal
 from femubench.reports.twins import MEANING, describe_twins, suspicions
 from femubench.results import (
-    FLOORS,
     JobResult,
     PairedMode,
     Run,
+    Standings,
     StudyAxes,
-    interval_kind,
-    leaderboard,
+    list_rows,
     modes_frame,
-    ranks_by_floor,
-    tell_apart,
-    twin_skills,
+    twin_gains,
 )
 
 if TYPE_CHECKING:
@@ -47,44 +44,44 @@ if TYPE_CHECKING:
 
 
 _FIGURES = {
-    "skill": Column("skill", 5, digits=3),
-    "skill_drawn": Column("from\ndrawn", 5, digits=3),
-    "higher_percent": Column("high\n%", 4, digits=2),
-    "modified_percent": Column("mod.\n%", 4, digits=2),
-    "used_percent": Column("given\n%", 4, digits=2),
-    "rigid_modes_lost": Column("rig.\nlost", 4),
-    "negative_eigenvalues": Column("neg.\neig.", 4),
-    "parameters": Column("par.", 5),
-    "seconds": Column("s", 4, digits=3),
-}
-_ALWAYS = 2 + len(_FIGURES)  # columns that are there whatever is known
-_MORE_FIGURES = {
-    "skill_tests": Column("on\ntests", 5, digits=3),
+    "gain": Column("gain", 6, digits=3),
+    "interval": Column("95 % interval", 16),
+    "error_percent": Column("off\n%", 4, digits=2),
+    "better_share": Column("better\n%", 6),
+    "error_gain": Column("out of\nband", 6, digits=3),
+    "change_gain": Column("of\nchanges", 7, digits=3),
+    "answered": Column("answered", 8),
+    "gain_drawn": Column("from\ndrawn", 6, digits=3),
+    "gain_tests": Column("on\ntests", 6, digits=3),
+    "band_percent": Column("in band\n%", 7, digits=2),
+    "shape_error": Column("1-MAC", 5, digits=3),
+    "false_modes": Column("false\nmodes", 5, digits=2),
+    "used_percent": Column("given\n%", 5, digits=2),
     "coverage90": Column("in\n90 %", 4, digits=2),
     "crps_percent": Column("CRPS\n%", 4, digits=2),
-    "evaluations": Column("eval.", 5),
+    "parameters": Column("par.", 5),
+    "seconds": Column("s", 4, digits=3),
+    "better_than": Column("above", 5),
+    "worse_than": Column("below", 5),
 }
-# No reason for a second table by themselves.
-_NEXT_TO = {_MORE_FIGURES[name].title for name in ("crps_percent", "evaluations")}
 _LEGEND = {
-    "high, mod., given": "rms frequency error in percent over the higher modes and those after a "
-    "design change, which no strategy is given, and over the modes that it was given; a mode "
-    "without partner counts 100 %; median over the cases, as are par., eval. and s: unknowns that "
-    "were free, eigenvalue solutions, wall time",
-    "on tests": "skill on tests alone, no computed truths",
+    "gain": "mean of `out of band` and `of changes`, over structures; a job without a possible "
+    "model counts as the model that was given",
+    "off, better": "mean |ln(f_p / f_m)| in percent out of the given band, and the share of the "
+    "structures where it is less than the textbook model's",
+    "on tests": "gain on tests alone, no computed truths",
+    "in band, 1-MAC, false modes": "error in percent of modified modes in the given band, where "
+    "the given frequencies nearly are the answer; shapes; modes that a test would see and did not",
+    "given": "rms error in percent of the modes that were given; median over the cases, as are "
+    "par. and s: unknowns that were free, wall time",
     "in 90 %, CRPS": "unseen modes inside the stated 90 % interval, and the continuous ranked "
     "probability score in percent of the frequency, less is better, without a stated uncertainty "
     "the absolute error; means over structures",
-    "rig. lost, neg. eig.": "rigid-body modes that the updated models lost, and negative "
-    "eigenvalues that they have, in all jobs",
-    "!": "unphysical for one of these, or for surplus partners; below all others",
-    "*": "some jobs gave no model: ten times the error, left out of the errors shown",
+    "above, below": "number of lines that it is shown to be better and worse than",
+    "=": "yardstick that knows nothing of the structure; without rank",
+    "!": "some models lost rigid-body modes or have negative eigenvalues",
+    "*": "some jobs gave no model",
 }
-_SKILL = (
-    "1 - r, where r is the geometric mean over structures, each the mean of its blocks of unseen "
-    "data, of (rms + 0.05 %) / (rms of the textbook model + 0.05 %). A job that failed, crashed or "
-    "timed out counts 10 in r, one that is not applicable as the model that it was given"
-)
 
 
 class TerminalReporter:
@@ -178,75 +175,69 @@ def board_text(run: Run) -> str:
     return to_terminal(_board(run))
 
 
-def floors_said(run: Run) -> tuple[str, str]:
-    """Return a label and which ranks rest on what is added to all errors."""
-    ranks = ranks_by_floor(run)
-    moved = {name: found for name, found in ranks.items() if len(set(found)) > 1}
-    label = f"Ranks with {', '.join(f'{floor:g}' for floor in FLOORS)} % added to all errors"
-    named = "; ".join(f"{name} {', '.join(map(str, found))}" for name, found in moved.items())
-    return label, f"the same but for {named}." if moved else "the same."
-
-
 def _marks(row: Mapping[Any, Any]) -> str:
-    """Return what must not be overlooked: lost physics, and jobs that the errors leave out."""
-    incomplete = row["ok"] + row["not_applicable"] < row["total"]
-    return ("!" if row["unphysical"] else "") + ("*" if incomplete else "")
+    """Return what must not be overlooked: yardsticks, lost physics, and jobs without a model."""
+    marks = {"=": row["yardstick"], "!": row["unphysical"], "*": row["ok"] < row["total"]}
+    return "".join(mark for mark, is_so in marks.items() if is_so)
+
+
+def _cells(row: Mapping[Any, Any]) -> dict[str, Cell]:
+    """Return the figures of a row as the board shows them."""
+    counts = {key: len(row[key]) for key in ("better_than", "worse_than")}
+    return {
+        **{key: row.get(key) for key in _FIGURES},
+        "interval": interval(row["gain_low"], row["gain_high"]),
+        "better_share": 100.0 * row["better_share"],
+        "answered": f"{row['answered']} of {row['total']}",
+        **{key: str(count) for key, count in counts.items()},
+    }
 
 
 def _board(run: Run, title: str = "") -> Iterator[Passage]:
     """Yield the leaderboard, what its columns mean, and what the run shows."""
-    rows = leaderboard(run).to_dict("records")
-    tested = tell_apart(run, [row["strategy"] for row in rows])
-    tiers = tested.tier_of()
-    letters = tested.letters()
-    heads = (
-        *(Column("#", 6), Column("strategy", 16, left=True), *_FIGURES.values()),
-        *(Column(f"95 % interval\nover {interval_kind(run)}", 16), *_MORE_FIGURES.values()),
-        *(Column("tier", 4), Column("group", 10, left=True)),
-    )
-    cells: list[list[Cell]] = [
-        [
-            _marks(row) + whole(row["rank"]),
-            row["strategy"],
-            *(row[key] for key in _FIGURES),
-            interval(row["skill_low"], row["skill_high"]),
-            *(row[key] for key in _MORE_FIGURES),
-            str(tiers.get(row["strategy"], NOTHING)),
-            letters.get(row["strategy"], ""),
-        ]
+    rows = list_rows(run)
+    tested = any(row["better_than"] for row in rows)
+    heads = {"#": Column("#", 6), "strategy": Column("strategy", 16, left=True), **_FIGURES}
+    listed = [
+        {"#": _marks(row) + whole(row["rank"]) * (row["rank"] is not None),
+         "strategy": row["strategy"], **_cells(row)}
         for row in rows
-    ]
+    ]  # fmt: skip
     # Columns that nothing is known of are left out.
     known = [
-        k
-        for k, head in enumerate(heads)
-        if k < _ALWAYS or {head.text(line[k]) for line in cells} - {NOTHING, ""}
+        key
+        for key, head in heads.items()
+        if key in ("#", "strategy", "gain")
+        or (
+            {head.text(line[key]) for line in listed} - {NOTHING, ""}
+            and (tested or key not in ("better_than", "worse_than"))
+        )
     ]
-    if not title and not {heads[k].title for k in known[_ALWAYS:]} - _NEXT_TO:
-        known = known[:_ALWAYS]
-    table = Table([heads[k] for k in known], [[line[k] for k in known] for line in cells], names=1)
+    table = Table(
+        [heads[key] for key in known], [[line[key] for key in known] for line in listed], names=1
+    )
     yield Passage(title, [table])
     titles = " ".join([*(c.title.replace("\n", " ") for c in table.columns), *map(_marks, rows)])
     legend = [entry for entry in _LEGEND.items() if entry[0].partition(",")[0] in titles]
-    if title or not tested.tiers:
-        legend.append(("tier, group" if tested.tiers else "#", tested.note))
+    if title or not tested:
+        legend.append(("tested", Standings.of(run).apart.note))
     yield Passage("", [lead(run), Items(legend)])
-    if said := finding(run, rows, tested.tiers):
+    if said := finding(run, rows):
         yield Passage("", [" ".join(said)])
     if twins := list(_twins(run)):
         yield Passage("Twins" if title else "", twins)
 
 
 def _twins(run: Run) -> Iterator[Block]:
-    """Yield the skills on twins next to those on their cases, and who may know these."""
-    found = sorted(twin_skills(run).items(), key=lambda entry: -entry[1].original_skill)
+    """Yield the gains on twins next to those on their cases, and who may know these."""
+    found = sorted(twin_gains(run).items(), key=lambda entry: -entry[1].original_gain)
     if found:
         heads = (Column(head, 8, digits=3) for head in ("on twins", "on cases", "p"))
         rows = [
-            [name + " (knows the cases?)" * own.suspicious, own.skill, own.original_skill, own.p]
+            [name + " (knows the cases?)" * own.suspicious, own.gain, own.original_gain, own.p]
             for name, own in found
         ]
-        said = f"{MEANING} Here: skill on {describe_twins(run)}."
+        said = f"{MEANING} The lower gain counts. Here: gain on {describe_twins(run)}."
         yield Table([Column("strategy", 30, left=True), *heads], rows, said)
     yield from (f"?: {stated}" for stated in suspicions(run))
 
@@ -276,7 +267,6 @@ def _document(run: Run) -> Iterator[Passage]:
     about = Table([Column("", 9, left=True)] * 2, list(header(run)))
     yield Passage("", [about, *([Items(notes)] if notes else [])])
     yield from _board(run, "Leaderboard")
-    yield Passage("", [Items([("skill", _SKILL), floors_said(run)])])
     rows: list[list[Cell]] = []
     for name in strategies_of(run):
         found = [result.status for result in run.results if result.strategy == name]
@@ -322,7 +312,7 @@ def _case(
     for result in sorted(found, key=lambda result: result.rank or 0):
         modes, mark = _tested(result), " (unphysical)" * result.unphysical
         known = (_predicted(modes[key]) if key in modes else NOTHING for key in columns)
-        rows.append([result.strategy + mark, *known, _mac(modes.values()), result.score])
+        rows.append([result.strategy + mark, *known, _mac(modes.values()), result.gain])
         for said, by_strategy in others:
             if stated := by_strategy.get(result.strategy):
                 cells = (
@@ -333,7 +323,7 @@ def _case(
                 )
                 rows.append([f"{result.strategy}, {said}", *cells, None, None])
     heads = [Column(" ".join(map(str, key)), 16) for key in columns]
-    heads += [Column("mean MAC", 8, digits=3), Column("error left", 8, digits=3)]
+    heads += [Column("mean MAC", 8, digits=3), Column("gain", 8, digits=3)]
     caption = f"Frequencies in Hz, in brackets the error in percent; seed {seed}."
     yield Table([Column("strategy", 16, left=True), *heads], rows, caption)
 

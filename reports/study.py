@@ -1,4 +1,4 @@
-"""A study as a report of any form: skill against two axes, every cell, what failed."""
+"""A study as a report of any form: gain against two axes, every cell, what failed."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from femubench import InputError
 from femubench.reports.blocks import Block, Column, Drawing, Items, Passage, Table
 from femubench.reports.cells import NOTHING, format_fixed, interval, plain
 from femubench.reports.summary import failures, header, lead, notes_of, troubles
-from femubench.results import Run, StudyAxes, skill_by
+from femubench.results import Run, StudyAxes, gain_by
 
 _MOST_ON_SCREEN = 60  # cells
 _MOST_COLUMNS = 9
 _SHORT = {"sensors_left_out": "left out"}
 _COUNTED = (
     "A cell is a leaderboard of its own: every structure counts once, a job that failed or is "
-    "missing counts ten times the error of the textbook model, and with several seeds skill is "
-    "the median over them. !: a model lost rigid-body modes or has negative eigenvalues."
+    "missing counts as the model that was given, and with several seeds gain is the mean over "
+    "them. !: a model lost rigid-body modes or has negative eigenvalues."
 )
 _PICTURE = (
     "White: 0, as the textbook model, which uses no measurement; blue: better, red: worse. "
@@ -45,8 +45,8 @@ def sections_of(run: Run, *drawing: Block) -> Iterator[Passage]:
     known = StudyAxes.of(run)
     x, y = known.pictured
     yield Passage("", [lead(run)], area="first")
-    yield Passage(f"Skill by {x} and {y}", [*drawing, _grid(run, known, x, y)])
-    cells = skill_by(run).to_dict("records")
+    yield Passage(f"Gain by {x} and {y}", [*drawing, _grid(run, known, x, y)])
+    cells = gain_by(run).to_dict("records")
     yield Passage(f"Cells ({len(cells)})", [*_cells(cells), _COUNTED])
     if failed := failures(troubles(run.results)):
         yield Passage("Failures", failed)
@@ -68,7 +68,7 @@ def _drawing(run: Run) -> Block:
     x, y = known.pictured
     columns, rows = len(known.values(x)), len(known.values(y))
     size = min(2.6 + 0.75 * max(columns, 5), 12.0), min(1.7 + 0.5 * max(rows, 3), 12.0)
-    title = f"Skill by {x} and {y}"
+    title = f"Gain by {x} and {y}"
     draw = partial(heat_map, run, x, y)
     try:
         found = svg(draw, name="heat-map", title=title, caption=_PICTURE, size=size)
@@ -84,9 +84,9 @@ def _grid(run: Run, known: StudyAxes, x: str, y: str) -> Block:
         x, y, columns, rows = y, x, rows, columns
     if len(columns) > _MOST_COLUMNS:
         return f"{len(columns)} by {len(rows)} values: see the cells."
-    found = {(row[x], row[y]): row for row in skill_by(run, x, y).to_dict("records")}
+    found = {(row[x], row[y]): row for row in gain_by(run, x, y).to_dict("records")}
     heads = [Column(y, 24, left=True), *(Column(StudyAxes.text_of(v), 7) for v in columns)]
-    cells = [[_skill(found[c, r]) if (c, r) in found else None for c in columns] for r in rows]
+    cells = [[_gain(found[c, r]) if (c, r) in found else None for c in columns] for r in rows]
     table = [[StudyAxes.text_of(r), *line] for r, line in zip(rows, cells, strict=True)]
     said = f"Down: {StudyAxes.title_of(y)}; across: {StudyAxes.title_of(x)}. *: failures."
     return Table(heads, table, said)
@@ -95,19 +95,19 @@ def _grid(run: Run, known: StudyAxes, x: str, y: str) -> Block:
 def _cells(cells: Sequence[dict[Any, Any]]) -> Iterator[Block]:
     """Yield every cell with its interval and what of it failed."""
     names = [str(name) for name in cells[0]]
-    axes = names[: names.index("skill")]
+    axes = names[: names.index("gain")]
     options = [name for name in axes if "." in name]
     bare = [name for name in axes if name not in options]
     lost = any(row["failed"] + row["missing"] for row in cells)
     heads = [Column(_SHORT.get(name, name), 16, left=True, wrap=True) for name in bare]
     heads += [Column("options", 14, left=True, wrap=True)] if options else []
-    heads += [Column("skill", 8), Column("95 % interval", 18)]
+    heads += [Column("gain", 8), Column("95 % interval", 18)]
     heads += [Column("failed", 14, wrap=True)] if lost else []
     rows = [
         [
             *(StudyAxes.text_of(row[name]) for name in bare),
             *([_options(row, options)] if options else []),
-            *(_skill(row), interval(row["skill_low"], row["skill_high"])),
+            *(_gain(row), interval(row["gain_low"], row["gain_high"])),
             *([_lost(row)] if lost else []),
         ]
         for row in cells
@@ -124,10 +124,10 @@ def _options(row: dict[Any, Any], names: Sequence[str]) -> str:
     return ", ".join(said) or NOTHING
 
 
-def _skill(row: dict[Any, Any]) -> str:
+def _gain(row: dict[Any, Any]) -> str:
     marks = ("!" if row["unphysical"] else "") + ("*" if row["failed"] + row["missing"] else "")
     return marks + (
-        "n/a" if row["not_applicable"] == row["jobs"] else format_fixed(row["skill"], 3, 6)
+        "n/a" if row["not_applicable"] == row["jobs"] else format_fixed(row["gain"], 3, 6)
     )
 
 

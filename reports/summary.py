@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from femubench.reports.blocks import Block, Column, Table
-from femubench.reports.cells import first_of, interval, join_names, plain
+from femubench.reports.cells import first_of, format_fixed, interval, join_names, plain
 from femubench.results import (
     JobResult,
     PairedMode,
+    Rule,
     Run,
     find_basis,
     interval_kind,
@@ -24,7 +25,7 @@ _HEADER = (
     *("run", "started", "seed", "seeds", "jobs", "timeout"),
     *("versions", "machine", "git_commit"),
 )
-_SHOWN = 0.0005  # skill that is printed as more than 0
+_SHOWN = 0.0005  # gain that is printed as more than 0
 _TITLES = {"jobs": "workers", "timeout": "timeout in s", "git_commit": "git commit"}
 
 
@@ -119,87 +120,120 @@ def measured_modes(run: Run, case: str) -> list[tuple[str, PairedMode]]:
     return [(name, mode) for (name, _), mode in found.items()]
 
 
-def _yardstick(run: Run) -> str:
-    return "textbook" if run.meta.get("yardstick") == "textbook" else "nominal"
-
-
 def lead(run: Run) -> str:
-    """Return what the skill of a run says, and from where its strategies started."""
-    unseen = find_basis(run) == "unseen"
-    what = "unseen data" if unseen else "the modes that were given"
+    """Return what the gain of a run says, and from where its strategies started."""
+    models = "textbook" if run.meta.get("yardstick") == "textbook" else "nominal"
     stated = [
-        f"Skill is the part of the {_yardstick(run)} model's error on {what} that a strategy takes "
-        "away: 1 is all of it, 0 none, less than 0 is worse."
+        f"Gain is what a model gains over the {models} one, -1 to 1: the part of that one's error "
+        "that it removes, or minus the part of its own that it adds; mean of the frequencies "
+        "out of the given band and of their changes by modifications."
     ]
     if len(run.nominals) > 1:
         stated.append(
             "Ranks are from the textbook models; the start from the drawn ones stands next to it."
         )
-    elif run.meta.get("yardstick") == "textbook":
+    elif models == "textbook":
         start = "as drawn" if run.nominals[0] == "drawn" else "of the textbooks"
         stated.append(f"All start from the models {start}.")
-    if not unseen:
-        stated.append("No case holds data back, so that nothing here shows what was learnt.")
-    return " ".join(stated)
+    if find_basis(run) != "unseen":
+        stated.append(
+            "No case holds data back: the gain is that on the modes that were given, and nothing "
+            "here shows what was learnt."
+        )
+    elif not (run.meta.get("twins") or {}).get("of"):
+        stated.append("No twins ran, so that memory of the cases is not excluded.")
+    rule = Rule.of(run.meta).to_json()["version"]
+    return " ".join(stated) + f" Rule {rule}."
 
 
-def finding(
-    run: Run, board: Sequence[Mapping[Any, Any]], tiers: Sequence[Sequence[str]]
-) -> list[str]:
+def finding(run: Run, board: Sequence[Mapping[Any, Any]]) -> list[str]:
     """Return what a run shows, in sentences made from its figures; the first is the headline.
 
     Arguments:
         board: rows of its leaderboard.
-        tiers: strategies, the first those not shown to differ from the best; empty without a test.
     """
-    best = next((row for row in board if row["ok"] and not row["unphysical"]), None)
-    if best is None:
-        return ["No strategy gave a possible model."] if board else []
-    name, skill, models = plain(best["strategy"]), best["skill"], f"{_yardstick(run)} models"
-    sure, data = "", "unseen data" if find_basis(run) == "unseen" else "the given modes"
-    if kind := interval_kind(run):
-        cases = {structures_of(run).get(case, case) for case in cases_of(run)}
-        count = len(seeds_of(run) if kind == "seeds" else cases)
-        ends = interval(best["skill_low"], best["skill_high"])
-        sure = f", 95 % interval {ends} over {count} {kind}"
-    first = [plain(row["strategy"]) for row in board if row["rank"] == best["rank"]]
-    leads = "leads: it takes" if len(first) == 1 else "share the first rank: each takes"
-    stated = [
-        f"{join_names(first)} {leads} away {100.0 * skill:.0f} % of the {models}' error on "
-        f"{data} (skill {skill:.3f}{sure})."
-        if skill >= _SHOWN
-        else f"No strategy improves on the {models} on {data}; the best, {name}, has a skill of "
-        f"{skill:.3f}{sure}.",
-        *_how_sure(name, tiers, len(board)),
-    ]
-    if skill >= _SHOWN and best["skill_low"] <= 0.0:
-        stated.append(f"Its interval holds 0: an improvement on the {models} is not shown.")
-    idle = [row["skill_drawn"] for row in board if row["strategy"] == run.meta.get("baseline")]
-    if idle and math.isfinite(idle[0]):
-        stated.append(
-            f"Without data the {models} stand at 0 and the models as drawn at {idle[0]:.3f}; "
-            f"started from the latter {name} reaches {best['skill_drawn']:.3f}."
-        )
-    if math.isfinite(best["skill_tests"]):
-        stated.append(
-            f"On tests alone, no computed truths, its skill is {best['skill_tests']:.3f}."
-        )
+    kind = interval_kind(run)
+    structures = {structures_of(run).get(case, case) for case in cases_of(run)}
+    count = len(seeds_of(run) if kind == "seeds" else structures)
+    models = "handbooks" if run.meta.get("yardstick") == "textbook" else "the nominal models"
+    unseen = find_basis(run) == "unseen"
+    where = "Above the given band" if unseen else "On the modes that were given"
+    stated = headline(board, where, models, len(structures), f"{count} {kind}" * bool(kind))
+    best = next((row for row in board if row["rank"] == 1), None)
+    if best is not None and math.isfinite(best["gain_tests"]):
+        stated.append(f"On tests alone, no computed truths, its gain is {best['gain_tests']:.3f}.")
     return [sentence.replace(" -", " \u2212") for sentence in stated]
 
 
-def _how_sure(name: str, tiers: Sequence[Sequence[str]], count: int) -> Iterator[str]:
-    """Return how many of the strategies are not shown to differ from the best."""
-    peers = [plain(other) for other in (tiers or ((),))[0] if plain(other) != name]
-    if count > 1 and not tiers:
-        yield "Whether the others differ from it is not tested."
-    elif count > 1 and not peers:
-        yield "It is alone in tier 1: all others are shown to be worse."
-    elif len(peers) == count - 1 > 0:
-        yield "No other strategy is shown to differ from it: all are in tier 1."
-    elif peers:
-        below = f"{count - 1 - len(peers)} of {count} are below"
-        first = first_of(peers, 4)
-        yield f"Next to it in tier 1, not shown to differ from it: {first}; {below}."
+def headline(
+    board: Sequence[Mapping[Any, Any]], where: str, models: str, structures: int, over: str
+) -> list[str]:
+    """Return what a board shows, in percent of frequency and in gain; what is not shown is said.
+
+    Arguments:
+        board: rows of a leaderboard, best first.
+        where: which errors are meant.
+        models: those that all are measured against.
+        structures: their number.
+        over: what the intervals are over; empty where there are none.
+    """
+    # Who never gave a model may share the first rank with who gave back the one that was given.
+    best = [row for row in board if row["rank"] == 1 and row["answered"]]
+    if not best:
+        return ["No strategy gave a possible model."] if board else []
+    lines = [row for row in board if row["yardstick"]]
+    first, percent = best[0], [f"{models} are {_percent(best[0]['textbook_percent'])} off"]
+    line = max(lines, key=lambda row: float(row["gain"]), default=None)
+    if line is not None and line["gain"] > _SHOWN:
+        percent.append(f"{line['yardstick']} {_percent(line['error_percent'])}")
+    name = join_names([plain(row["strategy"]) for row in best])
+    who = "the best strategy" if len(best) == 1 else "the best strategies"
+    percent.append(f"{who}, {name}, {_percent(first['error_percent'])}")
+    sure = ""
+    if over:
+        sure = f" (95 % interval {interval(first['gain_low'], first['gain_high'])} over {over})"
+    stated = [f"{where} {', '.join(percent)}."]
+    if first["gain"] < _SHOWN:
+        stated.insert(0, f"No strategy gains on {models}.")
+    if math.isfinite(first["better_share"]):
+        shares = [f"{100.0 * first[name]:.0f} %" for name in ("better_share", "worse_share")]
+        stated.append(
+            f"It is better than {models} on {shares[0]} of the {structures} structures, worse by "
+            f"more than a quarter on {shares[1]}."
+            if structures > 1
+            else f"That is {'better' if first['better_share'] else 'not better'} than {models}."
+        )
+    stated.append(f"Its gain is {format_fixed(first['gain'], 3, 7)}{sure}.")
+    return [*stated, *_how_sure(first, board, lines)]
+
+
+def _how_sure(
+    best: Mapping[Any, Any], board: Sequence[Mapping[Any, Any]], lines: Sequence[Mapping[Any, Any]]
+) -> Iterator[str]:
+    """Yield what is shown of the best strategy and of all against the yardsticks."""
+    others = [row["strategy"] for row in board if not row["yardstick"] and row is not best]
+    if not any(row["better_than"] for row in board):
+        yield "No difference between any two lines of the board is shown."
+        return
+    worse = [name for name in others if name in best["better_than"]]
+    if others:
+        yield f"It is shown to be better than {len(worse)} of {len(others)} other strategies."
+    none = []
+    for row in lines:
+        above = [
+            plain(other["strategy"]) for other in board
+            if not other["yardstick"] and row["strategy"] in other["better_than"]
+        ]  # fmt: skip
+        if above:
+            yield f"Shown to be better than {row['yardstick']}: {first_of(above, 4)}."
+        else:
+            none.append(plain(row["yardstick"]))
+    if none:
+        yield f"No strategy is shown to be better than {' or '.join(none)}."
+
+
+def _percent(value: float) -> str:
+    return f"{value:.1f} %"
 
 
 def notes_of(run: Run) -> list[str]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from femubench.reports.cells import first_of, plain
 from femubench.reports.page.rounding import clean
-from femubench.results import Run, twin_skills, unsteady
+from femubench.results import Run, twin_gains, unsteady
 
 MEANING = (
     "Twins are other structures under other names, drawn from a seed when the run began: similar "
@@ -18,11 +18,11 @@ MEANING = (
 
 
 def twins_by_strategy(run: Run) -> dict[str, dict[str, Any]]:
-    """Return by strategy, in plain data, its skill on twins and on their cases, and what is odd."""
-    keys = ("skill", "original_skill", "p", "suspicious")
+    """Return by strategy, in plain data, its gain on twins and on their cases, and what is odd."""
+    keys = ("gain", "original_gain", "p", "suspicious")
     return {
         name: {**{key: clean(getattr(found, key)) for key in keys}, "known": list(found.known)}
-        for name, found in twin_skills(run).items()
+        for name, found in twin_gains(run).items()
     }
 
 
@@ -40,11 +40,11 @@ def describe_twins(run: Run) -> str:
 def suspicions(run: Run) -> list[str]:
     """Return a sentence for every strategy that may know the cases, or that gave two answers."""
     stated = [
-        f"{plain(name)} knows the cases? skill {found.original_skill:.3f} on them, "
-        f"{found.skill:.3f} on their twins"
+        f"{plain(name)} knows the cases? gain {found.original_gain:.3f} on them, "
+        f"{found.gain:.3f} on their twins"
         + f" (more than twice the error on the twins of {first_of(found.known, 3)})"
         * bool(found.known)
-        for name, found in twin_skills(run).items()
+        for name, found in twin_gains(run).items()
         if found.suspicious
     ]
     return stated + [

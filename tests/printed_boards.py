@@ -11,15 +11,16 @@ import pytest
 import femubench
 from femubench import Run
 from femubench.reports.cells import shorten_text
-from femubench.results import leaderboard
+from femubench.reports.summary import finding
+from femubench.results import list_rows
 
 ROOT = Path(__file__).parents[1]
-# Seconds are those of one machine.
-COLUMNS = (
-    *("skill", "skill_drawn", "higher_percent", "modified_percent", "used_percent"),
-    *("rigid_modes_lost", "negative_eigenvalues", "parameters"),
+COLUMNS = ("gain", "gain_low", "gain_high", "error_percent", "better_share", "error_gain")
+_ROW = re.compile(
+    r"^\s*([=!*]*)(\d*)  (\S+)\s+(-?[\d.]+)  +(?:(-?[\d.]+) to (-?[\d.]+))  +"
+    r"([\d.]+)  +([\d.]+)  +(-?[\d.]+)  +-?[\d.]+$",
+    re.M,
 )
-_ROW = re.compile(r"^\s*([!*]*)(\d+)  (\S+)((?:\s+[\d.–-]+){9})$", re.M)
 
 
 def stored(name: str) -> Run:
@@ -39,18 +40,24 @@ def as_printed(text: str, spare: float = 0.1) -> Any:
 
 
 def assert_board_is_that_of(run: Run, name: str) -> None:
-    """The table that a document prints is that of a run."""
+    """The table that a document prints, and what it says below, are those of a run."""
     text = (ROOT / name).read_text(encoding="utf-8")
-    board = leaderboard(run).to_dict("records")
+    board = list_rows(run)
     rows = _ROW.findall(text)
-    assert [(int(rank), name) for _, rank, name, _ in rows] == [
-        (row["rank"], shorten_text(row["strategy"], 16)) for row in board
+    assert [(rank, name) for _, rank, name, *_ in rows] == [
+        ("" if row["rank"] is None else f"{row['rank']}", shorten_text(row["strategy"], 16))
+        for row in board
     ]
-    for (marks, _, _, cells), row in zip(rows, board, strict=True):
+    for (marks, _, _, *cells), row in zip(rows, board, strict=True):
+        assert ("=" in marks) == bool(row["yardstick"])
         assert ("!" in marks) == row["unphysical"]
-        assert ("*" in marks) == (row["ok"] + row["not_applicable"] < row["total"])
-        for column, cell in zip(COLUMNS, cells.split(), strict=False):
-            assert row[column] == as_printed(cell), (row["strategy"], column)
+        assert ("*" in marks) == (row["ok"] < row["total"])
+        for column, cell in zip(COLUMNS, cells, strict=True):
+            value = 100.0 * row[column] if column == "better_share" else row[column]
+            assert value == as_printed(cell), (row["strategy"], column)
+    words = " ".join(text.replace("\u2212", "-").split())
+    for sentence in finding(run, board):
+        assert sentence.replace("\u2212", "-") in words, sentence
 
 
 # Random searches and samples amplify rounding.

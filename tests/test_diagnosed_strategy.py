@@ -336,5 +336,5 @@ def test_the_solid_twin_is_predicted_where_others_are_not(harness_run: Run) -> N
     meta = {**harness_run.meta, "reference": {"frame-solid": errors}}
     board = leaderboard(Run(meta, tuple(chosen))).set_index("strategy")
     assert board.index[0] == "diagnosed"
-    assert board["skill"].idxmax() == "diagnosed"
+    assert board["gain"].idxmax() == "diagnosed"
     assert not board["unphysical"]["diagnosed"]

@@ -1,8 +1,8 @@
 """The figures of README and docs that one run, one reproduction and a committed file give.
 
 Figures of single pages stand in tests of their own: tables of docs/effects.md in test_effects_docs,
-the tutorial's in test_tutorial, those of the papers in test_papers_*; docs/scoring.md in
-test_sweep_noise, docs/diagnosis-accuracy.md in test_sweep_diagnosis.
+the tutorial's in test_tutorial, those of the papers in test_papers_*; docs/scoring.md and
+docs/scenarios.md in test_suite, docs/diagnosis-accuracy.md in test_sweep_diagnosis.
 """
 
 from __future__ import annotations
@@ -25,11 +25,14 @@ from femubench import Run
 from femubench.core.library.cases import read_cases
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.schema.results import Nominal
-from femubench.results import JobResult, leaderboard, tell_apart
+from femubench.results import JobResult, leaderboard
 
 pytestmark = pytest.mark.nightly
 PAGES = ("README.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md"))))
-NUMBERS = {"eleven": 11, "twelve": 12, "seventeen": 17, "twenty-three": 23, "twenty-five": 25}
+NUMBERS = {
+    **{"three": 3, "seven": 7, "ten": 10, "eleven": 11, "nineteen": 19, "twenty-three": 23},
+    "twenty-seven": 27,
+}
 
 
 @pytest.fixture(scope="module")
@@ -94,37 +97,44 @@ def test_how_many_meet_what_they_were_given(run: Run) -> None:
     often, of = only(r"(\S+) of the (\S+) strategies meet them within 0\.1 %", "README.md")
     assert (NUMBERS[often], NUMBERS[of]) == (len(met), len(run.meta["strategies"]))
     (worse,) = only(r"(\S+) of these predict the next two worse than the handbook", "README.md")
-    assert NUMBERS[worse] == sum((item.score or 0.0) > 1.005 for item in met)
+    assert NUMBERS[worse] == sum((item.gain or 0.0) < -0.005 for item in met)
 
 
-def test_what_the_readme_says_of_the_board(run: Run, rows: dict[str, dict[str, Any]]) -> None:
+def test_what_the_readme_says_of_the_board(rows: dict[str, dict[str, Any]]) -> None:
     text = text_of("README.md")
-    best, second = list(rows)[:2]
+    best, line = next(iter(rows)), rows["shifted"]
     assert best == "diagnosed"
-    for name, key, pattern in (
-        (best, "skill", r"leads with (0\.\d+)"),
-        (best, "skill_tests", r"two published tests \((0\.\d+)\)"),
-        (best, "skill_low", r"interval reaches from (-0\.\d+) to"),
-        (best, "skill_high", r"interval reaches from -0\.\d+ to (0\.\d+)"),
-        ("berman", "skill", r"take away (0\.\d+) and 0\.\d+ of"),
-        ("baruch", "skill", r"take away 0\.\d+ and (0\.\d+) of"),
-        (best, "skill_drawn", r"`diagnosed` \((0\.\d+)\), which knows"),
-        ("global", "skill_drawn", r"`global` \((0\.\d+)\), one factor"),
-    ):
-        (said,) = only(pattern, "README.md")
-        assert rows[name][key] == as_printed(said), (name, key)
-    own, rival = only(r"there its skill is (0\.\d+), the next one's (0\.\d+)")
-    assert (rows[best]["skill"], rows[second]["skill"]) == (as_printed(own), as_printed(rival))
-    assert "no strategy is shown to differ from it" in text
-    assert set(tell_apart(run, list(rows)).tiers[0]) == set(rows)
-    above = {name for name, row in rows.items() if row["skill_low"] > 1e-9}
-    assert above == {"berman", "baruch"}
-    data = {name: row for name, row in rows.items() if name not in ("unchanged", "textbook")}
-    past = {name for name, row in data.items() if row["skill_drawn"] > 0.0}
-    assert past == {"diagnosed", "global"}
-    worse = [name for name, row in data.items() if row["skill"] < 0.0]
-    said, of = only(r"(\S+) of the (\S+) leave it worse", "README.md")
-    assert (NUMBERS[said], NUMBERS[of]) == (len(worse), len(data))
+    own = rows[best]
+    percent = (
+        r"Above the given band handbooks are (\S+) % off, the given ratios carried on without "
+    )
+    percent += r"any knowledge (\S+) %, and `diagnosed`, which looks for the cause first, (\S+) %: "
+    percent += r"better than handbooks on (\d+) % of the structures, worse by more than a quarter "
+    percent += r"on (\d+) %"
+    figures = (own["textbook_percent"], line["error_percent"], own["error_percent"])
+    figures += tuple(100.0 * own[key] for key in ("better_share", "worse_share"))
+    assert [as_printed(said) for said in only(percent, "README.md")] == list(figures)
+    data = {name: row for name, row in rows.items() if not row["yardstick"]}
+    assert "no strategy is shown to be better than handbooks or than the ratios carried on" in text
+    assert not {"textbook", "shifted"} & {n for row in data.values() for n in row["better_than"]}
+    tests = {name: row["gain_tests"] for name, row in data.items()}
+    first = max(tests, key=lambda name: tests[name])
+    leads, other = only(r"`spring` leads with a gain of (\S+), where `diagnosed` has (\S+)\.")
+    assert first == "spring"
+    assert (tests["spring"], tests[best]) == (as_printed(leads), as_printed(other))
+    of, above, below = only(
+        r"Of the (\S+) strategies that use data, (\S+) gain more than the ratios carried on, and "
+        r"(\S+) leave the textbook model worse"
+    )
+    assert NUMBERS[of] == len(data)
+    assert NUMBERS[above] == sum(row["gain"] > line["gain"] for row in data.values())
+    assert NUMBERS[below] == sum(row["gain"] < 0.0 for row in data.values())
+    past = {name: row["gain_drawn"] for name, row in data.items() if row["gain_drawn"] > 0.0}
+    (count,) = only(r"drawn (\S+) get past the textbook model", "README.md")
+    assert NUMBERS[count] == len(past)
+    for name, gain in past.items():
+        (said,) = only(rf"`{name}` \((0\.\d+)\)", "README.md")
+        assert gain == as_printed(said), name
 
 
 def test_the_stated_uncertainties(rows: dict[str, dict[str, Any]]) -> None:

@@ -105,7 +105,7 @@ def test_the_board_so_far_and_the_command_that_goes_on(
     assert again.exit_code == 0
     store = Store("femubench-results")
     assert len(store.runs()) == 1
-    kept = ("case", "strategy", "nominal", "status", "blocks", "score", "rank")
+    kept = ("case", "strategy", "nominal", "status", "blocks", "gain", "rank")
     found = [[getattr(one, name) for name in kept] for one in store.load().results]
     assert found == [[getattr(one, name) for name in kept] for one in whole]
 

@@ -56,6 +56,13 @@ META = {
 }
 
 
+def with_models() -> dict[str, Any]:
+    """Return the meta data with what the results are measured by."""
+    import scored  # not where a process of its own reads this file
+
+    return {**META, "models": {"corner": {"drawn": scored.plain(GOOD.blocks)}}}
+
+
 def stored(
     folder: Path,
     run_id: str = "20260101T000000Z-000000",
@@ -69,9 +76,9 @@ def stored(
     return store
 
 
-def test_what_goes_in_comes_out_with_scores_and_ranks(tmp_path: Path) -> None:
+def test_what_goes_in_comes_out_with_gains_and_ranks(tmp_path: Path) -> None:
     run = stored(tmp_path / "new" / "folder").load()
-    assert run.results == rank_results([GOOD, BAD], META["reference"])
+    assert run.results == rank_results([GOOD, BAD], META)
     assert {**META, "finished": "2026-01-01T00:00:09+00:00"}.items() <= run.meta.items()
     assert run.meta["notes"] == []
 
@@ -247,7 +254,7 @@ def test_runs_of_version_0_1_are_converted(tmp_path: Path, line: str, message: s
     assert (file.name, count, len(faults)) == ("results.jsonl", 4, 1)
     assert re.search(message, str(faults[0]))
     run = store.load(META["run"])
-    assert run.results == rank_results([GOOD, BAD], META["reference"])
+    assert run.results == rank_results([GOOD, BAD], {})  # it has no models to be measured by
     assert (run.meta["finished"], run.meta["notes"]) == ("2026-01-01T00:00:09+00:00", [])
     assert store.runs() == (META["run"], "20260102T000000Z-bbbbbb")
     assert find_store_faults(store) == []
@@ -271,7 +278,7 @@ def test_runs_of_json_lines_with_checksums_are_converted(tmp_path: Path) -> None
     assert (file, count, len(faults)) == (old, 5, 1)
     assert str(faults[0]).startswith(f"{old}:4: damaged")
     run = store.load()
-    assert run.results == rank_results([GOOD, BAD], META["reference"])
+    assert run.results == rank_results([GOOD, BAD], {})
     assert run.meta["finished"] == "2026-01-01T00:00:09+00:00"
 
 
@@ -303,17 +310,18 @@ def test_many_writers_do_not_mix_their_records(tmp_path: Path) -> None:
 
 
 def test_json_is_the_contract_and_comes_back() -> None:
-    run = Run(META, rank_results([GOOD, BAD], META["reference"]))
+    meta = with_models()
+    run = Run(meta, rank_results([GOOD, BAD], meta))
     data = run_to_json(run)
     text = json.dumps(data, allow_nan=False)
     first, second = json.loads(text)["results"]
     required = "case strategy seed status reason seconds used higher modified rigid_body_modes"
-    assert {*required.split(), "negative_eigenvalues", "score", "rank"} <= first.keys()
+    assert {*required.split(), "negative_eigenvalues", "gain", "rank"} <= first.keys()
     assert first["used"]["rms_percent"] == 3.0
     assert first["used"]["modes"][1].items() >= {"measured_hz": 200.0, "predicted_hz": None}.items()
     assert first["higher"] is None
     assert first["unphysical"] is True
-    assert (second["status"], second["score"], second["used"]) == ("failed", 10.0, None)
+    assert (second["status"], second["gain"], second["used"]) == ("failed", 0.0, None)
     assert run_from_json(json.loads(text)) == run
 
 
@@ -329,7 +337,7 @@ def test_numbers_that_json_does_not_know_become_null() -> None:
 
 @pytest.mark.parametrize(
     ("change", "key"),
-    [({"status": "fine"}, "status"), ({"seed": None}, "seed"), ({"score": "high"}, "score")],
+    [({"status": "fine"}, "status"), ({"seed": None}, "seed"), ({"gain": "high"}, "gain")],
 )
 def test_wrong_json_is_refused_with_its_place(change: dict[str, Any], key: str) -> None:
     data = run_to_json(Run(META, (GOOD, BAD)))
@@ -341,11 +349,11 @@ def test_wrong_json_is_refused_with_its_place(change: dict[str, Any], key: str) 
 
 
 def test_one_row_a_job() -> None:
-    frame = results_frame(Run(META, rank_results([GOOD, BAD], META["reference"])))
+    frame = results_frame(Run(META, rank_results([GOOD, BAD], with_models())))
     assert frame["strategy"].tolist() == ["softer", "failing"]
     assert frame["used_percent"].tolist()[0] == 3.0
     assert np.isnan(frame["used_percent"].tolist()[1])
-    assert frame["rank"].tolist() == [1, 2]  # even an unphysical model is more than a failure
+    assert frame["rank"].tolist() == [1, 1]  # both leave the user with the model that was given
     assert frame["unphysical"].tolist() == [True, False]
     assert len(results_frame(Run({}, ()))) == 0
 

@@ -216,7 +216,7 @@ def test_a_run_of_others_is_as_without_them(hostile: Path, tmp_path: Path) -> No
 
 def figures(run: Mapping[str, Any]) -> list[Any]:
     """Return what a run says of models, without times."""
-    own = ("case", "nominal", "strategy", "status", "reason", "used", "higher", "modified", "score")
+    own = ("case", "nominal", "strategy", "status", "reason", "used", "higher", "modified", "gain")
     return [[result[key] for key in own] for result in run["results"]]
 
 

@@ -75,7 +75,7 @@ class TestEveryCommandOfTheReadme:
         assert femubench.report(run, "ours.json") == Path("ours.json")
         ours, theirs = data("ours.json"), data("results.json")
         assert ours.keys() == theirs.keys()
-        assert [r["score"] for r in ours["results"]] == [r["score"] for r in theirs["results"]]
+        assert [r["gain"] for r in ours["results"]] == [r["gain"] for r in theirs["results"]]
         assert ours["meta"]["request"] == theirs["meta"]["request"]
 
     def test_run_with_noise_and_run_resume(self) -> None:
@@ -97,8 +97,8 @@ class TestEveryCommandOfTheReadme:
         run = femubench.study("study.toml", jobs=2)
         femubench.report(run, "ours.json")
         assert data("ours.json")["cells"][0].keys() == data("theirs.json")["cells"][0].keys()
-        cells = [[cell["skill"] for cell in data(f)["cells"]] for f in ("ours.json", "theirs.json")]
-        assert cells[0] == cells[1] == run.skill_by("noise")["skill"].tolist()
+        cells = [[cell["gain"] for cell in data(f)["cells"]] for f in ("ours.json", "theirs.json")]
+        assert cells[0] == cells[1] == run.gain_by("noise")["gain"].tolist()
         again = femubench.study("study.toml", store="s")
         assert again.meta["run"] == data("theirs.json")["meta"]["run"]
 
@@ -113,9 +113,9 @@ class TestEveryCommandOfTheReadme:
     def test_compare(self) -> None:
         a = femubench.rank("rod", TWO, jobs=2, store="s")
         b = femubench.rank("rod", TWO, jobs=2, store="s")
-        words = ("compare", a.meta["run"], b.meta["run"], "--store", "s", "--fail", "unseen>1.2")
+        words = ("compare", a.meta["run"], b.meta["run"], "--store", "s", "--fail", "loss>0.2")
         call(*words, "-f", "json", "-o", "theirs.json")
-        found = femubench.compare(a, b.meta["run"], fail="unseen>1.2", store="s")
+        found = femubench.compare(a, b.meta["run"], fail="loss>0.2", store="s")
         assert not found.worse
         femubench.report(found, "ours.json")
         assert data("ours.json") == data("theirs.json")
@@ -134,7 +134,9 @@ class TestEveryCommandOfTheReadme:
         change_data(file, '"status":"ok"', '"status":"oj"')
         lost, missing = femubench.read_run(store="s").meta["notes"]
         assert "sqlite:2: damaged" in lost
-        assert missing.startswith("1 of 2 jobs are missing and score as failures: rod unchanged")
+        assert missing.startswith(
+            "1 of 2 jobs are missing and count as the model that was given: rod unchanged"
+        )
         call("store", "repair", "--store", "s")
         assert femubench.read_run(store="s").meta["notes"] == [missing]
 
@@ -411,7 +413,7 @@ class TestLooks:
             page = shown._repr_html_()  # type: ignore[attr-defined]
             assert page.startswith("<table>")
             assert page.count("<tr>") == page.count("</tr>") > 0
-        assert "skill" in repr(run)
+        assert "gain" in repr(run)
         assert found.verdict in repr(found)
 
     def test_tables_are_escaped(self) -> None:

@@ -23,7 +23,7 @@ ALLOWED = {
     "hframe": r"\"hframe\": _hframe",  # a structure of the challenge; in its seeds
     # the model with handbook values, and where a value of a cause comes from
     "textbook": r"[nN]ominal|handbook|record|: \[|_CAUSE_COLUMNS|source =|start|yardstick|both"
-    r"|item\.get",
+    r"|[mM]odels|item\.get",
     "physical": r"\"unphysical\"",  # a label next to its contrary
 }
 
@@ -68,11 +68,11 @@ def test_the_search_itself_finds_names() -> None:
     assert list(found_in(text, names)) == [(1, "unchanged"), (3, "kabe-rigid"), (4, "frame")]
 
 
-def test_baseline_and_yardstick_are_roles_that_one_strategy_each_has() -> None:
+def test_baseline_and_cost_reference_are_roles_that_one_strategy_each_has() -> None:
     plugins = load_plugins()
     found = plugins.strategies.values()
     assert [s.name for s in found if s.baseline] == ["unchanged"]
-    assert [s.name for s in found if s.yardstick] == ["physical"]
+    assert [s.name for s in found if s.cost_reference] == ["physical"]
     (subject,) = subjects("berman", plugins)
     assert subject.bench.reference is plugins.strategies["physical"]
     other = Plugins(strategies={"berman": plugins.strategies["berman"]})

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scored
 from synthetic_run import synthetic_run
 
 from femubench.core.score.comparison import Against, compare_runs
-from femubench.core.score.statistics import Groups
+from femubench.core.score.statistics import Differences
 from femubench.papers.printed import read_printed
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.page import data as page
@@ -28,11 +29,12 @@ from femubench.results import (
     Block,
     JobResult,
     PairedMode,
+    Rule,
     Run,
+    Standings,
     leaderboard,
     rank_results,
     run_to_json,
-    tell_apart,
 )
 
 ASSETS = Path(__file__).parents[1] / "reports" / "page" / "assets"
@@ -46,18 +48,20 @@ def data_in(html: str) -> dict[str, Any]:
     return found
 
 
-def outcome_of(run: Run) -> Groups:
-    return tell_apart(run, list(leaderboard(run)["strategy"]))
+def outcome_of(run: Run) -> Differences:
+    return Standings.of(run).apart
 
 
-def scored(table: Mapping[str, list[float]]) -> Run:
-    """Return a run with the given scores, a case of one block a column."""
+def with_errors(table: Mapping[str, list[float]]) -> Run:
+    """Return a run with the given errors in percent, a case of one held-out mode a column."""
+    count = max(map(len, table.values()))
+    errors = {f"case-{n}": {"used": 1.0, "higher": 10.0} for n in range(count)}
     results = [
-        JobResult(f"case-{n}", name, 0, "ok", score=score, blocks={"used": Block(score, None, ())})
-        for name, scores in table.items()
-        for n, score in enumerate(scores)
+        scored.result(f"case-{n}", name, higher=error)
+        for name, own in table.items()
+        for n, error in enumerate(own)
     ]
-    return Run({"strategies": list(table), "seeds": [0]}, rank_results(results))
+    return scored.run(errors, results, strategies=list(table))
 
 
 class TestNumbers:
@@ -72,7 +76,7 @@ class TestNumbers:
             assert ours["seed"] == theirs["seed"]
             blocks = [theirs[name] for name in found["blocks"]]
             assert ours["rms"] == [block and block["rms_percent"] for block in blocks]
-            assert ours["score"] == theirs["score"]
+            assert ours["gain"] == pytest.approx(theirs["gain"], rel=1e-12)
             assert ours["status"] == theirs["status"]
             assert ours["unphysical"] == theirs["unphysical"]
             assert ours["seconds"] == pytest.approx(theirs["seconds"], rel=1e-3)
@@ -82,9 +86,22 @@ class TestNumbers:
     def test_board_is_the_leaderboard(self) -> None:
         board = page_data(SMALL)["board"]
         for row, ours in zip(leaderboard(SMALL).to_dict("records"), board, strict=True):
-            assert {k: None if v is None else pytest.approx(v, abs=0) for k, v in ours.items()} == {
-                k: None if isinstance(v, float) and math.isnan(v) else v for k, v in row.items()
-            }
+            for key, value in row.items():
+                is_none = isinstance(value, float) and math.isnan(value)
+                assert ours[key] == (None if is_none else value), key
+
+    def test_starts_and_results_average_to_the_board(self) -> None:
+        """What the page computes anew with a filter, from its own data."""
+        found = page_data(SMALL)
+        strategies = [item["name"] for item in found["strategies"]]
+        for row in found["board"]:
+            own = {(r["c"], r["seed"]): r["gain"] for r in found["results"]
+                   if strategies[r["s"]] == row["strategy"]}  # fmt: skip
+            gains = [
+                np.mean([own.get((c, seed), case["start"]["gain"]) for seed in found["seeds"]])
+                for c, case in enumerate(found["cases"])
+            ]
+            assert np.mean(gains) == pytest.approx(row["gain"], abs=1e-12)
 
     def test_modes_of_the_first_seed(self) -> None:
         found = data_in(HtmlReporter().render(SMALL))
@@ -147,48 +164,40 @@ class TestNumbers:
 
 
 class TestStatistics:
-    def test_letters_say_between_whom_a_difference_is_shown(self) -> None:
-        found = outcome_of(synthetic_run(12, 40))
-        letters = found.letters()
+    def test_the_board_names_between_whom_a_difference_is_shown(self) -> None:
+        run = synthetic_run(12, 40)
+        found, rows = outcome_of(run), leaderboard(run).set_index("strategy")
         assert len(found.pairs) == 12 * 11 / 2
-        for first, second, p in found.pairs:
-            shared = set(letters[first].split()) & set(letters[second].split())
-            assert bool(shared) == (p >= 0.05)
+        for better, worse, p in found.pairs:
+            assert (worse in rows.loc[better, "better_than"]) == (p < 0.05)
+            assert (better in rows.loc[worse, "worse_than"]) == (p < 0.05)
+            assert rows.loc[better, "gain"] >= rows.loc[worse, "gain"] - 1e-12
+        shown = page_data(run)["statistics"]
+        assert len(shown["pairs"]) == len(found.pairs)
+        assert shown["note"] == found.note
 
     @pytest.mark.parametrize("seeds", [1, 3])
     def test_the_page_and_compare_give_the_same_answer(self, seeds: int) -> None:
-        """Two strategies alone, so that Holm's correction is over one comparison in both."""
+        """Two strategies alone, so that the family is of one comparison in both."""
         whole = synthetic_run(30, 9, seeds=seeds)
         shown = set()
-        for first, second in (("strategy-003", "strategy-025"), ("strategy-010", "strategy-011")):
+        for first, second in (("strategy-003", "strategy-025"), ("strategy-012", "strategy-013")):
             kept = tuple(r for r in whole.results if r.strategy in (first, second))
             run = Run({**whole.meta, "strategies": [first, second]}, kept)
             ((*_, p),) = outcome_of(run).pairs
             (ours,) = compare_runs(run, run, against=Against(first, second)).evidence
-            assert p == ours.p
-            assert (len(outcome_of(run).groups) == 2) == (ours.verdict in ("better", "worse"))
+            assert p == pytest.approx(ours.p)
             shown.add(ours.verdict)
         assert shown == {"worse", "no difference shown"}
 
-    def test_no_difference_at_all_is_one_group(self) -> None:
-        random = np.random.default_rng(1)
-        found = outcome_of(scored({name: list(random.uniform(0.9, 1.1, 12)) for name in "abcd"}))
-        assert [sorted(group) for group in found.groups] == [list("abcd")]
-
-    def test_few_structures_are_not_tested(self) -> None:
+    def test_few_structures_are_not_tested_and_equals_are_not_apart(self) -> None:
         for step, cases in ((1.0, 5), (0.0, 12), (1e-9, 12)):
             table = {name: [1.0 + step * k] * cases for k, name in enumerate("abc")}
-            found = outcome_of(scored(table))
-            assert found.tiers == found.pairs == found.groups == ()
-            assert "not tested" in found.note
+            found = outcome_of(with_errors(table))
+            assert all(p == 1.0 for *_, p in found.pairs)
+            assert ("not tested" in found.note) == (cases == 5) == (found.pairs == ())
 
-    def test_too_few_pairs_for_so_many_comparisons_are_told(self) -> None:
-        steps = {name: [0.1 * 2**n] * 6 for n, name in enumerate("abcdef")}
-        found = outcome_of(scored(steps))
-        assert len(found.groups) == 1
-        assert "however large the difference" in found.note
-
-    def test_a_failure_counts_and_a_missing_result_is_no_pair(self) -> None:
+    def test_a_failure_counts_as_the_start_and_a_missing_result_too(self) -> None:
         whole = synthetic_run(4, 12, failing=0.0)
         names = ["strategy-000", "strategy-001"]
         broken = [
@@ -196,29 +205,17 @@ class TestStatistics:
             for r in whole.results
         ]
         gone = [r for r in whole.results if r.strategy != names[0]]
-        ((_, _, p),) = [
-            pair for pair in outcome_of(Run(whole.meta, tuple(broken))).pairs if {*names} <= {*pair}
-        ]
-        assert p < 0.05
-        ((_, _, p),) = [
-            pair for pair in outcome_of(Run(whole.meta, tuple(gone))).pairs if {*names} <= {*pair}
-        ]
-        assert p == 1.0
+        for results in (broken, gone):
+            run = Run(whole.meta, tuple(results))
+            rows = leaderboard(run).set_index("strategy")
+            assert rows.loc[names[0], "gain"] == 0.0
+            assert rows.loc[names[0], "answered"] == 0
+            assert names[0] in rows.loc[names[1], "better_than"]
 
-    @pytest.mark.slow(5)
-    def test_many_overlapping_groups_become_stretches(self) -> None:
-        run = synthetic_run(120, 30)
-        found = outcome_of(run)
-        order = {name: place for place, name in enumerate(leaderboard(run)["strategy"])}
-        places = [[order[name] for name in group] for group in found.groups]
-        assert all(group == list(range(group[0], group[-1] + 1)) for group in places)
-        assert {place for group in places for place in group} == set(range(120))
-        assert "neighbours in the ranking" in found.note
-
-    def test_markdown_has_groups_coverage_and_the_test(self) -> None:
+    def test_markdown_has_coverage_and_the_test(self) -> None:
         text = MarkdownReporter().render(SMALL)
-        assert "| eval. | tier | group |" in text
-        assert "Wilcoxon's signed rank test" in text
+        assert "| above | below |" in text
+        assert "signs of all differences on a structure are flipped" in text
 
 
 class TestPapers:
@@ -269,7 +266,12 @@ def frame_run(factor: float) -> Run:
         "used": Block(1.0, 0.99, tuple(modes[:3])),
         "higher": Block(1.0, 0.99, tuple(modes[3:])),
     }
-    return Run({"seeds": [0]}, (JobResult("frame", "baruch", 0, "ok", blocks=blocks),))
+    meta = {
+        "seeds": [0],
+        "rule": Rule().to_json(),
+        "models": {"frame": {"drawn": scored.plain(blocks)}},
+    }
+    return Run(meta, rank_results([JobResult("frame", "baruch", 0, "ok", blocks=blocks)], meta))
 
 
 class TestDocument:

@@ -12,6 +12,7 @@ import diagnosis_toys
 import harness_toys
 import numpy as np
 import pytest
+import scored
 from diagnosis_toys import STRUCTURE, data_of
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -75,12 +76,13 @@ def run(**changes: Any) -> Run:
     }
     results = tuple(
         JobResult(
-            "toy", name, 0, "ok", seconds=0.1 * 10**k, score=0.5, history=histories[name],
-            negative_eigenvalues=int(name == "odd"), blocks={"used": Block(1.0 + k, None, ())},
+            "toy", name, 0, "ok", seconds=0.1 * 10**k, history=histories[name],
+            negative_eigenvalues=int(name == "odd"),
+            blocks=scored.blocks(used=100.0 * np.log1p(0.01 * (1.0 + k))),
         )
         for k, name in enumerate(histories)
     )  # fmt: skip
-    meta = {"strategies": list(histories), "seeds": [0], "reference": {"toy": {"used": 2.0}}}
+    meta = scored.meta({"toy": {"used": 2.0}}, strategies=list(histories))
     return replace(Run(meta, results), **changes)
 
 

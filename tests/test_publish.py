@@ -79,12 +79,12 @@ def test_one_run_gives_its_leaderboard(data: Data, site: Site) -> None:
     assert "1 new run, 1 run and 3 strategies in all" in answer.output
     board = leaderboard(run_from_json(data)).to_dict("records")
     found = site.index()
-    assert found["schema"] == 2
+    assert found["schema"] == 3
     assert [item["name"] for item in found["strategies"]] == [row["strategy"] for row in board]
     for item, row in zip(found["strategies"], board, strict=True):
         version = item["versions"][0]
         assert item["rank"] == row["rank"]
-        assert version["skill"] == pytest.approx(row["skill"], rel=1e-12)
+        assert version["gain"] == pytest.approx(row["gain"], rel=1e-12)
         assert version["failures"] == (2 if row["strategy"] == "failing" else 0)
         for block in ("used", "higher", "modified"):
             assert version[f"{block}_percent"] == pytest.approx(
@@ -95,7 +95,7 @@ def test_one_run_gives_its_leaderboard(data: Data, site: Site) -> None:
     (kept,) = (site.folder / "data").glob("*.json")
     assert json.loads(kept.read_text())["meta"]["structures"] == data["meta"]["structures"]
     text = (site.folder / "index.html").read_text()
-    assert f"{found['strategies'][0]['versions'][0]['skill']:.3f}" in text
+    assert f"{found['strategies'][0]['versions'][0]['gain']:.3f}" in text
 
 
 def test_the_same_files_give_the_same_bytes(data: Data, tmp_path: Path) -> None:
@@ -142,11 +142,11 @@ def test_history_has_every_version_and_the_board_the_latest(data: Data, site: Si
         "9.9",
         old["results"][1]["provenance"]["strategy"],
     ]
-    assert softer["versions"][0]["skill"] > softer["versions"][1]["skill"]
+    assert softer["versions"][0]["gain"] > softer["versions"][1]["gain"]
     assert softer["versions"][1]["machines"][0]["cpu"] == "Old <cpu>"
     page = (site.folder / softer["page"]).read_text()
     drawn = Links(page).text.partition("Versions")[0]
-    assert "Skill of every version" in drawn
+    assert "Gain of every version" in drawn
     assert all(
         f"{number}" in drawn and row["last"][:10] in drawn
         for number, row in zip((2, 1), softer["versions"], strict=True)
@@ -169,7 +169,7 @@ def test_older_case_files_are_not_ranked(data: Data, site: Site) -> None:
     first, second = site.strategy("softer")["versions"]
     assert first["comparable"]
     assert not second["comparable"]
-    assert second["skill"] is None
+    assert second["gain"] is None
     assert site.strategy("failing")["rank"] is None
     assert site.index()["cases"][0]["older"] == ["0123"]
     page = (site.folder / site.strategy("softer")["page"]).read_text()
@@ -198,11 +198,11 @@ def test_contradictions_are_kept_and_flagged(data: Data, site: Site) -> None:
     assert {item["case"] for item in conflicts} == {"corner", "other/corner"}
     assert [row["counted"] for row in conflicts[0]["results"]] == [True, False]
     assert len(conflicts[0]["results"][0]["runs"]) == 2
-    skill = site.strategy("softer")["versions"][0]["skill"]
+    gain = site.strategy("softer")["versions"][0]["gain"]
     alone = Site(site.room)
     alone.folder = site.room / "alone"
     alone.add(honest[0])
-    assert skill == alone.strategy("softer")["versions"][0]["skill"]
+    assert gain == alone.strategy("softer")["versions"][0]["gain"]
     assert "contradicted" in (site.folder / "index.html").read_text()
 
 
@@ -221,6 +221,9 @@ def test_a_liars_own_nominal_errors_do_not_make_it_count(data: Data, site: Site)
     liar = called(scaled(data, "softer", 0.01), "liar", 3, cpu="liar")
     for blocks in liar["meta"]["reference"].values():
         blocks |= dict.fromkeys(blocks, 0.0)
+    for models in liar["meta"]["models"].values():
+        for mode in models["drawn"]["higher"]["modes"]:
+            mode["predicted_hz"] *= 1.2
     site.add(called(data, "first", 1), liar)
     true = next(r for r in data["results"] if r["strategy"] == "softer")
     row = site.strategy("softer")["versions"][0]["cases"][0]
@@ -252,13 +255,15 @@ def bad(data: Data, path: str, value: object) -> Data:
 @pytest.mark.parametrize(
     ("path", "value", "key"),
     [
-        ("schema", 2, "schema: schema 2"),
+        ("schema", 3, "schema: schema 3"),
         ("meta/started", "yesterday", "meta.started"),
         ("meta/run", None, "meta.run"),
         ("meta/machine", [1], "meta.machine"),
         ("meta/versions", {"python": {}}, "meta.versions.python"),
         ("meta/cases/corner/digest", None, "meta.cases.corner.digest"),
         ("meta/reference/corner", None, "meta.reference.corner"),
+        ("meta/models", None, "meta.models"),
+        ("meta/models/corner", None, "meta.models.corner.drawn: missing"),
         ("meta/reference/corner/used", -1.0, "meta.reference.corner.used"),
         ("results", [], "results: no results"),
         ("results/0/key", "", "results[0].key"),
@@ -303,10 +308,10 @@ def test_a_folder_of_somebody_else_is_left_alone(data: Data, site: Site) -> None
     (site.folder / "thesis.tex").unlink()
     assert site.add(data).exit_code == 0
     marker = site.folder / publishing.MARKER
-    marker.write_text(marker.read_text().replace('"schema": 1', '"schema": 7'))
+    marker.write_text(marker.read_text().replace('"schema": 2', '"schema": 7'))
     answer = site.add(data)
     assert answer.exit_code == 2
-    assert "schema 7 (expected 1)" in answer.stderr
+    assert "schema 7 (expected 2)" in answer.stderr
 
 
 def test_what_others_put_into_the_folder_stays(data: Data, site: Site) -> None:
@@ -400,7 +405,7 @@ def test_extremes_do_not_break_the_site_that_took_them(data: Data, site: Site) -
             mode["predicted_hz"], mode["measured_hz"] = 1e100, 1e-40
             others = len(result["used"]["modes"])
             result["used"]["rms_percent"] = 100.0 * 1e140 / others**0.5
-        result["score"] = 1e150
+        result["gain"] = 1.0
     made["meta"]["reference"]["corner"]["used"] = 0.0
     assert site.add(made).exit_code == 0
     before = site.content()
@@ -435,6 +440,9 @@ def test_one_yardstick_and_one_start_for_all(data: Data, site: Site) -> None:
     assert refused.exit_code == 2
     assert "starts from the drawn model alone" in refused.stderr
     drawn["meta"]["starts"] = {case: ["textbook"] for case in drawn["meta"]["cases"]}
+    drawn["meta"]["models"] = {
+        c: {"textbook": m["drawn"]} for c, m in data["meta"]["models"].items()
+    }
     for result in drawn["results"]:
         result["nominal"] = "textbook"
     assert site.add(drawn).exit_code == 0
@@ -454,7 +462,7 @@ def test_a_class_has_a_board_of_its_own(data: Data, site: Site) -> None:
         for k, part in enumerate(parts)
         for result in part["results"]
     ]
-    for key in ("cases", "reference"):
+    for key in ("cases", "reference", "models"):
         made["meta"][key] = {n: v for part in parts for n, v in part["meta"][key].items()}
     made["meta"]["structures"] = {name: name for name in made["meta"]["cases"]}
     made["meta"]["classes"] = {"a0": ["frame", "all"], "a1": ["frame", "all"], "b0": ["all", "one"]}
@@ -468,10 +476,11 @@ def test_a_class_has_a_board_of_its_own(data: Data, site: Site) -> None:
     assert list(boards) == ["", "frame"]  # all of them is the whole, one is a case
     assert boards["frame"]["cases"] == ["a0", "a1"]
     first = boards["frame"]["rows"][0]
-    assert first["strategy"] == "unchanged"
+    ranks = {row["strategy"]: row["rank"] for row in boards["frame"]["rows"]}
+    assert ranks == {"unchanged": 1, "failing": 1, "softer": 3}
     page = (site.folder / boards["frame"]["page"]).read_text()
-    assert f'data-value="{first["skill"]}"' in page
-    assert "unchanged leads" in page
+    assert f'data-value="{first["gain"]}"' in page
+    assert "No strategy gains on handbooks." in page
     assert f'href="{boards["frame"]["page"]}"' in (site.folder / "index.html").read_text()
     lines = (site.folder / "leaderboard.csv").read_text().splitlines()
     assert [line.split(",")[:3] for line in lines if line.startswith("frame")] == [
@@ -597,6 +606,7 @@ def test_the_board_says_who_is_best_and_how_sure(data: Data, site: Site) -> None
     site.add(data)
     text = Links((site.folder / "index.html").read_text()).text
     best = site.index()["boards"][0]["rows"][0]
-    assert f"softer leads with skill {best['skill']:.3f}." in text
-    assert "Too few structures to say" in text
+    assert f"the best strategy, softer, {best['error_percent']:.1f} %." in text
+    assert f"Its gain is {best['gain']:.3f}." in text
+    assert "No difference between any two lines of the board is shown." in text
     assert "On 2 cases of 2 structures" in text

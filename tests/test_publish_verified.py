@@ -86,6 +86,12 @@ def _other_nominal(data: Data) -> None:
     errors["higher"] *= 3.0
 
 
+def _other_model(data: Data) -> None:
+    """Make the textbook model worse than it is, so that all gain more."""
+    for mode in data["meta"]["models"]["suite/bracket"]["textbook"]["higher"]["modes"]:
+        mode["predicted_hz"] *= 1.1
+
+
 def _without(data: Data, **fields: str) -> None:
     for key in ("results", "companions"):
         kept = [r for r in data[key] if any(r[k] != v for k, v in fields.items())]
@@ -100,7 +106,7 @@ def _without_strategy(data: Data) -> None:
 
 def _without_case(data: Data) -> None:
     _without(data, case="frame")
-    for name in ("cases", "reference", "starts", "structures"):
+    for name in ("cases", "reference", "models", "starts", "structures"):
         del data["meta"][name]["frame"]
 
 
@@ -130,17 +136,12 @@ def _one_mode_of_a_twin(data: Data) -> None:
     result["higher"]["modes"][0]["measured_hz"] *= 1.01
 
 
-def _spared(data: Data, **errors: float) -> None:
-    """Say that a strategy was not applicable to a drawn model that predicts better."""
+def _spared(data: Data) -> None:
+    """Say that a strategy was not applicable to a drawn model."""
     result = next(
         r for r in data["results"] if r["nominal"] == "drawn" and r["strategy"] == "global"
     )
-    result |= {
-        "status": "not-applicable",
-        "start_percent": errors,
-        "score": None,
-        "unphysical": False,
-    }
+    result |= {"status": "not-applicable", "gain": None, "unphysical": False}
     result |= dict.fromkeys(("used", "higher", "modified"))
 
 
@@ -185,8 +186,10 @@ EDITS: dict[str, tuple[Edit, str]] = {
     "measured figures": (_better, "Hz was not measured"),
     "measured figure of a twin": (_one_mode_of_a_twin, "Hz was not measured"),
     "nominal errors": (_other_nominal, "meta.reference.suite/bracket: not the errors"),
-    "score": (lambda d: d["results"][0].update(score=0.01), "results[0].score: score 0.01"),
-    "skill": (lambda d: d["leaderboard"][1].update(skill=0.99), "leaderboard[1].skill: skill 0.99"),
+    "gain of a job": (lambda d: d["results"][0].update(gain=0.99), "results[0].gain: gain 0.99"),
+    "nominal model": (_other_model, "meta.models.suite/bracket: not what the textbook model"),
+    "rule": (lambda d: d["meta"]["rule"].update(cap=0.2), "meta.rule: gains by another rule"),
+    "gain": (lambda d: d["leaderboard"][1].update(gain=0.99), "leaderboard[1].gain: gain 0.99"),
     "digest": (_other_files, "meta.cases.frame.digest: other files"),
     "unknown case": (_unknown, "no case 'suite/racket' is installed here"),
     "one result": (lambda d: d["results"].pop(1), "results: 1 jobs are missing"),
@@ -197,12 +200,10 @@ EDITS: dict[str, tuple[Edit, str]] = {
         lambda d: d["meta"]["structures"].update({"suite/bracket": "frame"}),
         "meta.structures.suite/bracket",
     ),
-    "not applicable": (_spared, "start_percent: not the errors of the drawn model"),
-    "applicable to a better one": (
-        lambda d: _spared(d, higher=0.1, used=0.1),
-        "start_percent: not the errors of the drawn model",
+    "yardstick": (
+        lambda d: d["meta"].update(yardstick="drawn"),
+        "meta.models.suite/bracket.drawn: missing",
     ),
-    "yardstick": (lambda d: d["meta"].update(yardstick="drawn"), "meta.yardstick"),
     "a job twice": (
         lambda d: d["companions"].append(d["companions"][0]),
         "results: 0 jobs are missing",
@@ -221,16 +222,10 @@ def test_what_was_edited_is_refused_in_one_line(honest: Data, tmp_path: Path, na
     assert not (tmp_path / "site").exists()
 
 
-def test_who_was_not_applicable_is_taken_with_the_errors_of_the_drawn_model(
+def test_who_was_not_applicable_is_taken_as_the_model_that_was_given(
     honest: Data, tmp_path: Path
 ) -> None:
-    own = next(
-        r for r in honest["results"] if r["nominal"] == "drawn" and r["strategy"] == "unchanged"
-    )
-    errors = {
-        name: own[name]["rms_percent"] for name in ("used", "higher", "modified") if own[name]
-    }
-    made = edited(honest, lambda data: _spared(data, **errors))
+    made = edited(honest, _spared)
     del made["leaderboard"]
     answer = publish(tmp_path, made)
     assert answer.exit_code == 0, answer.output

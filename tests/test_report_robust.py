@@ -98,7 +98,7 @@ class TestDamage:
         change_data(file_in(folder), '"ok"', '"oj"', "number = 5")
         notes = stated(report, folder)
         assert any(":5: damaged" in note and "left out" in note for note in notes)
-        said = f"1 of {len(RUN.results)} jobs are missing and score as failures: "
+        said = f"1 of {len(RUN.results)} jobs are missing and count as the model that was given: "
         assert any(note.startswith(said) for note in notes)
 
     def test_a_result_of_another_shape(self, report: Report, folder: Path) -> None:
@@ -116,14 +116,17 @@ class TestDamage:
         assert len(page["results"]) == len(RUN.results)
         assert Store(folder).load().meta["cases"] == RUN.meta["cases"]
 
-    def test_both_copies_of_the_start_that_are_lost_leave_the_results(
+    def test_without_both_copies_of_the_start_there_is_no_gain_but_the_jobs(
         self, report: Report, folder: Path
     ) -> None:
         change_data(file_in(folder), "{", "[", "number = 1")
         edit(file_in(folder), "DELETE FROM copies")
-        assert len([note for note in stated(report, folder) if ":1: damaged" in note]) == 1
-        page = data_in((folder / f"{RUN_ID}.html").read_text(encoding="utf-8"))
-        assert len(page["results"]) == len(RUN.results)
+        page = report("-f", "html")
+        assert page.exit_code == 2
+        assert "run it again" in page.stderr.splitlines()[-1]
+        jobs = report("-f", "csv")
+        assert jobs.exit_code == 0
+        assert len(jobs.stdout.splitlines()) == 1 + len(RUN.results)
 
     def test_many_damaged_records_are_a_few_lines(self, report: Report, folder: Path) -> None:
         edit(file_in(folder), "UPDATE records SET checksum = 0 WHERE number BETWEEN 4 AND 20")
@@ -263,7 +266,7 @@ class TestFormats:
         table = parquet.read_table(folder / f"{RUN_ID}.parquet")
         assert json.loads(table.schema.metadata[b"femubench"]) == {"run": RUN_ID, "notes": []}
         expected = results_frame(Store(folder).load())
-        assert table.to_pandas()["score"].tolist() == expected["score"].tolist()
+        assert table.to_pandas()["gain"].tolist() == expected["gain"].tolist()
         assert table.column_names == list(expected.columns)
 
     def test_parquet_without_its_library_is_one_line(

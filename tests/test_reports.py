@@ -10,6 +10,7 @@ import re
 from dataclasses import replace
 
 import pytest
+import scored
 from synthetic_run import synthetic_run
 
 from femubench.core.library.report import render_report
@@ -26,14 +27,12 @@ from femubench.results import (
     Block,
     JobResult,
     PairedMode,
+    Rule,
     Run,
     frequency_error,
     leaderboard,
-    structures_of,
-    tell_apart,
+    list_rows,
 )
-
-NOMINAL = {"used": 10.0, "higher": 8.0, "modified": 60.0}
 
 
 def mode(
@@ -85,12 +84,15 @@ def run_of(*results: JobResult, **meta: object) -> Run:
         "versions": {"python": "3.11.0", "femubench": "0.1.0"},
         "machine": {"platform": "Linux", "cpu_count": 2},
         "cases": {case: {"title": f"The {case}", "digest": "0"} for case in cases},
-        "reference": dict.fromkeys(cases, NOMINAL),
+        "rule": Rule().to_json(),
+        "models": {case: {"drawn": scored.plain(NOMINAL)} for case in cases},
+        "reference": {case: {n: b.rms_percent for n, b in NOMINAL.items()} for case in cases},
         "citations": {"good": "A. Author 2001, (1)"},
     }
     return Run({**full, **meta}, results)
 
 
+NOMINAL = result("nominal").blocks
 GOOD = result("good", 0.1)
 WORSE = result("worse", 1.5)
 IMAGINARY = result(
@@ -149,13 +151,13 @@ class TestTerminal:
     def test_table_is_ranked_and_shows_every_figure(self) -> None:
         text = TerminalReporter().render(RUN)
         rows = [line.split() for line in text.splitlines()[3:8]]
-        assert [row[1] for row in rows] == ["good", "picky", "worse", "imaginary", "broken"]
-        assert [row[0] for row in rows] == ["1", "2", "3", "!4", "*5"]
-        # rms 1 % over used and higher; one of three modified modes has no partner
-        modified = 100.0 * math.sqrt((0.01**2 + 1.0 + 0.01**2) / 3.0)
-        assert rows[0][3:11] == ["–", "1.00", f"{modified:.1f}", "1.00", "0", "0", "4", "1.25"]
-        assert rows[3][7:9] == ["2", "2"]
-        assert "unphysical" in text
+        assert [row[1] for row in rows] == ["good", "broken", "imaginary", "picky", "worse"]
+        assert [row[0] for row in rows] == ["1", "*2", "!2", "*2", "5"]
+        gain = 1.0 - math.log(1.01) / math.log(1.1)
+        off = 100.0 * math.log(1.01)
+        assert rows[0][2:9] == [f"{gain:.3f}", f"{off:.2f}", "100", f"{gain:.3f}", "1", "of", "1"]
+        assert [row[6:9] for row in rows[1:4]] == [["0", "of", "1"]] * 3
+        assert "some models lost rigid-body modes or have negative eigenvalues" in text
 
     def test_fits_80_columns_whatever_the_names_and_figures(self) -> None:
         name = "a-strategy-with-a-very-long-name-that-nobody-would-type"
@@ -181,7 +183,7 @@ class TestTerminal:
         failed = [replace(FAILED, seed=seed) for seed in range(5)]
         text = TerminalReporter().render(run_of(*results, *failed))
         assert "95 % interval" in text
-        assert re.search(r"good +0\.\d{3} to 0\.\d{3}", text)
+        assert re.search(r"good +0\.\d{3} +0\.\d{3} to 0\.\d{3}", text)
         assert re.search(r"broken +0, 1, 2, +failed", text)
         assert text.count("measured 3e-2") == 1
 
@@ -214,15 +216,15 @@ class TestMarkdown:
         assert found["machine"] == r"platform Linux, cpu\_count 2"
 
     def test_leaderboard(self) -> None:
-        rows = with_header(self.TEXT, "#", "strategy", "skill")
+        rows = with_header(self.TEXT, "#", "strategy", "gain")
         assert [row[:2] for row in rows] == [
             ["1", "good"],
-            ["2", "picky"],
-            ["3", "worse"],
-            ["!4", "imaginary"],
-            [r"\*5", "broken"],
+            [r"\*2", "broken"],
+            ["!2", "imaginary"],
+            [r"\*2", "picky"],
+            ["5", "worse"],
         ]
-        assert rows[4][2] == "-9.000"
+        assert [row[2] for row in rows[1:4]] == ["0.000"] * 3
 
     def test_coverage_and_reasons(self) -> None:
         rows = {row[0]: row[1:] for row in with_header(self.TEXT, "strategy", "ok")}
@@ -353,38 +355,53 @@ class TestFinding:
     """The sentences on what a run shows."""
 
     def stated(self, run: Run) -> list[str]:
-        board = leaderboard(run).to_dict("records")
-        return finding(run, board, tell_apart(run, [row["strategy"] for row in board]).tiers)
+        return finding(run, list_rows(run))
 
-    def test_who_leads_and_how_sure_that_is(self) -> None:
+    def test_how_far_off_in_percent_and_how_sure_that_is(self) -> None:
         run = synthetic_run(60, 12, failing=0.0)
-        best, *others = leaderboard(run).to_dict("records")
-        count = len(set(structures_of(run).values()) or run.meta["cases"])
-        headline, tier, *_ = self.stated(run)
-        assert headline.replace("\u2212", "-") == (
-            f"{best['strategy']} leads: it takes away {100 * best['skill']:.0f} % of the nominal "
-            f"models' error on unseen data (skill {best['skill']:.3f}, 95 % interval "
-            f"{best['skill_low']:.3f} to {best['skill_high']:.3f} over {count} structures)."
+        best = leaderboard(run).to_dict("records")[0]
+        said = [sentence.replace("\u2212", "-") for sentence in self.stated(run)]
+        assert said[0] == (
+            f"Above the given band the nominal models are {best['textbook_percent']:.1f} % off, "
+            f"the best strategy, {best['strategy']}, {best['error_percent']:.1f} %."
         )
-        first = tell_apart(run, [best["strategy"], *(row["strategy"] for row in others)]).tiers[0]
-        assert 5 < len(first) < 60
-        assert all(name in tier for name in first[1:5])
-        assert tier.endswith(f" and {len(first) - 5} more; {60 - len(first)} of 60 are below.")
+        count = len(run.meta["cases"])
+        better, worse = (f"{100 * best[key]:.0f} %" for key in ("better_share", "worse_share"))
+        assert said[1] == (
+            f"It is better than the nominal models on {better} of the {count} structures, worse by "
+            f"more than a quarter on {worse}."
+        )
+        ends = f"{best['gain_low']:.3f} to {best['gain_high']:.3f}"
+        assert said[2] == (
+            f"Its gain is {best['gain']:.3f} (95 % interval {ends} over {count} structures)."
+        )
+        assert 5 < len(best["better_than"]) < 60
+        below = [name for name in best["better_than"] if name != "unchanged"]
+        assert said[3] == f"It is shown to be better than {len(below)} of 58 other strategies."
+        assert said[4].startswith("Shown to be better than the models that were given: ")
 
     def test_no_improvement_is_told_as_such(self) -> None:
-        headline, *_ = self.stated(run_of(WORSE))
-        assert headline.startswith("No strategy improves on the nominal models on unseen data")
-        assert "\u2212" in headline
+        first, second, *_, last = self.stated(run_of(WORSE))
+        assert first == "No strategy gains on the nominal models."
+        assert "the nominal models are 9.5 % off, the best strategy, worse, 14.0 %" in second
+        assert last == "No difference between any two lines of the board is shown."
+        assert "\u2212" in " ".join(self.stated(run_of(WORSE)))
 
-    def test_equal_skills_share_the_lead(self) -> None:
+    def test_a_yardstick_never_leads_and_stands_between_handbooks_and_the_best(self) -> None:
+        line = {"good": "the given ratios carried on"}
+        first, *_ = self.stated(run_of(GOOD, result("best", 0.5), yardsticks=line))
+        assert (
+            "9.5 % off, the given ratios carried on 1.0 %, the best strategy, best, 4.9 %" in first
+        )
+
+    def test_equal_gains_share_the_lead(self) -> None:
         twins = [result(name, 0.1) for name in ("a", "b")]
-        assert self.stated(run_of(*twins))[0].startswith("a and b share the first rank: each takes")
+        assert "the best strategies, a and b, 1.0 %" in self.stated(run_of(*twins))[0]
 
     def test_few_structures_or_no_model(self) -> None:
         alone = self.stated(run_of(GOOD))
-        assert len(alone) == 1
-        assert "interval" not in alone[0]
-        assert "Whether the others differ from it is not tested." in self.stated(RUN)
+        assert alone[1] == "That is better than the nominal models."
+        assert "interval" not in " ".join(alone)
         assert self.stated(run_of(FAILED)) == ["No strategy gave a possible model."]
         assert self.stated(Run({}, ())) == []
 

@@ -36,7 +36,7 @@ def stable(run: Run) -> dict[tuple[str, str, int], dict[str, Any]]:
     """What of a run does not depend on when and how often it was interrupted."""
     from femubench.core.schema.records import result_to_json
 
-    volatile = {"seconds", "rank", "score"}
+    volatile = {"seconds", "rank", "gain"}
     return {
         (item.case, item.strategy, item.seed): {
             name: value for name, value in result_to_json(item).items() if name not in volatile
@@ -139,7 +139,7 @@ def test_a_damaged_record_keeps_nobody_from_going_on(tmp_path: Path) -> None:
     assert {item.strategy for item in loaded.results} == {"unchanged", "failing"}
     lost, note = loaded.meta["notes"]
     assert lost.endswith("damaged (expected the record that was written): left out")
-    assert note.startswith("1 of 3 jobs are missing and score as failures: ")
+    assert note.startswith("1 of 3 jobs are missing and count as the model that was given: ")
     assert "softer seed 0 drawn" in note
     done: list[str] = []
     again = some(store, resume=True, progress=lambda result, *_: done.append(result.strategy))

@@ -1,24 +1,26 @@
-"""Blocks, rigid-body modes, scores, ranks and the leaderboard."""
+"""Blocks, rigid-body modes, gains, ranks and the leaderboard."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Any
 
 import harness_toys as toys
 import numpy as np
 import pytest
+import scored
+from scored import result
 
+from femubench import InputError
 from femubench.core.case.case import Case
 from femubench.core.fem.frame import Support
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal import eigen
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.schema.paired_modes import PairedMode
-from femubench.core.schema.results import Block, JobResult, Run, Status
+from femubench.core.schema.results import Run
 from femubench.core.score.leaderboard import leaderboard
-from femubench.core.score.ranking import rank_items, rank_results, score_of
+from femubench.core.score.ranking import rank_items, rank_results
 from femubench.core.score.scoring import (
     Reference,
     frequency_error,
@@ -27,7 +29,7 @@ from femubench.core.score.scoring import (
     reference_of,
     score_model,
 )
-from femubench.results import find_basis, ranks_by_floor
+from femubench.results import find_basis
 
 
 @pytest.fixture(scope="module")
@@ -224,83 +226,84 @@ def test_a_large_model_offers_as_many_modes_as_a_small_one(
         assert sparse[name].rms_percent == pytest.approx(block.rms_percent, rel=1e-6)
 
 
-def result(
-    strategy: str,
-    *,
-    status: Status = "ok",
-    seed: int = 0,
-    case: str = "a",
-    rms: float = 1.0,
-    **more: Any,
-) -> JobResult:
-    blocks = {name: Block(rms, 0.9, ()) for name in ("used", "higher")} if status == "ok" else {}
-    return JobResult(case, strategy, seed, status, blocks=blocks, **more)
+ERRORS = {"a": {"used": 4.0, "higher": 2.0}, "b": {"used": 1.0, "higher": 5.0}}
 
 
-REFERENCE = {"a": {"used": 4.0, "higher": 2.0}, "b": {"used": 1.0, "higher": 5.0}}
-META = {"reference": REFERENCE, "seeds": [0], "seed": 5, "strategies": []}
+def row(errors: dict[str, dict[str, float]], *results: Any, **more: Any) -> Any:
+    return leaderboard(scored.run(errors, results, **more)).iloc[0]
 
 
-def test_score_is_what_is_left_of_the_error_on_unseen_data() -> None:
-    assert score_of(result("s"), REFERENCE["a"]) == pytest.approx(1.05 / 2.05, rel=1e-14)
-    both = {"used": 4.0, "higher": 2.0, "modified": 7.0}
-    blocks = {name: Block(rms, None, ()) for name, rms in (("higher", 1.0), ("modified", 3.0))}
-    expected = math.sqrt((1.05 / 2.05) * (3.05 / 7.05))
-    assert score_of(replace(result("s"), blocks=blocks), both) == pytest.approx(expected, rel=1e-14)
-    # A case that holds nothing back has nothing else to say.
-    assert score_of(result("s"), {"used": 4.0}) == pytest.approx(1.05 / 4.05, rel=1e-14)
+def test_gain_is_what_is_removed_of_the_error_out_of_band_or_added() -> None:
+    for own, gain in ((1.0, 0.5), (2.0, 0.0), (4.0, -0.5), (33.0, -31.0 / 33.0), (-1.0, 0.5)):
+        assert row({"a": ERRORS["a"]}, result(higher=own))["gain"] == pytest.approx(gain)
+    both = {"a": {"used": 4.0, "higher": 2.0, "modified": 6.0}}
+    found = row(both, result(used=0.0, higher=1.0, modified=5.0))
+    assert found["gain"] == pytest.approx(0.25)  # of 4 and 3 %, each block with one weight
+    assert (found["error_percent"], found["textbook_percent"]) == pytest.approx((3.0, 4.0))
+    # Meeting what was given is no gain, but where a case holds nothing back.
+    assert row({"a": ERRORS["a"]}, result(used=0.0, higher=2.0))["gain"] == pytest.approx(0.0)
+    assert row({"a": {"used": 4.0}}, result(used=1.0))["gain"] == pytest.approx(0.75)
 
 
 @pytest.mark.parametrize(
-    ("status", "score"),
-    [("failed", 10), ("crashed", 10), ("timeout", 10), ("diverged", 10), ("not-applicable", 1)],
-)
-def test_score_of_a_job_without_model(status: str, score: float) -> None:
-    assert score_of(result("s", status=status), REFERENCE["a"]) == score
+    "more",
+    [
+        {"status": "failed"}, {"status": "crashed"}, {"status": "timeout"}, {"status": "diverged"},
+        {"status": "not-applicable"}, {"higher": 0.1, "negative_eigenvalues": 1},
+        {"higher": 0.1, "rigid_body_modes": 2, "rigid_body_modes_expected": 3},
+    ],
+)  # fmt: skip
+def test_without_a_possible_model_the_one_that_was_given_counts(more: dict[str, Any]) -> None:
+    for nominal, gain in (("textbook", 0.0), ("drawn", -0.75)):
+        drawn = {"a": {"used": 6.0, "higher": 8.0}}
+        run = scored.run(ERRORS, [result(**more, nominal=nominal)], drawn=drawn)
+        assert run.results[0].gain == pytest.approx(gain), nominal
+    found = row({"a": ERRORS["a"]}, result(**more))
+    assert found[["answered", "total", "gain"]].tolist() == [0, 1, 0.0]
+    assert found["unphysical"] == ("higher" in more)
 
 
-def test_ranks_go_by_physics_then_score() -> None:
-    results = [
-        result("zeta", rms=2.0),
-        result("best", rms=0.1, rigid_body_modes=2, rigid_body_modes_expected=3),
-        result("negative", rms=0.2, negative_eigenvalues=1),
-        result("alpha", rms=2.0),
-        result("gone", status="crashed"),
-        result("zeta", rms=9.0, case="b"),
+def test_a_missing_result_counts_as_the_model_that_was_given() -> None:
+    run = scored.run(ERRORS, [result(higher=1.0)], strategies=["s", "never"])
+    table = leaderboard(run).set_index("strategy")
+    assert table["gain"].to_dict() == pytest.approx({"s": 0.25, "never": 0.0})
+    assert table.loc["s", ["answered", "total"]].tolist() == [1, 2]
+
+
+def test_ranks_go_by_gain_alone() -> None:
+    listed = [
+        result(strategy="zeta", higher=1.0),
+        result(strategy="odd", higher=0.1, negative_eigenvalues=1),
+        result(strategy="alpha", higher=1.0),
+        result(strategy="gone", status="crashed"),
+        result(strategy="worse", higher=3.0),
+        result("b", "zeta", higher=9.0),
     ]
-    found = rank_results(results, REFERENCE)
+    found = scored.run(ERRORS, listed).results
     places = [(item.strategy, item.rank) for item in found]
     assert places == [
-        ("zeta", 1),
-        ("best", 3),
-        ("negative", 4),
-        ("alpha", 1),
-        ("gone", 5),
-        ("zeta", 1),
-    ]
-    assert [item.score for item in rank_results(found)] == [item.score for item in found]
+        ("zeta", 1), ("odd", 3), ("alpha", 1), ("gone", 3), ("worse", 5), ("zeta", 1),
+    ]  # fmt: skip
+    assert rank_results(found, {}) == found  # of a run without models they stay as they are
 
 
-def test_equal_scores_share_a_rank_whatever_their_rounding() -> None:
+def test_equal_gains_share_a_rank_whatever_their_rounding() -> None:
     """As physical and nobari-rigid, which are one method on a ladder."""
     for noise in (0.0, 1e-12, -1e-12):
-        rms = {"beta": 2.0 * (1.0 + noise), "last": 2.1, "alpha": 2.0, "first": 1.0}
-        results = [result(name, rms=value) for name, value in rms.items()]
-        assert {r.strategy: r.rank for r in rank_results(results, REFERENCE)} == {
-            "first": 1,
-            "alpha": 2,
-            "beta": 2,
-            "last": 4,
-        }
-        meta = {**META, "reference": {"a": REFERENCE["a"]}}
-        table = leaderboard(Run(meta, tuple(results)))
-        assert table["strategy"].tolist() == ["first", "alpha", "beta", "last"]
-        assert table["rank"].tolist() == [1, 2, 2, 4]
+        errors = {"beta": 1.0 * (1.0 + noise), "last": 1.5, "alpha": 1.0, "first": 0.5}
+        run = scored.run(
+            {"a": ERRORS["a"]}, [result(strategy=n, higher=e) for n, e in errors.items()]
+        )
+        ranks = {"first": 1, "alpha": 2, "beta": 2, "last": 4}
+        assert {r.strategy: r.rank for r in run.results} == ranks
+        table = leaderboard(run)
+        assert dict(zip(table["strategy"], table["rank"], strict=True)) == ranks
+        assert table["strategy"].tolist() == list(ranks)
 
 
 def test_ties_are_transitive_and_end_at_a_gap() -> None:
-    scores = [1.0 + 0.9e-6 * k for k in range(4)] + [1.0 + 5e-6]
-    items = list(zip("dcbae", scores, strict=True))
+    numbers = [1.0 + 0.9e-6 * k for k in range(4)] + [1.0 + 5e-6]
+    items = list(zip("dcbae", numbers, strict=True))
     for order in (items, items[::-1]):
         found = rank_items(order, lambda item: ((), item[1], item[0]))
         assert [(rank, name) for rank, (name, _) in found] == [
@@ -311,169 +314,88 @@ def test_ties_are_transitive_and_end_at_a_gap() -> None:
     assert tiers == [(1, "y"), (2, "x")]
 
 
-def test_without_reference_the_result_of_the_baseline_serves() -> None:
-    found = rank_results(
-        [result("still", rms=2.0), result("good", rms=1.0), result("x", case="b")],
-        baseline="still",
-    )
-    assert [item.score for item in found] == pytest.approx([1.0, 1.05 / 2.05, 10.0])
+def test_yardsticks_stand_in_their_place_and_have_no_rank() -> None:
+    errors = {"best": 0.5, "line": 1.0, "last": 1.5}
+    listed = [result(strategy=name, higher=error) for name, error in errors.items()]
+    table = leaderboard(scored.run({"a": ERRORS["a"]}, listed, yardsticks={"line": "a line"}))
+    assert table["strategy"].tolist() == ["best", "line", "last"]
+    assert table["rank"].tolist()[::2] == [1, 2]
+    assert np.isnan(table["rank"][1])
 
 
-def board(reference: dict[str, dict[str, float]], *results: JobResult, **meta: Any) -> Any:
-    return leaderboard(Run({**META, "reference": reference, **meta}, results)).iloc[0]
+def test_every_structure_counts_once_however_many_cases_and_seeds_it_has() -> None:
+    errors = {name: {"higher": 4.0} for name in "abc"}
+    own = {"a": 2.0, "b": 3.0, "c": 0.0}
+    listed = [result(name, higher=error) for name, error in own.items()]
+    assert row(errors, *listed)["gain"] == pytest.approx((0.5 + 0.25 + 1.0) / 3)
+    one = row(errors, *listed, structures={"a": "x", "b": "x"})
+    assert one["gain"] == pytest.approx((0.375 + 1.0) / 2)
+    assert one["error_percent"] == pytest.approx(1.25)
+    seeds = [result("a", seed=k, higher=error) for k, error in enumerate((2.0, 4.0, 8.0))]
+    assert row({"a": errors["a"]}, *seeds, seeds=[0, 1, 2])["gain"] == pytest.approx(0.0)
 
 
-def with_blocks(case: str, **errors: float) -> JobResult:
-    return replace(
-        result("s", case=case), blocks={k: Block(rms, None, ()) for k, rms in errors.items()}
-    )
-
-
-def test_skill_is_what_is_taken_away_of_the_error_on_unseen_data() -> None:
-    results = (result("s", rms=1.0), with_blocks("b", used=3.0, higher=4.0))
-    row = board(REFERENCE, *results)
-    ratios = [1.05 / 2.05, 4.05 / 5.05]
-    assert row["skill"] == pytest.approx(1.0 - math.sqrt(np.prod(ratios)), rel=1e-12)
-    assert row["used_percent"] == 2.0  # the median over the two cases
-    assert row["higher_percent"] == 2.5
-    assert np.isnan(row["modified_percent"])
-    better = board(
-        REFERENCE,
-        *(replace(item, blocks={**item.blocks, "used": Block(0.0, None, ())}) for item in results),
-    )
-    assert better["skill"] == row["skill"]  # meeting what was given is no skill
-
-
-def test_every_structure_counts_once_however_many_cases_it_has() -> None:
-    reference = {name: {"used": 1.0, "higher": 1.0} for name in "abc"}
-    errors = {"a": 3.0, "b": 3.0, "c": 0.5}
-    results = [with_blocks(name, higher=rms) for name, rms in errors.items()]
-    apart = board(reference, *results)
-    assert 1.0 - apart["skill"] == pytest.approx((3.05**2 * 0.55) ** (1 / 3) / 1.05)
-    one = board(reference, *results, structures={"a": "x", "b": "x"})
-    assert 1.0 - one["skill"] == pytest.approx((3.05 * 0.55) ** 0.5 / 1.05)
-
-
-def test_data_that_two_cases_of_a_structure_share_count_once() -> None:
-    reference = {"a": {"higher": 2.0, "modified": 1.0}, "b": {"modified": 1.0}}
-    results = [with_blocks("a", higher=1.0, modified=4.0), with_blocks("b", modified=4.0)]
-    row = board(reference, *results, structures={"a": "x", "b": "x"})
-    alone = board({"a": reference["a"]}, results[0])
-    assert row["skill"] == pytest.approx(alone["skill"], rel=1e-14)
-    other = board(reference | {"b": {"modified": 1.1}}, *results, structures={"a": "x", "b": "x"})
-    assert other["skill"] < row["skill"] - 0.05
-
-
-@pytest.mark.parametrize("floor", [0.005, 0.2])
-def test_what_is_added_to_all_errors_can_be_chosen(floor: float) -> None:
-    run = Run({**META, "reference": {"a": {"higher": 2.0}}}, (with_blocks("a", higher=1.0),))
-    left = 1.0 - leaderboard(run, floor)["skill"][0]
-    assert left == pytest.approx((1.0 + floor) / (2.0 + floor))
-
-
-def test_ranks_that_rest_on_the_floor_are_told() -> None:
-    reference = {"a": {"higher": 1.0}, "b": {"higher": 1.0}}
-    errors = {"met": (0.0, 4.0), "even": (0.45, 0.45)}
-    results = [
-        replace(with_blocks(case, higher=rms), strategy=name)
-        for name, pair in errors.items()
-        for case, rms in zip("ab", pair, strict=True)
-    ]
-    found = ranks_by_floor(Run({**META, "reference": reference}, tuple(results)))
-    assert found == {"met": (1, 1, 1, 2, 2), "even": (2, 2, 2, 1, 1)}
-
-
-def test_a_missing_result_scores_ten_and_a_strategy_without_any_is_there() -> None:
-    run = Run({**META, "strategies": ["s", "never"]}, (result("s", rms=1.0),))
-    table = leaderboard(run).set_index("strategy")
-    expected = 1.0 - math.sqrt(1.05 / 2.05 * 10.0)
-    assert table.loc["s", "skill"] == pytest.approx(expected, rel=1e-12)
-    assert table.loc["never", "skill"] == pytest.approx(-9.0)
-    assert table.loc["s", ["ok", "total"]].tolist() == [1, 2]
+def test_how_many_structures_are_better_and_much_worse() -> None:
+    errors = {name: {"higher": 4.0} for name in "abcd"}
+    own = {"a": 3.9, "b": 4.0, "c": 4.9, "d": 5.1}
+    found = row(errors, *(result(name, higher=error) for name, error in own.items()))
+    assert (found["better_share"], found["worse_share"]) == (0.25, 0.25)
 
 
 def test_a_case_that_holds_nothing_back_counts_only_among_its_like() -> None:
-    reference = {"a": {"used": 4.0, "higher": 2.0, "modified": 1.0}, "b": {"used": 3.0}}
-    seen = with_blocks("a", used=0.0, higher=1.0, modified=2.0)
-    row = board(reference, seen, result("s", rms=0.0, case="b"))
-    expected = 1.0 - math.sqrt((1.05 / 2.05) * (2.05 / 1.05))
-    assert row["skill"] == pytest.approx(expected, rel=1e-12)
-    assert row[["ok", "total"]].tolist() == [2, 2]
-    assert board(reference, result("s", case="b"))["skill"] == pytest.approx(-9.0)
-    given = Run({**META, "reference": {"b": {"used": 3.0}}}, (result("s", case="b"),))
-    assert leaderboard(given)["skill"][0] == pytest.approx(1.0 - 1.05 / 3.05)
+    errors = {"a": ERRORS["a"], "b": {"used": 3.0}}
+    seen = result(used=0.0, higher=1.0)
+    found = row(errors, seen, result("b", used=0.0))
+    assert found["gain"] == pytest.approx(0.5)
+    assert found[["answered", "total"]].tolist() == [2, 2]
+    given = scored.run({"b": {"used": 3.0}}, [result("b", used=1.5)])
+    assert leaderboard(given)["gain"][0] == pytest.approx(0.5)
     assert find_basis(given) == "given"
-    assert find_basis(Run({**META, "reference": reference}, (seen,))) == "unseen"
+    assert find_basis(scored.run(errors, [seen])) == "unseen"
 
 
 def test_tests_stand_apart_from_computed_truths() -> None:
-    reference = {"a": {"higher": 1.0}, "b": {"higher": 1.0}}
-    results = (with_blocks("a", higher=0.5), with_blocks("b", higher=3.0))
-    row = board(reference, *results, classes={"b": ["free"]})
-    assert row["skill_tests"] == pytest.approx(1.0 - 0.55 / 1.05)
-    assert np.isnan(board(reference, *results)["skill_tests"])
+    errors = {"a": {"higher": 1.0}, "b": {"higher": 1.0}}
+    listed = (result(higher=0.5), result("b", higher=3.0))
+    assert row(errors, *listed, classes={"b": ["free"]})["gain_tests"] == pytest.approx(0.5)
+    assert np.isnan(row(errors, *listed)["gain_tests"])
 
 
-def test_ranks_are_from_the_textbook_model_and_the_start_as_drawn_is_beside() -> None:
-    reference = {"a": {"higher": 1.0}, "b": {"higher": 1.0}}
+def test_ranks_are_from_the_textbook_model_and_the_start_as_drawn_stands_next_to_it() -> None:
+    errors = {"a": {"higher": 1.0}, "b": {"higher": 1.0}}
     starts = {"starts": {"a": ["textbook", "drawn"], "b": ["textbook"]}, "alike": ["b"]}
-    results = [
-        replace(with_blocks("a", higher=0.5), nominal="textbook"),
-        replace(with_blocks("a", higher=2.0), negative_eigenvalues=1),
-        replace(with_blocks("b", higher=1.0), nominal="textbook"),
+    listed = [
+        result(higher=0.5, nominal="textbook"),
+        result(higher=2.0, nominal="drawn"),
+        result("b", higher=1.0, nominal="textbook"),
     ]
-    run = Run({**META, "reference": reference, **starts}, rank_results(results, reference))
-    row = leaderboard(run).iloc[0]
-    assert row["skill"] == pytest.approx(1.0 - math.sqrt(0.55 / 1.05))
-    assert row["skill_drawn"] == pytest.approx(1.0 - math.sqrt(2.05 / 1.05))
-    assert not row["unphysical"]
-    assert row["total"] == 2
+    run = scored.run(errors, listed, drawn={"a": {"higher": 3.0}}, **starts)
+    found = leaderboard(run).iloc[0]
+    assert found["gain"] == pytest.approx(0.25)
+    assert found["gain_drawn"] == pytest.approx(-0.25)
+    assert found["total"] == 2
     assert [item.rank for item in run.results] == [1, 1, 1]
+    # What fails from the model as drawn leaves that.
+    lost = [listed[0], result(status="failed", nominal="drawn"), listed[2]]
+    again = scored.run(errors, lost, drawn={"a": {"higher": 3.0}}, **starts)
+    assert leaderboard(again)["gain_drawn"][0] == pytest.approx(-1.0 / 3.0)
 
 
-def test_who_is_not_applicable_scores_as_the_model_that_was_given() -> None:
-    errors = {"used": 6.0, "higher": 8.0}
-    drawn = {name: Block(error, None, ()) for name, error in errors.items()}
-    idle = replace(result("idle", status="not-applicable"), start_percent=errors)
-    same = replace(result("same"), blocks=drawn)
-    assert score_of(idle, REFERENCE["a"]) == score_of(same, REFERENCE["a"])
-    assert score_of(idle, REFERENCE["a"]) == pytest.approx(8.05 / 2.05, rel=1e-14)
-    found = rank_results(
-        [idle, same, result("better", rms=1.9), result("worse", rms=9.0)], REFERENCE
-    )
-    assert [(item.strategy, item.rank) for item in found] == [
-        ("idle", 2), ("same", 2), ("better", 1), ("worse", 4),
-    ]  # fmt: skip
-    assert rank_results(found) == found
-    # From the textbook model it stays on the line that a measurement has to pass.
-    starts = {"starts": {"a": ["textbook", "drawn"]}, "reference": {"a": REFERENCE["a"]}}
-    line = replace(result("idle", status="not-applicable"), nominal="textbook")
-    row = leaderboard(Run({**META, **starts}, (line, idle))).iloc[0]
-    assert row["skill"] == 0.0
-    assert row["skill_drawn"] == pytest.approx(1.0 - 8.05 / 2.05, rel=1e-14)
-    assert np.isnan(row["higher_percent"])  # it is no model of the strategy's
+def test_several_seeds_of_few_structures_give_an_interval_over_seeds() -> None:
+    listed = [result(seed=k, higher=e) for k, e in enumerate((1.0, 1.2, 0.8, 0.5, 1.5))]
+    stated = {"seeds": list(range(5))}
+    found = row({"a": ERRORS["a"]}, *listed, **stated)
+    assert found["gain"] == pytest.approx(0.5)
+    assert found["gain_low"] < found["gain"] < found["gain_high"]
+    again = row({"a": ERRORS["a"]}, *reversed(listed), **stated)
+    assert again["gain_low"] == pytest.approx(found["gain_low"])
+    assert np.isnan(row({"a": ERRORS["a"]}, listed[0])["gain_low"])
 
 
-def test_the_unphysical_rank_below_the_physical_and_no_model_at_all_below_both() -> None:
-    lost = result("lost", rms=0.1, rigid_body_modes=1, rigid_body_modes_expected=3)
-    fine = result("lost", rms=0.1, case="b", rigid_body_modes=3, rigid_body_modes_expected=3)
-    bad = [result("bad", status="failed"), result("bad", status="failed", case="b")]
-    poor = [result("poor", rms=50.0), result("poor", status="failed", case="b")]
-    table = leaderboard(Run(META, (lost, fine, *bad, *poor)))
-    assert table["strategy"].tolist() == ["poor", "lost", "bad"]
-    assert table["rank"].tolist() == [1, 2, 3]
-    assert table["unphysical"].tolist() == [False, True, False]
-    assert table["rigid_modes_lost"].tolist() == [0, 2, 0]
-
-
-def test_several_seeds_give_the_median_and_an_interval() -> None:
-    errors = [1.0, 3.0, 2.0, 5.0, 4.0]
-    results = [result("s", seed=k, rms=rms) for k, rms in enumerate(errors)]
-    meta = {**META, "reference": {"a": REFERENCE["a"]}, "seeds": list(range(5))}
-    row = leaderboard(Run(meta, tuple(results))).iloc[0]
-    assert row["skill"] == pytest.approx(1.0 - 3.05 / 2.05, rel=1e-12)
-    assert row["skill_low"] < row["skill"] < row["skill_high"]
-    again = leaderboard(Run(meta, tuple(reversed(results)))).iloc[0]
-    assert again.to_dict() == pytest.approx(row.to_dict(), nan_ok=True)
-    one = leaderboard(Run(META, (result("s"),))).iloc[0]
-    assert np.isnan(one["skill_low"])
+def test_a_run_without_what_its_gains_rest_on_is_to_be_run_again() -> None:
+    old = Run({"run": "old", "reference": {"a": {"higher": 2.0}}}, (result(higher=1.0),))
+    with pytest.raises(InputError, match=r"keeps no candidate partners of case 'a'.*run it again"):
+        leaderboard(old)
+    lacking = scored.run(ERRORS, [result("c", higher=1.0)])
+    with pytest.raises(InputError, match=r"case 'c'.*run it again"):
+        leaderboard(lacking)

@@ -30,7 +30,10 @@ from femubench.core.schema.results import Block, JobResult, Run
 
 FLIPS = 300
 RUN = "20260101T000000Z-000000"
-META = {"run": RUN, "seeds": [*range(3)], "cases": {"corner": {}}, "strategies": ["a", "b"]}
+META: dict[str, Any] = {
+    **{"run": RUN, "seeds": [*range(3)], "cases": {"corner": {}}, "strategies": ["a", "b"]},
+    "models": {"corner": {"drawn": {"used": {"rms_percent": 2.0, "modes": []}}}},
+}
 RESULTS = tuple(
     JobResult(
         "corner",
@@ -39,7 +42,6 @@ RESULTS = tuple(
         "ok",
         seconds=0.25 * seed,
         blocks={"used": Block(3.0 + seed, 0.9, (PairedMode(1, 100.0, 101.0 + seed, 0.99),))},
-        score=1.0,
         parameters=({"name": "E", "before": 1.0, "after": 0.9, "unit": "", "std": None},),
         history=({"residual": 0.5 / (1 + seed)},),
         key=f"{seed}{strategy}" * 8,
@@ -134,7 +136,7 @@ def test_the_jobs_that_are_missing_are_named(ended: bool, tmp_path: Path) -> Non
             break
         edit(file, f"DELETE FROM records WHERE number = {place}", *end)
         name = f"corner {lost.strategy} seed {lost.seed} drawn"
-        said = "1 of 6 jobs are missing and score as failures: "
+        said = "1 of 6 jobs are missing and count as the model that was given: "
         said = said if ended else "the run has not ended: 5 of 6 jobs are there; not run: "
         assert store.load().meta["notes"][-1] == said + name
         file.write_bytes(whole)
@@ -348,7 +350,10 @@ def test_a_report_leaves_out_what_is_damaged(tmp_path: Path) -> None:
     done = CliRunner().invoke(bench, words)
     assert len(done.stdout.splitlines()) == len(RESULTS)
     assert "sqlite:2: damaged" in done.stderr
-    assert "1 of 6 jobs are missing and score as failures: corner a seed 0 drawn" in done.stderr
+    assert (
+        "1 of 6 jobs are missing and count as the model that was given: corner a seed 0 drawn"
+        in done.stderr
+    )
 
 
 def test_a_comparison_tells_what_is_damaged(tmp_path: Path) -> None:

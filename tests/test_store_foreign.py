@@ -171,8 +171,9 @@ def test_jobs_that_a_file_claims_are_counted_not_made() -> None:
     meta = {"cases": many, "strategies": [f"s-{n}" for n in range(10**3)], "seeds": [*range(10**3)]}
     there = [JobResult("case-0", "s-0", 0, "ok"), JobResult("other", "s-0", 0, "ok")]
     assert note_missing_jobs(meta, there) == (
-        "9999999999 of 10000000000 jobs are missing and score as failures: case-0 s-1 seed 0 drawn,"
-        " case-0 s-2 seed 0 drawn, case-0 s-3 seed 0 drawn, case-0 s-4 seed 0 drawn,"
+        "9999999999 of 10000000000 jobs are missing and count as the model that was given: "
+        "case-0 s-1 seed 0 drawn, case-0 s-2 seed 0 drawn, case-0 s-3 seed 0 drawn,"
+        " case-0 s-4 seed 0 drawn,"
         " case-0 s-5 seed 0 drawn and 9999999994 more"
     )
 

@@ -22,7 +22,7 @@ from femubench.core.errors import InputError, NotApplicable
 from femubench.core.run.companions import choose_beside
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.starts import Starts
-from femubench.core.score.twin_skill import TwinSkill, twin_skills
+from femubench.core.score.twin_gain import TwinGain, twin_gains
 from femubench.core.twin.reduced_solid import ReducedSolid
 from femubench.core.twin.stretched_case import FILE, draw_stretched_case, stretch_case
 from femubench.core.twin.twins import FAMILIES, TruthFamily, twin_of, twins_of
@@ -286,20 +286,20 @@ def test_a_case_without_a_file_has_none_of_them() -> None:
         draw_stretched_case(toys.tiny_case(), np.random.default_rng(0))
 
 
-def skill(families: Mapping[str, TruthFamily]) -> dict[str, TwinSkill]:
+def gain(families: Mapping[str, TruthFamily]) -> dict[str, TwinGain]:
     """What twins of some families say of who knows ratios by heart, and of who does nothing."""
     case = builtin("stiffened-strip")
     twins = list(twins_of([case], 2, 13, families))
     truth = stretch_case(case, ReducedSolid.read(case.folder / FILE), np.ones(4), None)
     able = [toys.Unchanged(), Ratios(tuple(truth.measurement.frequencies))]
     starts = Starts(companions=choose_beside([case], twins, 2, 13))
-    return twin_skills(run_jobs([case], able, jobs=1, starts=starts))
+    return twin_gains(run_jobs([case], able, jobs=1, starts=starts))
 
 
 def test_who_knows_ratios_by_heart_is_marked_by_stretched_twins_alone() -> None:
-    similar, stretched_too = skill({"similar": FAMILIES["similar"]}), skill(FAMILIES)
-    assert similar["ratios"].original_skill > 0.5
-    assert similar["ratios"].skill == pytest.approx(similar["ratios"].original_skill, abs=1e-3)
+    similar, stretched_too = gain({"similar": FAMILIES["similar"]}), gain(FAMILIES)
+    assert similar["ratios"].original_gain > 0.5
+    assert similar["ratios"].gain == pytest.approx(similar["ratios"].original_gain, abs=1e-3)
     assert not similar["ratios"].suspicious
     assert stretched_too["ratios"].known == ("suite/stiffened-strip",)
     assert not stretched_too["unchanged"].suspicious
@@ -309,7 +309,7 @@ def test_strategies_that_reckon_are_not_marked() -> None:
     names = ["local", "offset", "sparse", "eigensensitivity", "baruch"]
     cases = ["suite/stiffened-strip", "suite/bracket"]
     run = femubench.rank(cases, names, twins=(2, 21), nominal="textbook", jobs=1)
-    found = twin_skills(run)
+    found = twin_gains(run)
     assert sorted(found) == sorted(names)
     assert {kind for kinds in run.meta["twins"]["kinds"].values() for kind in kinds} == {
         *("stretched", "similar")

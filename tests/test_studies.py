@@ -1,4 +1,4 @@
-"""Studies: what is expanded, what strategies see of it, how skill is taken together."""
+"""Studies: what is expanded, what strategies see of it, how gain is taken together."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult
 from femubench.core.study.conditions import vary_case
 from femubench.core.study.study_file import read_study
-from femubench.results import leaderboard, results_frame, skill_by
+from femubench.results import gain_by, leaderboard, results_frame
 from tests.test_cli import put_case
 
 SENSORS = "label,x,y,z,direction\n" + "".join(f"s{i},{i / 5},0,0,z\n" for i in range(1, 6))
@@ -188,27 +188,27 @@ class TestRun:
         }  # fmt: skip
 
     def test_cells_are_leaderboards_of_their_own(self, spied: Run) -> None:
-        table = skill_by(spied, "noise", "spy.factor").set_index(["noise", "spy.factor"])
+        table = gain_by(spied, "noise", "spy.factor").set_index(["noise", "spy.factor"])
         assert table["jobs"].tolist() == [4] * 6
         alone = Run(
             {**spied.meta, "strategies": ["spy:factor=1.2"]},
             tuple(r for r in spied.results if r.strategy == "spy:factor=1.2"),
         )
-        expected = leaderboard(alone)["skill"][0]
-        assert_allclose(table["skill"][[(1.0, 1.2), (2.0, 1.2)]], expected)
+        expected = leaderboard(alone)["gain"][0]
+        assert_allclose(table["gain"][[(1.0, 1.2), (2.0, 1.2)]], expected)
         broken = table.loc[(2.0, BROKEN)]
         assert (broken["failed"], broken["missing"]) == (4, 0)
-        assert broken["skill"] == pytest.approx(-9.0)  # ten times the error
+        assert broken["gain"] == 0.0  # as the model that was given
         part = Run(spied.meta, spied.results[1:])
-        assert skill_by(part, "spy.factor")["missing"].tolist() == [1, 0, 0]
+        assert gain_by(part, "spy.factor")["missing"].tolist() == [1, 0, 0]
 
     def test_axes_that_are_left_out_are_taken_together(self, spied: Run) -> None:
-        assert list(skill_by(spied).columns[:3]) == ["noise", "sensors_left_out", "spy.factor"]
-        assert len(skill_by(spied)) == 2 * 2 * 3
-        (whole,) = skill_by(spied, "strategy").to_dict("records")
+        assert list(gain_by(spied).columns[:3]) == ["noise", "sensors_left_out", "spy.factor"]
+        assert len(gain_by(spied)) == 2 * 2 * 3
+        (whole,) = gain_by(spied, "strategy").to_dict("records")
         assert (whole["jobs"], whole["failed"]) == (24, 8)
         with pytest.raises(InputError, match="no axis 'nois'; did you mean 'noise'"):
-            skill_by(spied, "nois")
+            gain_by(spied, "nois")
 
     def test_results_by_row_have_the_axes(self, spied: Run) -> None:
         frame = results_frame(spied)
@@ -228,7 +228,7 @@ class TestRun:
             assert "the factor is 9" in " ".join(str(texts[name]).split())
         assert "<svg" in str(texts["html"])
         cells = json.loads(str(texts["json"]))["cells"]
-        assert [cell["skill"] for cell in cells] == skill_by(spied)["skill"].tolist()
+        assert [cell["gain"] for cell in cells] == gain_by(spied)["gain"].tolist()
 
     def test_heat_map_has_a_number_and_a_hatch_a_cell(self, spied: Run) -> None:
         ax = plot.heat_map(spied, "noise", "spy.factor")
@@ -262,10 +262,10 @@ class TestResume:
         assert seen == list(range(1, 9))
         assert store.runs() == (early.meta["run"],)
         whole = run_plan(plan, 2, Store("calm"))
-        fields = ("status", "score", "key", "blocks", "diagnostics")
+        fields = ("status", "gain", "key", "blocks", "diagnostics")
         assert values(resumed, *fields) == values(whole, *fields)
-        assert resumed.skill_by().equals(
-            whole.skill_by().assign(seconds=resumed.skill_by()["seconds"])
+        assert resumed.gain_by().equals(
+            whole.gain_by().assign(seconds=resumed.gain_by()["seconds"])
         )
         again = run_plan(plan, 2, store)
         assert [r.seconds for r in again.results] == [r.seconds for r in resumed.results]

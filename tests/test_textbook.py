@@ -85,15 +85,15 @@ def test_a_run_from_the_textbook_model_measures_against_it(tmp_path: Path) -> No
     wanted = ("frame", ["unchanged", "textbook"])
     drawn = femubench.rank(*wanted, jobs=1, store=tmp_path, nominal="drawn")
     repaired = femubench.rank(*wanted, jobs=1, store=tmp_path, nominal="textbook")
-    scores = {
+    jobs = {
         run.meta["request"]["nominal"]: run.table.set_index("strategy") for run in (drawn, repaired)
     }
     # Both runs measure against the textbook model, from wherever they start.
-    assert scores["drawn"].loc["unchanged", "score"] > 2.0
-    assert scores["drawn"].loc["textbook", "score"] == pytest.approx(1.0, abs=1e-9)
-    assert scores["textbook"].loc["textbook", "score"] == pytest.approx(1.0, abs=1e-9)
-    unchanged = scores["textbook"].loc["unchanged"]
-    assert unchanged["used_percent"] == scores["drawn"].loc["textbook", "used_percent"]
+    assert jobs["drawn"].loc["unchanged", "gain"] < -0.5
+    assert jobs["drawn"].loc["textbook", "gain"] == pytest.approx(0.0, abs=1e-9)
+    assert jobs["textbook"].loc["textbook", "gain"] == pytest.approx(0.0, abs=1e-9)
+    unchanged = jobs["textbook"].loc["unchanged"]
+    assert unchanged["used_percent"] == jobs["drawn"].loc["textbook", "used_percent"]
     assert request_of(repaired).nominal == "textbook"
     assert len({result.key for run in (drawn, repaired) for result in run.results}) == 4
     again = femubench.rank(jobs=1, store=tmp_path, resume=True, overwrite="missing")
@@ -104,14 +104,14 @@ def test_a_run_starts_from_both_models_and_ranks_from_the_textbook_one(tmp_path:
     case = femubench.cases["frame"]
     plain = replace(case, name="plain", model=as_matrices(case.model))
     both = femubench.rank([case, plain], "unchanged", jobs=1, store=tmp_path)
-    found = [(item.case, item.nominal, round(item.score or 0.0, 6)) for item in both.results]
+    found = [(item.case, item.nominal, round(item.gain or 0.0, 6)) for item in both.results]
     # Matrices have no textbook: they are run once.
-    assert found[0] == ("frame", "textbook", 1.0)
+    assert found[0] == ("frame", "textbook", 0.0)
     assert found[1][:2] == ("frame", "drawn")
-    assert found[2:] == [("plain", "textbook", 1.0)]
+    assert found[2:] == [("plain", "textbook", 0.0)]
     row = both.leaderboard.iloc[0]
-    assert row["skill"] == pytest.approx(0.0, abs=1e-9)
-    assert row["skill_drawn"] == pytest.approx(1.0 - (found[1][2] or 0.0) ** 0.5, abs=1e-5)
+    assert row["gain"] == pytest.approx(0.0, abs=1e-9)
+    assert row["gain_drawn"] == pytest.approx((found[1][2] or 0.0) / 2.0, abs=1e-5)
     assert [item.case for item in both.started_from("drawn")] == ["frame", "plain"]
     again = femubench.rank([case, plain], "unchanged", jobs=1, store=tmp_path, resume=True)
     assert again.results == both.results
@@ -160,7 +160,7 @@ def test_the_screen_says_where_all_start_from(tmp_path: Path) -> None:
     assert "nominal cannot be given with it" in locked.output
 
 
-def test_who_is_not_applicable_scores_as_who_leaves_the_model_as_it_is(tmp_path: Path) -> None:
+def test_who_is_not_applicable_counts_as_who_leaves_the_model_as_it_is(tmp_path: Path) -> None:
     still = femubench.strategies["unchanged"]
     both = [still, toys.Declining()]
     run = femubench.rank(["frame", "suite/bracket"], both, jobs=1, store=tmp_path)
@@ -168,17 +168,14 @@ def test_who_is_not_applicable_scores_as_who_leaves_the_model_as_it_is(tmp_path:
     for case, _, nominal in own:
         found, companions = own[case, "declining", nominal], own[case, "unchanged", nominal]
         assert (found.status, found.blocks) == ("not-applicable", {})
-        assert found.score == pytest.approx(companions.score, rel=1e-9)
+        assert found.gain == pytest.approx(companions.gain, rel=1e-9)
         assert found.rank == companions.rank == 1
-        given = {name: block.rms_percent for name, block in companions.blocks.items()}
-        drawn = nominal == "drawn"
-        assert found.start_percent == (pytest.approx(given, rel=1e-9) if drawn else {})
-    assert own["frame", "declining", "textbook"].score == 1.0
-    assert own["frame", "declining", "drawn"].score > 1.5
+    assert own["frame", "declining", "textbook"].gain == 0.0
+    assert own["frame", "declining", "drawn"].gain < -0.5
     assert ("suite/bracket", "declining", "drawn") not in own  # matrices have no textbook
     board = run.leaderboard.set_index("strategy")
-    assert board.loc["declining", "skill_drawn"] == pytest.approx(
-        board.loc["unchanged", "skill_drawn"]
+    assert board.loc["declining", "gain_drawn"] == pytest.approx(
+        board.loc["unchanged", "gain_drawn"]
     )
     again = Store(tmp_path).load(run.meta["run"])
     assert again.results == run.results

@@ -6,10 +6,12 @@ import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import harness_toys as toys
 import numpy as np
 import pytest
+import scored
 from click.testing import CliRunner
 from twin_toys import Chance, Drawn, Memory
 
@@ -48,10 +50,10 @@ from femubench.core.run.runner import run_jobs
 from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
 from femubench.core.schema.records import run_from_json, run_to_json
-from femubench.core.schema.results import Run
+from femubench.core.schema.results import JobResult, Run
 from femubench.core.score.repeatability import unsteady
 from femubench.core.score.scoring import judge, reference_of
-from femubench.core.score.twin_skill import twin_skills
+from femubench.core.score.twin_gain import twin_gains
 from femubench.core.twin.disguise import disguise_case
 from femubench.core.twin.similarity import Similarity, matrix_factors, similar_case, similar_frame
 from femubench.core.twin.twins import FAMILIES, Twin, again, twin_of, twins_of
@@ -293,87 +295,81 @@ def run() -> Run:
 
 
 def test_who_knows_a_case_by_heart_is_marked(run: Run) -> None:
-    found = twin_skills(run)
-    assert found["memory"].original_skill > 0.8
-    assert found["memory"].skill == pytest.approx(0.0, abs=1e-6)
+    found = twin_gains(run)
+    assert found["memory"].original_gain > 0.8
+    assert found["memory"].gain == pytest.approx(0.0, abs=1e-6)
     assert found["memory"].suspicious
     assert found["memory"].known == ("frame-solid",)
     honest = {name for name, item in found.items() if not item.suspicious}
     assert honest == {"unchanged", "chance", "drawn"}
-    assert found["unchanged"].skill == pytest.approx(found["unchanged"].original_skill, abs=1e-9)
+    assert found["unchanged"].gain == pytest.approx(found["unchanged"].original_gain, abs=1e-9)
 
 
-def test_over_many_structures_the_signs_decide(run: Run) -> None:
-    # Twelve structures, on the twins of which a strategy leaves a fifth more error: no single case.
-    meta = {"reference": {}, "structures": {}, "twins": {**run.meta["twins"], "reference": {}}}
-    meta["twins"] |= {"of": {}, "again": {}}
+def with_twins(here: JobResult, *there: JobResult) -> Run:
+    """Return a run of one case, of a textbook error of 3 %, with twins of it."""
+    stated = scored.meta({"one": {"used": 1.0, "higher": 3.0}})
+    names = {result.case: "one" for result in there}
+    models = dict.fromkeys(names, stated["models"]["one"])
+    twins = {"of": names, "again": {}, "models": models}
+    return Run({**stated, "twins": twins}, (here,), there)
+
+
+def answer(case: str, error: float, **more: Any) -> JobResult:
+    return scored.result(case, higher=error, **more)
+
+
+def test_over_many_structures_the_signs_decide() -> None:
+    # Twelve structures, on the twins of which a strategy leaves more error: no single case.
+    cases = [f"case-{i}" for i in range(12)]
+    meta = scored.meta({name: {"used": 1.0, "higher": 3.0} for name in cases})
+    twins = {f"{name}~1": name for name in cases}
+    meta["twins"] = {
+        "of": twins,
+        "again": {},
+        "models": {twin: meta["models"][name] for twin, name in twins.items()},
+    }
     results, others = [], []
     for strategy, factor in (("knows", 1.2), ("none", 1.0), ("slightly", 1.05)):
-        for i in range(12):
-            name = f"case-{i}"
-            meta["reference"][name] = meta["twins"]["reference"][f"{name}~1"] = {"higher": 3.0}
-            meta["twins"]["of"][f"{name}~1"] = name
-            block = run.results[0].blocks["higher"]
-            for listed, called, f in ((results, name, 1.0), (others, f"{name}~1", factor)):
-                error = {"higher": replace(block, rms_percent=(2.0 + 0.01 * i) * f)}
-                own = {"case": called, "strategy": strategy, "seed": 0, "blocks": error}
-                listed.append(replace(run.results[0], **own))
-    found = twin_skills(Run(meta, tuple(results), tuple(others)))
+        for i, name in enumerate(cases):
+            error = 2.0 + 0.01 * i
+            results.append(scored.result(name, strategy, higher=error))
+            others.append(scored.result(f"{name}~1", strategy, higher=error * factor))
+    run = Run(meta, tuple(results), tuple(others))
+    found = twin_gains(run)
     assert [found[n].suspicious for n in ("knows", "none", "slightly")] == [True, False, False]
     assert found["knows"].p is not None
     assert found["knows"].p < 0.01
     assert found["knows"].known == ()
+    # The lower gain is that of the board.
+    rows = leaderboard(run).set_index("strategy")["gain"]
+    assert rows["knows"] == pytest.approx(found["knows"].gain)
+    assert rows["none"] == pytest.approx(found["none"].original_gain)
 
 
-def test_one_twin_may_be_chance_and_who_is_never_good_knows_nothing(run: Run) -> None:
-    def with_scores(here: float, *there: float) -> bool:
-        names = {f"one~{i}": "one" for i, _ in enumerate(there, start=1)}
-        stated = {"of": names, "again": {}, "reference": {name: {"higher": 3.0} for name in names}}
-        meta = {"reference": {"one": {"higher": 3.0}}, "twins": stated}
-        jobs = [
-            replace(
-                run.results[0],
-                case=case,
-                seed=0,
-                strategy="s",
-                blocks={"higher": replace(run.results[0].blocks["higher"], rms_percent=rms)},
-            )
-            for case, rms in zip(("one", *names), (here, *there), strict=True)
-        ]
-        return twin_skills(Run(meta, tuple(jobs[:1]), tuple(jobs[1:])))["s"].suspicious
+def test_one_twin_may_be_chance_and_who_is_never_good_knows_nothing() -> None:
+    def suspicious(here: float, *there: float) -> bool:
+        listed = (answer(f"one~{i}", error) for i, error in enumerate(there, start=1))
+        return twin_gains(with_twins(answer("one", here), *listed))["s"].suspicious
 
-    assert with_scores(0.5, 2.0, 2.0)
-    assert not with_scores(0.5, 2.0)
-    assert not with_scores(0.5, 2.0, 0.6)
-    assert not with_scores(4.0, 20.0, 20.0)
+    assert suspicious(0.5, 2.0, 2.0)
+    assert not suspicious(0.5, 2.0)
+    assert not suspicious(0.5, 2.0, 0.6)
+    assert not suspicious(4.0, 20.0, 20.0)
 
 
-def test_a_job_that_was_stopped_says_nothing_of_what_a_strategy_knows(run: Run) -> None:
+def test_a_job_that_was_stopped_says_nothing_of_what_a_strategy_knows() -> None:
     """A twin that took too long, on a machine with more to do: the other answers are compared."""
-    stated = {f"one~{i}": "one" for i in (1, 2, 3)}
-    reference = {name: {"higher": 3.0} for name in stated}
-    meta = {
-        "reference": {"one": {"higher": 3.0}},
-        "twins": {"of": stated, "again": {}, "reference": reference},
-    }
-    answer = replace(
-        run.results[0],
-        case="one",
-        seed=0,
-        strategy="s",
-        blocks={"higher": replace(run.results[0].blocks["higher"], rms_percent=0.5)},
-    )
+    names, own = [f"one~{i}" for i in (1, 2, 3)], answer("one", 0.5)
     for status in ("timeout", "crashed"):
-        stopped = [replace(answer, case=name, status=status, blocks={}) for name in stated]
-        assert twin_skills(Run(meta, (answer,), tuple(stopped))) == {}
-        some = (*stopped[:2], replace(answer, case="one~3"))
-        found = twin_skills(Run(meta, (answer,), some))["s"]
-        assert found.skill == found.original_skill == pytest.approx(1.0 - 0.55 / 3.05)
+        stopped = [scored.result(name, status=status) for name in names]
+        assert twin_gains(with_twins(own, *stopped)) == {}
+        found = twin_gains(with_twins(own, *stopped[:2], answer("one~3", 0.5)))["s"]
+        assert found.gain == found.original_gain == pytest.approx(2.5 / 3.0)
         assert not found.suspicious
-        over = replace(answer, status=status, blocks={})
-        assert twin_skills(Run(meta, (over,), some)) == {}
-    failed = [replace(answer, case=name, status="failed", blocks={}) for name in stated]
-    assert twin_skills(Run(meta, (answer,), tuple(failed)))["s"].suspicious
+        over = scored.result("one", status=status)
+        assert twin_gains(with_twins(over, answer("one~3", 0.5))) == {}
+    failed = [scored.result(name, status="failed") for name in names]
+    assert twin_gains(with_twins(own, *failed))["s"].suspicious
 
 
 def test_who_answers_otherwise_every_time_is_found(run: Run) -> None:
@@ -382,7 +378,7 @@ def test_who_answers_otherwise_every_time_is_found(run: Run) -> None:
     assert run.meta["unsteady"] == unsteady(run)
 
 
-def test_no_figure_of_the_run_has_twins_in_it(run: Run) -> None:
+def test_twins_lower_gains_and_are_in_no_other_figure(run: Run) -> None:
     assert {result.case for result in run.results} == {"frame-solid"}
     assert set(run.meta["cases"]) == set(run.meta["reference"]) == {"frame-solid"}
     names = {"frame-solid~1", "frame-solid~2", "frame-solid~again"}
@@ -390,20 +386,25 @@ def test_no_figure_of_the_run_has_twins_in_it(run: Run) -> None:
     stated = {result.case: result.provenance for result in run.companions}
     assert stated["frame-solid~2"]["twin_of"] == "frame-solid"
     assert stated["frame-solid~again"]["again"] == "frame-solid"
-    alone = leaderboard(Run({k: v for k, v in run.meta.items() if k != "twins"}, run.results))
-    assert leaderboard(run).equals(alone)
+    bare = Run({k: v for k, v in run.meta.items() if k != "twins"}, run.results)
+    alone, own = (leaderboard(one).set_index("strategy") for one in (bare, run))
+    assert own["higher_percent"].equals(alone["higher_percent"].loc[own.index])
+    # The lower of case and twin: what was known by heart is no gain.
+    assert alone.loc["memory", "gain"] > 0.8
+    assert own.loc["memory", "gain"] == pytest.approx(0.0, abs=1e-6)
+    assert own.loc["unchanged", "gain"] == pytest.approx(alone.loc["unchanged", "gain"], abs=1e-9)
 
 
 def test_reports_tell_of_twins(run: Run) -> None:
     text = " ".join(str(femubench.report(run)).split())
-    assert "skill on 2 twins of 1 cases, seed 11" in text
-    assert "?: memory knows the cases? skill" in text
+    assert "gain on 2 twins of 1 cases, seed 11" in text
+    assert "?: memory knows the cases? gain" in text
     assert "?: chance gave two answers to one job: frame-solid: another model" in text
     markdown = str(femubench.report(run, style="markdown"))
     assert "## Twins" in markdown
     assert "memory (knows the cases?)" in markdown
     page = str(femubench.report(run, style="html"))
-    assert "knows the cases? skill" in page
+    assert "knows the cases? gain" in page
     assert '"suspicious":true' in page.replace(" ", "")
 
     rows = {
@@ -466,10 +467,10 @@ def test_no_strategy_of_ours_is_marked_where_order_and_rounding_decide() -> None
     names = ["local", "offset", "sparse", "eigensensitivity", "baruch"]
     cases = ["suite/tapered-cantilever", "suite/arch", "frame-solid"]
     run = rank(cases, names, twins=(2, 21), nominal="textbook", jobs=2)
-    found = twin_skills(run)
+    found = twin_gains(run)
     assert sorted(found) == sorted(names)
     assert not any(item.suspicious for item in found.values())
     assert unsteady(run) == {}
-    # Without chance and without a choice among equals the skills are the same.
+    # Without chance and without a choice among equals the gains are the same.
     for name in ("eigensensitivity", "baruch"):
-        assert found[name].skill == pytest.approx(found[name].original_skill, abs=1e-6)
+        assert found[name].gain == pytest.approx(found[name].original_gain, abs=1e-6)

@@ -70,7 +70,7 @@ def test_samples_take_three_lines_more() -> None:
     assert lines(Sampled) - lines(Point) <= 3
     run = femubench.rank(CASE, [Point(), Sampled()])
     board = leaderboard(run).set_index("strategy")
-    assert board["skill"].nunique() == 1
+    assert board["gain"].nunique() == 1
     assert board.notna()["coverage90"].to_dict() == {"sampled": True, "point": False}
     assert board.notna()["log_score"].to_dict() == {"sampled": True, "point": False}
     assert board["crps_percent"].notna().all()

@@ -259,7 +259,7 @@ def test_meta_data_are_checked(key: str, value: object) -> None:
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("seed", -1), ("seed", 2**63), ("score", 0.0), ("score", -1.0), ("rank", 0),
+        ("seed", -1), ("seed", 2**63), ("gain", 1.5), ("gain", -1.5), ("rank", 0),
         ("status", "fine"), ("case", "x" * 1001), ("reason", "x" * 100_001), ("seconds", -1),
         ("evaluations", 10**30), ("used", {"rms_percent": 1e200, "modes": []}),
         ("used", {"rms_percent": 1, "modes": [{"measured_hz": 0, "predicted_hz": 1, "mac": 1}]}),
@@ -328,6 +328,7 @@ def test_a_name_neither_breaks_the_screen_nor_the_document(tmp_path: Path) -> No
         result["reason"] = EVIL if result["status"] != "ok" else ""
     data["meta"] |= {"strategies": [EVIL], "cases": {EVIL: {"title": EVIL}}, "run": f"../{EVIL}"}
     data["meta"] |= {"citations": {EVIL: EVIL}, "machine": {EVIL: EVIL}, "reference": None}
+    data["meta"]["models"] = {EVIL: data["meta"]["models"]["frame"]}
     file = tmp_path / "run.json"
     file.write_text(json.dumps(data))
     for name in ("terminal", "markdown"):

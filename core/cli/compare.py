@@ -44,8 +44,9 @@ def fail_option(what: str) -> options.Option:
     help="This one only; repeat.",
 )  # fmt: skip
 @fail_option(
-    "Exit with 1 if a ratio B/A exceeds X: unseen, used, higher, modified, seconds; or the "
-    "number of lost results: failures. May be repeated. Default: unseen>1.01 and failures>0."
+    "Exit with 1 if X is exceeded by the loss of gain, a ratio B/A (used, higher, modified, "
+    "seconds) or the number of lost results: failures. May be repeated. Default: loss>0.01 and "
+    "failures>0."
 )
 @options.style(
     "terminal", "markdown", "html", "json", dest="form", what="What is printed or written."

@@ -44,6 +44,10 @@ class _Formats(click.Option):
 @click.command("report")
 @click.argument("run", required=False)
 @click.option("-f", "--format", "formats", multiple=True, metavar="FORMAT", cls=_Formats)
+@click.option(
+    "--rule", "rule", multiple=True, metavar="KEY=VALUE",
+    help="Score by another number of the rule (docs/scoring.md); may be repeated.",
+)  # fmt: skip
 @click.option("--open", "opened", is_flag=True, help="Write the HTML page and open it.")
 @options.output_folder("Write files there. Default: the screen; for html and parquet, the store.")
 @options.store("Where the results are.")
@@ -52,6 +56,7 @@ def report(
     ctx: click.Context,
     run: str | None,
     formats: tuple[str, ...],
+    rule: tuple[str, ...],
     opened: bool,
     output: Path | None,
     store: Path | None,
@@ -81,7 +86,7 @@ def report(
             plugins.reporters[w] for w in choose_names("report format", words, plugins.reporters)
         ]
         kept = store_in(store)
-        found = read_run(run, kept)
+        found = read_run(run, kept).scored_by(rule)
         # What was left out is printed on stderr where a report has no room for it.
         silent = any(writer.name not in _TELLING for writer in writers)
         for note in way_of("terminal", "notes")(found) if silent else ():

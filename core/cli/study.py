@@ -1,4 +1,4 @@
-"""``bench study``: how a strategy's skill depends on noise, sensors and options."""
+"""``bench study``: how a strategy's gain depends on noise, sensors and options."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     *(RunOptions, "overwrite"), default="failed", show_default=True,
     help="Which stored results of the same jobs are computed again: all, none, or the failures.",
 )  # fmt: skip
-@options.of_jobs("Write the results and the skill of every cell as JSON.")
+@options.of_jobs("Write the results and the gain of every cell as JSON.")
 @click.pass_context
 def study(ctx: click.Context, /, file: Path, dry_run: bool, **asked: object) -> int:
     """Run strategies under conditions that vary: noise, sensors, options.

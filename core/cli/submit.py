@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     "--baseline", type=options.PATH, metavar="FILE",
     help="The result file of an earlier run; exit with 1 if this one is worse.",
 )  # fmt: skip
-@fail_option("What is worse, as in bench compare. Default: unseen>1.01 and failures>0.")
+@fail_option("What is worse, as in bench compare. Default: loss>0.01 and failures>0.")
 @click.option(
     "--summary", type=options.OUTPUT, metavar="FILE", envvar="GITHUB_STEP_SUMMARY",
     help="Append what came out as Markdown. Default: $GITHUB_STEP_SUMMARY.",

@@ -139,7 +139,7 @@ def _bench(
 ) -> Bench:
     if role == "strategy":
         named = plugins.strategies.values()
-        reference = next((s for s in named if getattr(s, "yardstick", False)), None)
+        reference = next((s for s in named if getattr(s, "cost_reference", False)), None)
         return Bench(item, reference=reference, cases=cases, seconds=seconds)
     helpers = tuple(plugins.readers.values()) if role == "scenario" else ()
     return Bench(item, helpers=helpers, seconds=seconds)

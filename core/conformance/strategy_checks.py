@@ -268,7 +268,7 @@ def _withheld(bench: Bench) -> list[tuple[str, Want]]:
 @check(
     "strategy",
     "resources",
-    "Time and memory stay below 100 times those of the yardstick strategy.",
+    "Time and memory stay below 100 times those of the reference strategy.",
     wants=lambda bench: _measured(bench),
 )
 def resources(bench: Bench) -> Verdict:

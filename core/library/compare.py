@@ -41,8 +41,9 @@ def compare(
             `against`, one run will do.
         strategies: those to compare; all where there are none.
         against: strategy X of A and Y of B, to compare these two alone.
-        fail: what counts as worse, as ``"unseen>1.01"`` (the default, with ``"failures>0"``): a
-            ratio B / A of unseen, used, higher, modified or seconds, or the number of lost results.
+        fail: what counts as worse, as ``"loss>0.01"`` (the default, with ``"failures>0"``): the
+            loss of gain, a ratio B / A of used, higher, modified or seconds, or the number of lost
+            results.
         store: where runs are kept.
 
     Raises:

@@ -39,8 +39,10 @@ from femubench.core.schema.run_options import (
     check_keywords,
     split_keywords,
 )
+from femubench.core.score.bounded_gain import Rule
 from femubench.core.score.leaderboard import is_test, leaderboard
-from femubench.core.study.skill import skill_by
+from femubench.core.score.ranking import rank_results
+from femubench.core.study.gain import gain_by
 from femubench.core.twin.twins import Twin, twins_of
 
 if TYPE_CHECKING:
@@ -102,7 +104,7 @@ class Run(results.Run):
 
     @property
     def table(self) -> pd.DataFrame:
-        """Return one row a job: status, errors by block, counts, score and rank."""
+        """Return one row a job: status, errors by block, counts, gain and rank."""
         return results_frame(self)
 
     @property
@@ -115,16 +117,39 @@ class Run(results.Run):
         """Return one row a strategy, best first."""
         return leaderboard(self)
 
-    def skill_by(self, *axes: str) -> pd.DataFrame:
-        """Return one row a cell of a study; see `femubench.results.skill_by`."""
-        return skill_by(self, *axes)
+    def scored_by(self, words: Iterable[str]) -> Run:
+        """Return the run scored by a rule with other numbers.
+
+        Arguments:
+            words: ``KEY=VALUE`` each, fields of `results.Rule`; none for the rule that it has.
+
+        Raises:
+            InputError: for a field that there is none of, a value out of its bounds, or a run that
+                keeps too little to be scored again.
+
+        Examples:
+            >>> femubench.Run.of(run).scored_by(["cap=0.2"]).meta["rule"]["version"]
+            '1 cap'
+        """
+        if not (listed := list(words)):
+            return self
+        meta = {**self.meta, "rule": Rule.of(self.meta).changed(listed).to_json()}
+        return Run(meta, rank_results(self.results, meta), self.companions)
+
+    def gain_by(self, *axes: str) -> pd.DataFrame:
+        """Return one row a cell of a study; see `femubench.results.gain_by`."""
+        return gain_by(self, *axes)
 
     def rows(self) -> list[tuple[str, str]]:
         """Return what was run, and who leads."""
-        board = self.leaderboard[["rank", "strategy", "skill"]].itertuples(index=False)
+        board = self.leaderboard[["rank", "strategy", "gain"]].to_dict("records")
         return [
             *super().rows(),
-            *((f"{r}. {name}", f"skill {skill:.3f}") for r, name, skill in board),
+            *(
+                (f"{row['rank']:.0f}. {row['strategy']}", f"gain {row['gain']:.3f}")
+                for row in board
+                if row["rank"] == row["rank"]
+            ),
         ]
 
 
@@ -155,8 +180,8 @@ def rank(
         InputError: for an unknown name, an option that does not exist, or a faulty case.
 
     Examples:
-        >>> femubench.rank(case, [nominal, scaled]).leaderboard["skill"].round(2).tolist()
-        [0.0, -0.15]
+        >>> femubench.rank(case, [nominal, scaled]).leaderboard["gain"].round(2).tolist()
+        [0.0, -0.14]
         >>> quick = femubench.RunOptions(nominal="drawn", timeout=60.0)
         >>> len(femubench.rank(case, nominal, quick, jobs=1).results)
         1
@@ -360,8 +385,8 @@ def read_run(
 
     Examples:
         >>> file = femubench.report(run, "results.json")
-        >>> femubench.read_run(file).leaderboard["skill"].round(2).tolist()
-        [0.47, -1.97]
+        >>> femubench.read_run(file).leaderboard["gain"].round(2).tolist()
+        [0.6, -0.67]
     """
     if isinstance(run, results.Run):
         return Run.of(run)

@@ -50,7 +50,7 @@ class StudyPlan(Plan):
 
     @property
     def cells(self) -> int:
-        """Return the number of rows of `skill_by`, which takes cases and seeds together."""
+        """Return the number of rows of `gain_by`, which takes cases and seeds together."""
         conditions = len(self.axes.values("noise")) * len(self.axes.values("sensors_left_out"))
         return conditions * len(self.axes.nominals) * len(self.strategies)
 
@@ -99,7 +99,7 @@ def study(
 ) -> Run:
     """Run a study: strategies with grids of options under conditions that vary.
 
-    Its `skill_by` gives the skill by axes as a table, and `femubench.plot.heat_map` draws it.
+    Its `gain_by` gives the gain by axes as a table, and `femubench.plot.heat_map` draws it.
 
     Arguments:
         file: a study file; see docs/studies.md.
@@ -118,7 +118,7 @@ def study(
         >>> file = Path("study.toml")
         >>> axes = f'axes = {{cases = ["{case.name}"], noise = [1, 2], seeds = 1}}'
         >>> _ = file.write_text(f'{axes}\\n[[strategies]]\\nname = "{nominal.name}"')
-        >>> femubench.study(file).skill_by("noise")["jobs"].tolist()
+        >>> femubench.study(file).gain_by("noise")["jobs"].tolist()
         [1, 1]
     """
     check_keywords(keywords, StudyKeywords)

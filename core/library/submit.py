@@ -118,7 +118,8 @@ def _losses(found: Comparison) -> Iterator[str]:
     whole = [item for item in found.excesses if item.scenario is None]
     for item in whole or found.excesses:
         where = "" if item.scenario is None else f" on {item.scenario}"
-        was = "lost results" if item.metric == "failures" else f"{item.metric}, as a ratio"
+        names = {"failures": "lost results", "loss": "loss of gain"}
+        was = names.get(item.metric, f"{item.metric}, as a ratio")
         figures = f"{was}: {item.value:.3g}, allowed {item.most:g}"
         yield f"{item.strategy} is worse than the baseline{where}: {figures}"
 

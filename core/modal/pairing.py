@@ -26,8 +26,6 @@ WINDOW_WITHOUT_SHAPE = 1.4
 # One MAC point is worth four points of ln(f_p / f_m): shapes decide, and frequencies decide
 # between shapes that the sensors can hardly tell apart.
 FREQUENCY_WEIGHT = 0.25
-# Of shapes that differ by less, frequencies a fifth apart choose: that is what was measured.
-ALIKE = 0.05
 # Any gain by shape outweighs all gains by frequency alone.
 _WITHOUT_SHAPE = 1e-4
 _IN_ORDER = 1e-3
@@ -41,13 +39,10 @@ class Pairing:
     Arguments:
         index: column of the predicted mode, -1 where there is none, (m,).
         mac: of the pair; nan where there is none or the shapes could not be compared, (m,).
-        choices: number of predicted modes that could be the partner, and whose shape is as near to
-            the measured one within a MAC of 0.05, (m,).
     """
 
     index: IntArray
     mac: FloatArray
-    choices: IntArray
 
     def __len__(self) -> int:
         return len(self.index)
@@ -94,7 +89,7 @@ def pair_modes(
     predicted = np.asarray(predicted_frequencies, dtype=float)
     m, p = len(measured), len(predicted)
     if m == 0 or p == 0:
-        return Pairing(np.full(m, -1), np.full(m, np.nan), np.zeros(m, dtype=np.int64))
+        return Pairing(np.full(m, -1), np.full(m, np.nan))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.abs(np.log(predicted)[None, :] - np.log(measured)[:, None])
     distance = np.where(np.isfinite(ratio), ratio, np.inf)
@@ -128,8 +123,7 @@ def pair_modes(
     rows = np.arange(len(index))
     score = likeness[rows, index]
     known = (index >= 0) & by_shape[rows, index]
-    alike = (gain > 0.0) & (~by_shape | (likeness > score[:, None] - ALIKE))
-    return Pairing(index, np.where(known, score, np.nan), alike.sum(axis=1) * (index >= 0))
+    return Pairing(index, np.where(known, score, np.nan))
 
 
 def pair_measured(measurement: Measurement, modes: Modes, readings: FloatArray) -> Pairing:

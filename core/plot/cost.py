@@ -15,21 +15,21 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _LABELS = {
-    "left": "unseen error that is left, 1 - skill (1: textbook model)",
+    "error_percent": "error out of the given band, %",
     "used_percent": "rms error of the used modes, %",
     "higher_percent": "rms error of the higher modes, %",
     "modified_percent": "rms error of the modified structures, %",
 }
 
 
-def error_against_cost(run: Run, *, error: str = "left", ax: Axes | None = None) -> Axes:
+def error_against_cost(run: Run, *, error: str = "error_percent", ax: Axes | None = None) -> Axes:
     """Draw every strategy of a run by error and wall time, medians over the cases.
 
     Hollow squares are models that lost rigid-body modes or have negative eigenvalues.
 
     Arguments:
         run: with results.
-        error: ``left``, which is 1 - skill, or ``used_percent``, ``higher_percent``,
+        error: ``error_percent``, out of the given band, or ``used_percent``, ``higher_percent``,
             ``modified_percent`` as in the leaderboard.
         ax: to draw on; None for axes of a new figure.
 
@@ -44,7 +44,6 @@ def error_against_cost(run: Run, *, error: str = "left", ax: Axes | None = None)
     if error not in _LABELS:
         raise InputError(f"there is no error {error!r}", expected=", ".join(_LABELS))
     board = leaderboard(run)
-    board["left"] = 1.0 - board["skill"]
     seconds, errors = (board[key].to_numpy(dtype=float) for key in ("seconds", error))
     kept = board[np.isfinite(seconds) & np.isfinite(errors) & (seconds > 0.0) & (errors > 0.0)]
     if not len(kept):

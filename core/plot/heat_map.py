@@ -1,4 +1,4 @@
-"""The skill of a study against two of its axes."""
+"""The gain of a study against two of its axes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from femubench.core.errors import InputError
 from femubench.core.plot.style import INK, SOFT, check_kind, figure_of, name_of, own_axes
 from femubench.core.schema.results import Run
 from femubench.core.study.axes import StudyAxes, Value
-from femubench.core.study.skill import skill_by
+from femubench.core.study.gain import gain_by
 from femubench.core.typing import FloatArray
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _MOST_NUMBERED = 150  # cells with their number; more have no room
 _DARK = 0.5  # of the scale, beyond which the colour of a cell is too dark for black letters
-_SCALES = (0.25, 0.5, 1.0)  # the skill with the darkest blue
+_SCALES = (0.25, 0.5, 1.0)  # the gain with the darkest blue
 _LONGEST_LABELS = 45  # letters of all labels of the columns that stand next to each other
 _GREY = "0.85"
 
@@ -28,17 +28,17 @@ _GREY = "0.85"
 def heat_map(
     run: Run, x: str | None = None, y: str | None = None, *, ax: Axes | None = None
 ) -> Axes:
-    """Draw the skill of every cell, blue above the textbook model and red below it.
+    """Draw the gain of every cell, blue above the textbook model and red below it.
 
     White is 0, what the textbook model predicts without any measurement; the scale ends at 0.25,
     0.5 or 1 both ways, and what is less has its last red. Every cell has its number as far as there
     is room.
-    Hatched: a job at least failed or is missing, which counts as ten times the error. Grey: the
-    strategy is applicable to no job of the cell.
+    Hatched: a job at least failed or is missing, which counts as the model that was given. Grey:
+    the strategy is applicable to no job of the cell.
 
     Arguments:
         run: of a study, or any other.
-        x, y: axes, see `femubench.results.skill_by`; those of the study where they are left out.
+        x, y: axes, see `femubench.results.gain_by`; those of the study where they are left out.
         ax: to draw on; None for axes of a new figure.
 
     Raises:
@@ -48,21 +48,21 @@ def heat_map(
         >>> plot.heat_map(run, "strategy", "case").get_xlabel()
         'strategy'
     """
-    check_kind(run, (Run,), "skill by axes")
+    check_kind(run, (Run,), "gain by axes")
     known = StudyAxes.of(run)
     usual = [name for name in known.pictured if name not in (x, y)]
     x = x or usual.pop(0)
     y = y or usual.pop(0)
     if x == y:
         raise InputError(f"{x!r} is on both axes", key="y", expected="two axes")
-    table = skill_by(run, x, y)
+    table = gain_by(run, x, y)
     columns, rows = known.values(x), known.values(y)
     ax = own_axes(ax, (2.6 + 0.62 * max(len(columns), 5), 1.7 + 0.42 * max(len(rows), 3)))
     figures = {
         name: _grid(table, name, x, y, columns, rows)
-        for name in ("skill", "jobs", "failed", "missing", "not_applicable")
+        for name in ("gain", "jobs", "failed", "missing", "not_applicable")
     }
-    _paint(ax, figures["skill"])
+    _paint(ax, figures["gain"])
     _mark(ax, figures)
     ax.set_xticks(range(len(columns)), [name_of(known.text_of(v), 22) for v in columns])
     ax.set_yticks(range(len(rows)), [name_of(known.text_of(v), 22) for v in rows])
@@ -74,22 +74,22 @@ def heat_map(
     return ax
 
 
-def _paint(ax: Axes, skill: FloatArray) -> None:
+def _paint(ax: Axes, gain: FloatArray) -> None:
     """Draw the colours, the same distance from 0 both ways, and what they mean."""
-    largest = float(np.nanmax(np.abs(skill), initial=0.0))
+    largest = float(np.nanmax(np.abs(gain), initial=0.0))
     end = next((step for step in _SCALES if largest <= step), _SCALES[-1])
     image = ax.imshow(
-        skill, vmin=-end, vmax=end, cmap="RdBu", aspect="auto", interpolation="nearest",
+        gain, vmin=-end, vmax=end, cmap="RdBu", aspect="auto", interpolation="nearest",
         origin="lower",
     )  # fmt: skip
-    rows, columns = skill.shape
+    rows, columns = gain.shape
     ax.set_xticks(np.arange(columns - 1) + 0.5, minor=True)
     ax.set_yticks(np.arange(rows - 1) + 0.5, minor=True)
     ax.grid(which="minor", color="white", linewidth=1.5)
     ax.tick_params(which="minor", length=0.0)
-    below = bool(np.nanmin(skill, initial=0.0) < -end)
+    below = bool(np.nanmin(gain, initial=0.0) < -end)
     bar = figure_of(ax).colorbar(image, ax=ax, extend="min" if below else "neither", pad=0.03)
-    bar.set_label("skill (0: textbook model)")
+    bar.set_label("gain (0: textbook model)")
 
 
 def _grid(
@@ -104,15 +104,15 @@ def _grid(
 
 
 def _mark(ax: Axes, figures: Mapping[str, FloatArray]) -> None:
-    """Write the skill into every cell, hatch those with failures, grey out what does not apply."""
+    """Write the gain into every cell, hatch those with failures, grey out what does not apply."""
     from matplotlib.patches import Rectangle
 
-    skill = figures["skill"]
+    gain = figures["gain"]
     low, high = ax.get_images()[0].get_clim()
-    for (i, j), value in np.ndenumerate(skill):
+    for (i, j), value in np.ndenumerate(gain):
         if not np.isfinite(figures["jobs"][i, j]):
             continue
-        count = {name: int(found[i, j]) for name, found in figures.items() if name != "skill"}
+        count = {name: int(found[i, j]) for name, found in figures.items() if name != "gain"}
         lost = [f"{count[name]} {name}" for name in ("failed", "missing") if count[name]]
         text = f"{value:.2f}".replace("-", "\N{MINUS SIGN}")
         dark = not low * _DARK <= value <= high * _DARK
@@ -123,7 +123,7 @@ def _mark(ax: Axes, figures: Mapping[str, FloatArray]) -> None:
             look |= {"hatch": "///", "edgecolor": SOFT}
             text = "\n".join([text, *lost, f"of {count['jobs']}"])
         ax.add_patch(Rectangle((j - 0.5, i - 0.5), 1.0, 1.0, **look))
-        if skill.size <= _MOST_NUMBERED:
+        if gain.size <= _MOST_NUMBERED:
             box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0} if lost else None
             ax.text(
                 j, i, text, ha="center", va="center", fontsize=8.5, bbox=box,

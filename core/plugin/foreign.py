@@ -132,9 +132,9 @@ class ForeignStrategy(StatedOptions):
         return bool(self._description["baseline"])
 
     @property
-    def yardstick(self) -> bool:
-        """Tell whether others are compared with it."""
-        return bool(self._description["yardstick"])
+    def cost_reference(self) -> bool:
+        """Tell whether time and memory of others are compared with its own."""
+        return bool(self._description["cost_reference"])
 
     @property
     def doc(self) -> str:
@@ -372,7 +372,7 @@ def strategy_of(handle: Handle, description: Mapping[str, Any]) -> ForeignStrate
         "options": options,
         "open": check_texts(description.get("open"), "open options"),
         "baseline": description.get("baseline") is True,
-        "yardstick": description.get("yardstick") is True,
+        "cost_reference": description.get("cost_reference") is True,
         "module": harmless(of_type(description.get("module"), str, "module")),
         "doc": _doc(description),
         "about": select_known(of_type(description.get("about"), dict, "what its package says")),

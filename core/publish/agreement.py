@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 from femubench.core.publish.submissions import Submission
 from femubench.core.schema.results import JobResult
-from femubench.core.score.ranking import OFFSET_PERCENT, score_of
+from femubench.core.score.ranking import Scale
 
-# Nominal errors by block, of a case by its name and digest.
-References = Mapping[tuple[str, str], Mapping[str, float]]
+# What results are measured by, of a case by its name and digest.
+Scales = Mapping[tuple[str, str], Scale]
 # Two machines round differently, and an ill-conditioned update magnifies it.
 _AGREES = 1e-3
+_OFFSET_PERCENT = 0.05  # added to both errors: one that is met is rounding
 # These say what a machine could bear, not what the job gives.
 _NO_RESULT = frozenset({"timeout", "crashed"})
 
@@ -37,14 +38,14 @@ class Outcome:
         return len({machine_of(run) for run in self.runs})
 
 
-def findings_of(submissions: Iterable[Submission], references: References) -> list[Outcome]:
+def findings_of(submissions: Iterable[Submission], scales: Scales) -> list[Outcome]:
     """Return one finding for every job, in the order of case, strategy, seed and key.
 
     Of contradicting results that counts on which most machines agree, of equals the worst.
 
     Arguments:
         submissions: oldest first.
-        references: that the worst is found with. Those of a run could make its own result look
+        scales: that the worst is found with. Those of a run could make its own result look
             worse than it is, and so let it count.
     """
     groups: dict[tuple[str, str, int, str], list[Outcome]] = {}
@@ -61,7 +62,7 @@ def findings_of(submissions: Iterable[Submission], references: References) -> li
                     break
             else:
                 listed.append(Outcome(result, (item,)))
-    return [_settle_outcomes(groups[job], references) for job in sorted(groups)]
+    return [_settle_outcomes(groups[job], scales) for job in sorted(groups)]
 
 
 def agree(first: JobResult, second: JobResult) -> bool:
@@ -71,7 +72,7 @@ def agree(first: JobResult, second: JobResult) -> bool:
     errors = (
         (first.blocks[name].rms_percent, second.blocks[name].rms_percent) for name in first.blocks
     )
-    near = all(abs(a - b) <= _AGREES * (min(a, b) + OFFSET_PERCENT) for a, b in errors)
+    near = all(abs(a - b) <= _AGREES * (min(a, b) + _OFFSET_PERCENT) for a, b in errors)
     return near and first.unphysical == second.unphysical
 
 
@@ -81,15 +82,16 @@ def machine_of(item: Submission) -> tuple[str, str, str]:
     return str(machine["cpu"]), str(machine["blas"]), str(machine["platform"])
 
 
-def _settle_outcomes(found: Sequence[Outcome], references: References) -> Outcome:
+def _settle_outcomes(found: Sequence[Outcome], scales: Scales) -> Outcome:
     sound = [item for item in found if item.result.status not in _NO_RESULT] or list(found)
     if all(item.result.status in _NO_RESULT for item in found):
         sound = [replace(found[0], runs=tuple(run for item in found for run in item.runs))]
 
     def order(item: Outcome) -> tuple[int, float, str]:
         result = item.result
-        case = result.case, str(result.provenance["case"])
-        return -item.machines, -score_of(result, references[case]), item.runs[0].name
+        scale = scales[result.case, str(result.provenance["case"])]
+        gain = scale.gain(result.case, scale.errors(result)).gain
+        return -item.machines, gain, item.runs[0].name
 
     first, *rest = sorted(sound, key=order)
     return replace(first, others=tuple(rest))

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from femubench.core.errors import InputError
 from femubench.core.publish.agreement import Outcome, findings_of, machine_of
 from femubench.core.publish.news import news_of
-from femubench.core.publish.places import Scope, board_on, errors_of, on_case, skill_on
+from femubench.core.publish.places import (
+    Scope,
+    board_on,
+    counted_on,
+    errors_of,
+    gain_on,
+    on_case,
+)
 from femubench.core.publish.submissions import Submission, slug
-from femubench.core.schema.results import BLOCKS
+from femubench.core.score.ranking import Scale
 from femubench.core.score.repeatability import unsteady
 from femubench.core.score.statistics import structures_of
-from femubench.core.score.twin_skill import twin_skills
+from femubench.core.score.twin_gain import twin_gains
 
-INDEX_SCHEMA = 2  # since more skill is better
+INDEX_SCHEMA = 3  # since gains are bounded
 
 
 class _Version(NamedTuple):
@@ -39,18 +45,8 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
     if len({item.run.meta.get("yardstick") or "drawn" for item in submissions}) > 1:
         what = "some runs are measured against the textbook models, others against the drawn ones"
         raise InputError(what, expected="one of both: run again with this version")
-    # The nominal errors by case and digest: the median of what the runs found.
-    found: dict[tuple[str, str], dict[str, list[float]]] = {}
-    for item in submissions:
-        for name, case in _cases(item).items():
-            blocks = found.setdefault((name, case["digest"]), {})
-            for block, value in item.run.meta["reference"][name].items():
-                blocks.setdefault(block, []).append(value)
-    references = {
-        case: {name: statistics.median(blocks[name]) for name in BLOCKS if name in blocks}
-        for case, blocks in found.items()
-    }
-    findings = findings_of(submissions, references)
+    scales = _choose_scales(submissions)
+    findings = findings_of(submissions, scales)
     current = {name: case["digest"] for item in submissions for name, case in _cases(item).items()}
     groups: dict[_Version, list[Outcome]] = {}
     for one in findings:
@@ -66,7 +62,12 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
     latest = {version.strategy: version for version in versions}  # the last one stays
     ranked = _ranked_cases(latest.values(), versions, current)
     stated = _stated_in_runs(submissions, "structures"), _stated_in_runs(submissions, "classes")
-    ground = Scope(ranked, current, references, *stated)
+    yardsticks = {
+        name: str(said)
+        for item in submissions
+        for name, said in (item.run.meta.get("yardsticks") or {}).items()
+    }
+    ground = Scope(ranked, current, scales, *stated, yardsticks)
     runs = [
         {
             "file": f"data/{item.name}",
@@ -105,6 +106,26 @@ def _cases(item: Submission) -> dict[str, dict[str, Any]]:
     return {name: case for name, case in item.run.meta["cases"].items() if name in used}
 
 
+def _choose_scales(submissions: Iterable[Submission]) -> dict[tuple[str, str], Scale]:
+    """Return what results are measured by, by case and digest of its files.
+
+    Of the runs, verified ones where there are any, the one whose textbook error is the median: no
+    run alone can shift what all are measured by.
+    """
+    found: dict[tuple[str, str], list[tuple[bool, Scale]]] = {}
+    for item in submissions:
+        own = Scale.of(item.run.meta)
+        for name, case in _cases(item).items():
+            alone = Scale(own.rule, own.blocks, own.textbook, {})
+            found.setdefault((name, case["digest"]), []).append((item.verified, alone))
+    chosen = {}
+    for (name, digest), listed in found.items():
+        sure = [scale for verified, scale in listed if verified] or [scale for _, scale in listed]
+        order = sorted(sure, key=lambda scale: scale.textbook[name].error)
+        chosen[name, digest] = order[(len(order) - 1) // 2]
+    return chosen
+
+
 def _ranked_cases(
     latest: Iterable[_Version],
     versions: Mapping[_Version, Sequence[Outcome]],
@@ -129,16 +150,16 @@ def _describe(version: _Version, findings: Sequence[Outcome], ground: Scope) -> 
     for item in findings:
         job = item.result.case, str(item.result.provenance["case"])
         groups.setdefault(job, []).append(item)
-    shares = ground.shares
     cases = [
         {
-            **on_case(listed, ground.references[case], shares.get(case[0])),
+            **on_case(listed, ground.scales[case]),
             "current": ground.has(case),
             "ranked": ground.counts(case),
         }
         for case, listed in sorted(groups.items())
     ]
-    figures = skill_on(ground, [case for case in cases if case["ranked"]])
+    figures = gain_on(ground, version.strategy, counted_on(ground, findings))
+    del figures["strategy"], figures["rank"]
     runs = sorted({run.order: run for item in findings for run in item.runs}.items())
     machines = {machine_of(run): run.run.meta["machine"] for _, run in runs}
     return {
@@ -163,7 +184,7 @@ def _marks(strategy: str, findings: Iterable[Outcome]) -> list[str]:
     marks = []
     if not all(any(run.verified for run in item.runs) for item in listed):
         marks.append("unverified")
-    twins = [twin_skills(run.run).get(strategy) for run in runs]
+    twins = [twin_gains(run.run).get(strategy) for run in runs]
     if any(found is not None and found.suspicious for found in twins):
         marks.append("knows the cases?")
     if any(strategy in unsteady(run.run) for run in runs):
@@ -224,7 +245,10 @@ def _case_entries(submissions: Iterable[Submission], ground: Scope) -> list[dict
             "older": [old for old in digests[name] if old != digest],
             "classes": list(ground.kinds.get(name, ())),
             "ranked": name in ground.cases,
-            "nominal_percent": dict(ground.references[name, digest]),
+            "nominal_percent": {
+                block: found.rms_percent
+                for block, found in ground.scales[name, digest].blocks[name].items()
+            },
         }
         for name, digest in sorted(ground.current.items())
     ]

@@ -8,6 +8,7 @@ from typing import Any
 from femubench.core.score.ranking import rank_items
 
 _MOST = 100  # entries that are kept, the latest
+_STATED = ("gain", "error_percent", "textbook_percent")
 
 
 def news_of(
@@ -15,7 +16,7 @@ def news_of(
 ) -> list[dict[str, Any]]:
     """Return every new version and every change of the leader, latest first.
 
-    Skills are those on the cases of today, on which alone versions of different times compare; so
+    Gains are those on the cases of today, on which alone versions of different times compare; so
     a leader of old is whom one would have seen with these cases.
 
     Arguments:
@@ -50,14 +51,14 @@ def _leaders(present: Mapping[str, Mapping[str, Any]]) -> list[str]:
     sound = {
         name: version
         for name, version in present.items()
-        if version["complete"] and version["skill"] is not None and not version["unphysical"]
+        if version["complete"] and version["answered"] and not version["yardstick"]
     }
-    listed = rank_items(sound, lambda name: ((), 1.0 - sound[name]["skill"], name))
+    listed = rank_items(sound, lambda name: ((), -sound[name]["gain"], name))
     return [name for rank, name in listed if rank == 1]
 
 
 def _entry(
     kind: str, strategy: str, version: Mapping[str, Any], run: Mapping[str, Any]
 ) -> dict[str, Any]:
-    stated = {name: version[name] for name in ("version", "femubench", "skill", "low", "high")}
+    stated = {name: version[name] for name in (*_STATED, "version", "femubench", "low", "high")}
     return {"kind": kind, "when": run["started"], "strategy": strategy, **stated}

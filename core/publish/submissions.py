@@ -18,6 +18,7 @@ from femubench.core.plugin.distribution import DOI, HOMEPAGE, LONGEST_LINE
 from femubench.core.schema.bounds import Name, Percent
 from femubench.core.schema.records import (
     LARGEST_RUN,
+    Models,
     parse_json,
     result_to_json,
     run_from_json,
@@ -25,10 +26,11 @@ from femubench.core.schema.records import (
 )
 from femubench.core.schema.results import JobResult, Nominal, Run
 from femubench.core.schema.validation import read_plain
+from femubench.core.score.bounded_gain import Rule
 from femubench.core.score.ranking import rank_results
 from femubench.core.score.scoring import frequency_error
 
-SCHEMA = 1
+SCHEMA = 2
 _MOMENT = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,9})?(\+00:00|Z)\Z"
 _LONGEST = 1e9  # s
 _ROUNDING = 1e-6  # relative, of an rms that is computed again from its modes
@@ -62,6 +64,7 @@ class _Twins(Struct, kw_only=True):
     again: dict[Name, Name]
     cases: dict[Name, _Case]
     reference: dict[Name, dict[_BlockName, Percent]]
+    models: Models
 
 
 class _About(Struct):
@@ -92,6 +95,8 @@ class _Meta(Struct, kw_only=True):
     citations: dict[Name, Annotated[str, Meta(max_length=5_000)]] = {}
     about: dict[Name, _About] = {}
     reference: dict[Name, dict[_BlockName, Percent]]
+    models: Models
+    yardsticks: dict[Name, _Word] = {}
     versions: Annotated[dict[_Word, _Word], Meta(max_length=50)] = {}
     machine: _Machine = field(default_factory=_Machine)
     git_commit: _Word | None = None
@@ -105,7 +110,7 @@ class Submission:
     """A run as it is published.
 
     Arguments:
-        run: with scores and ranks computed anew.
+        run: with gains and ranks computed anew.
         text: the normalised file.
         name: of that file, from the run's id and a hash of the text.
         verified: whether all that can be checked of it was.
@@ -167,7 +172,7 @@ def read_submission(
     text = json.dumps(data, sort_keys=True, allow_nan=False, separators=(",", ":")) + "\n"
     digest = hashlib.sha256(text.encode()).hexdigest()[:12]
     run = run_from_json(json.loads(text), file=file)
-    ranked = replace(run, results=rank_results(run.results, meta["reference"]))
+    ranked = replace(run, results=rank_results(run.results, run.meta))
     return Submission(ranked, text, f"{slug(str(meta['run']))}-{digest}.json", verified)
 
 
@@ -179,8 +184,8 @@ def slug(text: str, longest: int = 40) -> str:
 
 
 def _records(results: Iterable[JobResult]) -> list[dict[str, Any]]:
-    """Return results in an order that does not depend on who ended first, without their scores."""
-    dropped = {"score": None, "rank": None, "traceback": ""}
+    """Return results in an order that does not depend on who ended first, without their gains."""
+    dropped = {"gain": None, "rank": None, "traceback": ""}
     order = sorted(results, key=lambda r: (r.case, r.strategy, r.seed, r.key))
     return [{**result_to_json(item), **dropped} for item in order]
 
@@ -189,10 +194,10 @@ def _meta(run: Run, file: Path) -> dict[str, Any]:
     # Without halves of characters, which no file could hold.
     record = read_plain(_Meta, to_plain(run.meta), file=file, key="meta")
     data: dict[str, Any] = to_plain(record)
-    for name in ("baseline", "structures", "classes", "about"):
+    for name in ("baseline", "structures", "classes", "about", "yardsticks"):
         if not data[name]:  # as in what was published before there was one
             del data[name]
-    return data
+    return {**data, "rule": Rule().to_json()}
 
 
 def _check(result: JobResult, meta: Mapping[str, Any], file: Path, key: str) -> None:
@@ -228,6 +233,9 @@ def _check(result: JobResult, meta: Mapping[str, Any], file: Path, key: str) -> 
     reference = meta["reference"].get(result.case)
     if not reference:
         refuse("missing", f"meta.reference.{result.case}", "the errors of the nominal model")
+    nominal = meta.get("yardstick") or "drawn"
+    if nominal not in (meta["models"].get(result.case) or {}):
+        refuse("missing", f"meta.models.{result.case}.{nominal}", "what that model predicts")
     for name, block in result.blocks.items():
         if name not in reference or not block.modes:
             what = "no modes" if name in reference else "a block that the nominal model has not"

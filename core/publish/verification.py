@@ -7,8 +7,7 @@ believed.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import astuple, dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any, NoReturn, Protocol
@@ -16,10 +15,11 @@ from typing import Any, NoReturn, Protocol
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
 from femubench.core.run.provenance import plan_digest
-from femubench.core.schema.results import JobResult, Nominal, Run
-from femubench.core.score.leaderboard import leaderboard
-from femubench.core.score.ranking import score_of
-from femubench.core.score.scoring import find_given_errors, reference_of
+from femubench.core.schema.results import JobResult, Run
+from femubench.core.score.bounded_gain import Rule
+from femubench.core.score.leaderboard import list_rows
+from femubench.core.score.ranking import Models, Scale
+from femubench.core.score.scoring import reference_of
 from femubench.core.twin.twins import Twin
 
 SANDBOX = "namespaces"  # what a run calls the one that it can have
@@ -53,11 +53,11 @@ class Installed(Protocol):
 
 @dataclass(frozen=True)
 class _Known:
-    """What this installation says of a case: measured figures and nominal errors."""
+    """What this installation says of a case: measured figures, nominal errors, its scale."""
 
-    case: Case
     measured: Marks
     reference: Mapping[str, float]
+    scale: Scale
 
     @classmethod
     def of(cls, case: Case, installed: Installed) -> _Known:
@@ -67,12 +67,8 @@ class _Known:
             for name, block in found.blocks.items()
             for mode in block.modes
         }
-        return cls(case, measured, found.rms_percent)
-
-    @cached_property
-    def given(self) -> dict[str, float]:
-        """Return the errors of the model as drawn; nothing where it is the textbook model."""
-        return find_given_errors(self.case, self.reference)
+        models: Models = {case.name: {"textbook": found.blocks}}
+        return cls(measured, found.rms_percent, Scale.of_models(models, Rule(), "textbook"))
 
 
 def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) -> None:
@@ -96,18 +92,25 @@ def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) 
     if any(one != SANDBOX for one in (usual, *each)):
         what = "the strategies ran without a sandbox"
         _refuse(file, what, "meta.sandbox", "a run with `--sandbox require`, or --unverified")
+    if Rule.of(run.meta) != Rule():
+        _refuse(file, "gains by another rule", "meta.rule", _AGAIN)
     cases = _own_cases(run, installed, file)
     twins = _own_twins(run, list(cases.values()), installed, file)
     _check_complete(run, file)
     known = {name: _Known.of(case, installed) for name, case in (cases | twins).items()}
-    # The nominal errors, which every score is relative to.
+    # The nominal errors, which every gain is relative to.
+    scale = Scale.of(run.meta)
     for key, stated, names in (
         ("meta.reference", run.meta["reference"], run.meta["cases"]),
         ("meta.twins.reference", run.meta["twins"]["reference"], run.meta["twins"]["of"]),
     ):
         for name in names:
             errors, right = stated.get(name, {}), known[name].reference
-            _check_errors(errors, right, f"{key}.{name}", nominal="textbook", file=file)
+            _check_errors(errors, right, f"{key}.{name}", file)
+            predicted, said = known[name].scale.textbook[name], scale.textbook.get(name)
+            if said is None or not all(map(_near, astuple(said), astuple(predicted))):
+                where = key.replace("reference", "models")
+                _refuse(file, "not what the textbook model predicts", f"{where}.{name}", _AGAIN)
     origins = run.meta["twins"]["again"]
     for key, results in (("results", run.results), ("companions", run.companions)):
         for number, result in enumerate(results):
@@ -190,26 +193,23 @@ def _check_complete(run: Run, file: Path) -> None:
 
 
 def _check_errors(
-    found: Mapping[str, float], own: Mapping[str, float], key: str, nominal: Nominal, file: Path
+    found: Mapping[str, float], own: Mapping[str, float], key: str, file: Path
 ) -> None:
-    """Check the errors of a nominal model."""
+    """Check the errors of a textbook model."""
     if found.keys() != own.keys() or not all(_near(found[block], own[block]) for block in own):
         errors = ", ".join(f"{block} {error:.6g} %" for block, error in own.items()) or "none"
-        _refuse(file, f"not the errors of the {nominal} model", key, errors)
+        _refuse(file, "not the errors of the textbook model", key, errors)
 
 
 def _near(one: float, other: float) -> bool:
-    return abs(one - other) <= _ROUNDING * (1.0 + abs(other))
+    return abs(one - other) <= _ROUNDING * (1.0 + abs(other)) or (one != one and other != other)
 
 
 def _check_result(result: JobResult, known: _Known, file: Path, key: str) -> None:
-    """Check measured figures and score of a result."""
+    """Check measured figures and gain of a result."""
     if result.status != "ok":
         if result.blocks:
             _refuse(file, f"errors of a job that is {result.status}", key, "none")
-        idle = result.status == "not-applicable" and result.nominal == "drawn"
-        own = known.given if idle else {}
-        _check_errors(result.start_percent, own, f"{key}.start_percent", "drawn", file)
         return
     found = [
         ((name, mode.modification, mode.number), mode.measured_hz)
@@ -222,22 +222,25 @@ def _check_result(result: JobResult, known: _Known, file: Path, key: str) -> Non
         if abs(hertz - known.measured[mark]) > _SAME * known.measured[mark]:
             what = f"{hertz:.9g} Hz was not measured: mode {mark[2]} of block {mark[0]}"
             _refuse(file, what, f"{key}.{mark[0]}", f"{known.measured[mark]:.9g} Hz")
-    if result.score is not None and not _near(result.score, score_of(result, known.reference)):
-        _refuse(file, f"score {result.score:.6g}, its modes give another", f"{key}.score", _AGAIN)
+    if result.gain is not None and result.answered:
+        own = replace(result, case=next(iter(known.scale.blocks)))
+        gain = known.scale.gain(own.case, known.scale.errors(own)).gain
+        if not _near(result.gain, gain):
+            _refuse(file, f"gain {result.gain:.6g}, its modes give another", f"{key}.gain", _AGAIN)
 
 
 def _check_board(run: Run, board: object, file: Path) -> None:
-    """Check the skills of the leaderboard that comes with a run, where one does."""
+    """Check the gains of the leaderboard that comes with a run, where one does."""
     if board is None:
         return
-    skills: dict[str, float] = dict(zip(*map(leaderboard(run).get, _STATED), strict=True))
+    gains = {str(row["strategy"]): float(row["gain"]) for row in list_rows(run)}
     rows: Iterable[object] = board if isinstance(board, list) else [board]
     for number, row in enumerate(rows):
-        name, skill = (row.get(key) if isinstance(row, dict) else None for key in _STATED)
-        own = skills.get(name) if isinstance(name, str) else None
-        if own is None or not isinstance(skill, (int, float)) or not _near(skill, own):
-            what = f"skill {skill!r}, the results give {own!r}"[:200]
-            _refuse(file, what, f"leaderboard[{number}].skill", "what its results give")
+        name, gain = (row.get(key) if isinstance(row, dict) else None for key in _STATED)
+        own = gains.get(name) if isinstance(name, str) else None
+        if own is None or not isinstance(gain, (int, float)) or not _near(gain, own):
+            what = f"gain {gain!r}, the results give {own!r}"[:200]
+            _refuse(file, what, f"leaderboard[{number}].gain", "what its results give")
 
 
-_STATED = "strategy", "skill"
+_STATED = "strategy", "gain"

@@ -8,6 +8,8 @@ from functools import cached_property
 from typing import Any
 
 from femubench.core.case.case import Case
+from femubench.core.schema.results import Nominal
+from femubench.core.score.ranking import list_models
 from femubench.core.score.scoring import Reference
 from femubench.core.twin.twins import AGAIN, Twin
 
@@ -37,7 +39,7 @@ class Companions:
         case = self.repeated_case
         return {} if case is None else {f"{case.name}{AGAIN}": case.name}
 
-    def about(self, references: Mapping[str, Reference]) -> dict[str, Any]:
+    def about(self, references: Mapping[str, Reference], yardstick: Nominal) -> dict[str, Any]:
         """Return what a run tells of it in its meta data; nothing where there is nothing."""
         if not self.twins and self.repeated_case is None:
             return {}
@@ -53,6 +55,9 @@ class Companions:
                 "again": self._again,
                 "cases": {name: {"digest": digest} for name, digest in digests.items()},
                 "reference": {twin.name: references[twin.name].rms_percent for twin in self.twins},
+                "models": list_models(
+                    {twin.name: {yardstick: references[twin.name].blocks} for twin in self.twins}
+                ),
             }
         }
 

@@ -18,12 +18,12 @@ __all__ = ["modes_frame", "results_frame", "run_from_json", "run_to_json"]
 
 
 def results_frame(run: Run) -> pd.DataFrame:
-    """Return one row a job: status, errors by block, counts, score and rank.
+    """Return one row a job: status, errors by block, counts, gain and rank.
 
     Columns: case strategy seed nominal status reason seconds; ``used_percent``, ``used_mac`` and
     the same for ``higher`` and ``modified`` (nan where the case has no such block);
-    rigid_body_modes rigid_body_modes_expected negative_eigenvalues surplus_partners unphysical
-    parameter_count evaluations score rank. Of a study also the values of its axes:
+    rigid_body_modes rigid_body_modes_expected negative_eigenvalues unphysical
+    parameter_count evaluations gain rank. Of a study also the values of its axes:
     ``plain_case`` and ``plain_strategy``, noise, sensors_left_out, and every option as
     ``STRATEGY.OPTION``.
 
@@ -45,7 +45,7 @@ def results_frame(run: Run) -> pd.DataFrame:
     own = [] if study is None else [_PLAIN.get(name, name) for name in study.names]
     axes = [name for name in own if name not in _JOB]
     frame = pd.DataFrame(rows, columns=[*_JOB, *axes, *_ERRORS, *_COUNTS])
-    whole = {name: "Int64" for name in _COUNTS if name not in ("unphysical", "score")}
+    whole = {name: "Int64" for name in _COUNTS if name not in ("unphysical", "gain")}
     return frame.astype({**whole, **dict.fromkeys(_FLOATS, "float64")})
 
 
@@ -54,7 +54,7 @@ def modes_frame(run: Run) -> pd.DataFrame:
 
     Columns: case strategy seed nominal block modification mode measured_hz predicted_hz
     error_percent counted_percent mac predicted_std_hz. The error is signed, (f_p / f_m - 1), and
-    nan for a mode without partner or with an imaginary one; `counted_percent` is what the score
+    nan for a mode without partner or with an imaginary one; `counted_percent` is what the rms
     takes, 100 for such a mode.
 
     Examples:
@@ -91,8 +91,8 @@ def modes_frame(run: Run) -> pd.DataFrame:
 _JOB = ("case", "strategy", "seed", "nominal", "status", "reason", "seconds")
 _PLAIN = {"case": "plain_case", "strategy": "plain_strategy"}  # without conditions and options
 _COUNTS = (
-    *("rigid_body_modes", "rigid_body_modes_expected", "negative_eigenvalues", "surplus_partners"),
-    *("unphysical", "parameter_count", "evaluations", "score", "rank"),
+    *("rigid_body_modes", "rigid_body_modes_expected", "negative_eigenvalues", "unphysical"),
+    *("parameter_count", "evaluations", "gain", "rank"),
 )
 _ERRORS = tuple(f"{name}_{what}" for name in BLOCKS for what in ("percent", "mac"))
-_FLOATS = ("seconds", *_ERRORS, "score")
+_FLOATS = ("seconds", *_ERRORS, "gain")

@@ -18,7 +18,7 @@ from femubench.core.run.model_checks import check_model
 from femubench.core.schema.records import encode
 from femubench.core.schema.results import JobResult, Nominal
 from femubench.core.score.predicted_spread import Spread
-from femubench.core.score.scoring import Reference, find_given_errors, judge, score_of
+from femubench.core.score.scoring import Reference, judge
 
 _JUDGED = ("model", "samples", "discrepancy_std")  # of an outcome, and no part of the result
 
@@ -85,7 +85,7 @@ def _exhibit(case: Case, outcome: JobOutcome, result: JobResult) -> dict[str, An
 def judge_outcome(
     case: Case, reference: Reference, job: tuple[str, int, Nominal], outcome: JobOutcome
 ) -> JobResult:
-    """Return the result of a job: its model checked and scored; a model that fails has failed.
+    """Return the result of a job: its model checked and judged; a model that fails has failed.
 
     Arguments:
         case: with the nominal model that the strategy started from.
@@ -99,15 +99,10 @@ def judge_outcome(
     result = JobResult(
         case.name, strategy, seed, **own, rigid_body_modes_expected=expected, nominal=nominal
     )
-    if outcome.model is not None:
-        result = _scored(result, case, outcome, reference)
-    elif outcome.status == "not-applicable" and nominal == "drawn":
-        given = find_given_errors(case, reference.rms_percent)
-        result = replace(result, start_percent=given)
-    return replace(result, score=score_of(result, reference.rms_percent))
+    return result if outcome.model is None else _judged(result, case, outcome, reference)
 
 
-def _scored(result: JobResult, case: Case, outcome: JobOutcome, reference: Reference) -> JobResult:
+def _judged(result: JobResult, case: Case, outcome: JobOutcome, reference: Reference) -> JobResult:
     assert outcome.model is not None
     try:
         with warnings.catch_warnings():

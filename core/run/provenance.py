@@ -22,6 +22,7 @@ from femubench.core.plugin.distribution import about
 from femubench.core.plugin.foreign import ForeignStrategy
 from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Strategy
+from femubench.core.score.bounded_gain import Rule
 from femubench.core.score.scoring import Reference
 from femubench.core.source_files import Stamp, python_files, stamp, stamps
 from femubench.core.version import __version__
@@ -234,6 +235,10 @@ def run_meta(
         "citations": {strategy.name: strategy.citation for strategy in strategies},
         "about": {s.name: known for s in strategies if (known := about_of(s))},
         "baseline": next((s.name for s in strategies if getattr(s, "baseline", False)), None),
+        "yardsticks": {
+            s.name: str(said) for s in strategies if (said := getattr(s, "yardstick", ""))
+        },
+        "rule": Rule().to_json(),
         "reference": {name: item.rms_percent for name, item in references.items()},
     }
 

@@ -32,8 +32,9 @@ from femubench.core.schema.run_options import (
     check_keywords,
     split_keywords,
 )
+from femubench.core.score.ranking import list_models, rank_results
 from femubench.core.score.repeatability import unsteady
-from femubench.core.score.scoring import Reference, rank_results, reference_of
+from femubench.core.score.scoring import Reference, reference_of
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,9 @@ class Plan:
             references = starts.companions.add_repeated(self._solve_yardsticks())
             slots = self.slots
             asked |= {"request": dict(self.request), "plan": plan_digest(slots.keys)}
-            about = {**starts.about(cases), **starts.companions.about(references)}
+            about = starts.about(cases)
+            about |= starts.companions.about(references, about["yardstick"])
+            about["models"] = list_models(starts.predict(cases, references))
             yardsticks = {case.name: references[case.name] for case in cases}
             slots.meta = run_meta(cases, strategies, yardsticks, slots.seeds, asked, about)
             meta, known = begin_run(stack, store, slots.meta, options.overwrite, options.resume)
@@ -110,7 +113,7 @@ class Plan:
             for one in executor.compute(workload, wanted):
                 results.add(*one)
             others, done = origins_of(meta), results.in_order()
-            ranked = rank_results([r for r in done if r.case not in others], meta["reference"])
+            ranked = rank_results([r for r in done if r.case not in others], meta)
             found = Run(meta, ranked, tuple(result for result in done if result.case in others))
             if origins_of(meta, "again"):
                 ending["unsteady"] = unsteady(found)

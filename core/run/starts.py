@@ -8,8 +8,9 @@ from typing import Any
 
 from femubench.core.case.case import Case
 from femubench.core.run.companions import NOTHING, Companions
-from femubench.core.schema.results import NOMINALS, Nominal
+from femubench.core.schema.results import NOMINALS, Block, Nominal
 from femubench.core.schema.run_options import StartModels
+from femubench.core.score.scoring import Reference, score_model
 from femubench.core.twin.twins import again
 
 
@@ -55,6 +56,25 @@ class Starts:
         if self.companions.repeated_case is not None:
             nominal, case = next(self.of(self.companions.repeated_case))
             yield nominal, again(case)
+
+    def predict(
+        self, cases: Sequence[Case], references: Mapping[str, Reference]
+    ) -> dict[str, dict[Nominal, Mapping[str, Block]]]:
+        """Return what the nominal models predict that results are measured by, by case.
+
+        Arguments:
+            references: what the one that all errors are measured against gives.
+
+        Raises:
+            ModelError: when a model as drawn has no modes.
+        """
+        yardstick: Nominal = NOMINALS[self.textbook is not None]
+        found = {case.name: {yardstick: references[case.name].blocks} for case in cases}
+        for case in cases:
+            for nominal, own in self.of(case):
+                if nominal != yardstick and case.name in (self.textbook or {}):
+                    found[case.name][nominal] = score_model(own, own.model)
+        return found
 
     def about(self, cases: Sequence[Case]) -> dict[str, Any]:
         """Return what a run tells of its cases: from where they start, and what they are."""

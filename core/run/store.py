@@ -36,9 +36,8 @@ from femubench.core.schema.results import (
     Nominal,
     Run,
     origins_of,
-    rate,
 )
-from femubench.core.score.ranking import scores_and_ranks
+from femubench.core.score.ranking import Scale, rate_results
 
 JobName = tuple[str, str, int, Nominal]
 
@@ -65,7 +64,7 @@ def note_missing_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> 
     Examples:
         >>> meta = {"cases": {"rod": {}}, "strategies": ["mine"], "seeds": [0]}
         >>> results.note_missing_jobs(meta, ())
-        '1 of 1 jobs are missing and score as failures: rod mine seed 0 drawn'
+        '1 of 1 jobs are missing and count as the model that was given: rod mine seed 0 drawn'
     """
     starts = meta.get("starts") or {}
     models = {case: starts.get(case, NOMINALS[:1]) for case in meta.get("cases") or {}}
@@ -90,7 +89,7 @@ def note_missing_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> 
     if "finished" in meta and (meta["finished"] is None or meta.get("interrupted") is True):
         how = "has not ended" if meta["finished"] is None else "was interrupted"
         return f"the run {how}: {len(there)} of {planned} jobs are there; not run: {first}"
-    return f"{lost} of {planned} jobs are missing and score as failures: {first}"
+    return f"{lost} of {planned} jobs are missing and count as the model that was given: {first}"
 
 
 def _is_old(file: Path) -> bool:
@@ -193,7 +192,7 @@ class Store:
 
     @pause_collection()
     def load(self, run_id: str | None = None) -> Run:
-        """Return a run with scores and ranks, its results in the order of its jobs.
+        """Return a run with gains and ranks, its results in the order of its jobs.
 
         What is damaged is left out; ``meta["notes"]`` say so, and which jobs have no result. A run
         that never ended has ``meta["finished"]`` None.
@@ -222,10 +221,7 @@ class Store:
         known, missing = meta.get("notes"), note_missing_jobs(meta, everything)
         notes = [*(known if isinstance(known, list) else []), *notes_of(faults, self.folder)]
         notes += [*self.notes_of_old_files(), *([missing] if missing else [])]
-        reference = meta.get("reference") or None
-        found = scores_and_ranks(listed, reference, meta.get("baseline"))
-        for result, score, rank in zip(listed, *found, strict=True):
-            rate(result, score, rank)
+        rate_results(listed, Scale.of(meta))
         return Run({**meta, "notes": notes}, tuple(listed), companions)
 
     @pause_collection()

@@ -4,10 +4,44 @@ from __future__ import annotations
 
 from msgspec import Struct, field
 
-from femubench.core.schema.bounds import Hertz, Mac, PredictedHertz, StdHertz, Text, Whole
+from femubench.core.schema.bounds import (
+    Hertz,
+    Mac,
+    PredictedHertz,
+    StdHertz,
+    Text,
+    Weight,
+    Whole,
+)
 
 
-class PairedMode(Struct, frozen=True, gc=False):
+class PartnerCandidate(Struct, frozen=True, gc=False, array_like=True):
+    """A mode of a model that may stand for a measured one, and is the partner of no other.
+
+    Arguments:
+        hz: its frequency.
+        weight: how far the sensors see it in the measured shape, in parts of the partner's.
+        mac: with the measured shape.
+    """
+
+    hz: Hertz
+    weight: Weight
+    mac: Mac
+
+
+class ModeBefore(Struct, frozen=True, gc=False, array_like=True):
+    """The mode of the structure as tested that has the shape of a modified one.
+
+    Arguments:
+        number: its label.
+        mac: of the two measured shapes.
+    """
+
+    number: Whole
+    mac: Mac
+
+
+class PairedMode(Struct, frozen=True, gc=False, omit_defaults=True):
     """One measured mode and the model's mode that was paired with it by shape.
 
     Arguments:
@@ -19,6 +53,9 @@ class PairedMode(Struct, frozen=True, gc=False):
         modification: name of the design change; None for the structure as tested.
         predicted_std_hz: standard deviation of what a test would find about `predicted_hz`, its
             own error of measurement included; None where the strategy does not say.
+        candidates: other modes of the model that may stand for the measured one.
+        before: of a modified mode, in what the textbook model predicts, the tested one of its
+            shape.
     """
 
     number: Whole = field(name="mode")
@@ -27,3 +64,5 @@ class PairedMode(Struct, frozen=True, gc=False):
     mac: Mac | None
     modification: Text | None = None
     predicted_std_hz: StdHertz | None = None
+    candidates: tuple[PartnerCandidate, ...] = ()
+    before: ModeBefore | None = None

@@ -14,7 +14,7 @@ from msgspec import Meta, Struct
 from femubench.core.errors import InputError
 from femubench.core.files import MIB, read_text
 from femubench.core.schema.bounds import Name, Percent, Text, Whole
-from femubench.core.schema.results import BLOCKS, NOMINALS, JobResult, Nominal, Run
+from femubench.core.schema.results import BLOCKS, NOMINALS, Blocks, JobResult, Nominal, Run
 from femubench.core.schema.validation import read_plain
 
 LARGEST_RUN = 256 * MIB  # bytes of a file of `bench run --json`
@@ -38,11 +38,13 @@ class _Names(Struct):
     history: list[dict[Name, Any]] = []
     diagnostics: dict[Name, Any] = {}
     provenance: dict[Name, Any] = {}
-    start_percent: dict[Name, Any] = {}
 
 
 class _CaseMeta(Struct):
     title: Text | None = None
+
+
+Models = dict[Name, dict[Nominal, Blocks]]
 
 
 class _TwinsMeta(Struct):
@@ -55,6 +57,7 @@ class _TwinsMeta(Struct):
     cases: dict[Name, _CaseMeta]
     reference: dict[Name, dict[Name, Percent]]
     kinds: dict[Name, list[Name]] = {}
+    models: Models = {}
 
 
 class _MetaRecord(Struct):
@@ -75,6 +78,9 @@ class _MetaRecord(Struct):
     citations: dict[Name, Text] | None = None
     reference: dict[Name, dict[Name, Percent]] | None = None
     twins: _TwinsMeta | None = None
+    yardsticks: dict[Name, Text] | None = None
+    models: Models | None = None
+    rule: dict[Name, str | float] | None = None
 
 
 def check_depth(data: object, what: str, **where: Any) -> None:  # noqa: ANN401 - of InputError

@@ -12,13 +12,13 @@ from femubench.core.display import Shown, count_noun
 from femubench.core.schema.bounds import (
     LONGEST_TEXT,
     Figure,
+    GainFigure,
     Mac,
     Name,
     Note,
     Number,
     Percent,
     Rank,
-    Score,
     Seconds,
     Text,
     Whole,
@@ -65,8 +65,7 @@ class JobResult:
     Arguments:
         case, strategy, seed: the job.
         status: how it ended; anything but ``ok`` has a reason.
-        reason: one line, with the measured figure where a self-check failed; of a model that is
-            ``ok`` how many partners it has, where these are too many.
+        reason: one line, with the measured figure where a self-check failed.
         seconds: wall time of the strategy alone.
         blocks: errors by block name; empty unless the status is ``ok``.
         rigid_body_modes: modes of zero frequency that are rigid-body motions.
@@ -74,8 +73,7 @@ class JobResult:
         negative_eigenvalues: of the updated model.
         parameter_count: unknowns that were free.
         evaluations: eigenvalue solutions that the strategy made.
-        score: how much of the textbook model's error on unseen data is left: geometric mean over
-            the unseen blocks of (rms + 0.05 %) / (its rms + 0.05 %). Less is better.
+        gain: over the textbook model of the case, -1 to 1; more is better.
         rank: within case, seed and nominal model; 1 is best.
         parameters, history, diagnostics: as the strategy gave them, in plain data.
         traceback: of an exception.
@@ -83,10 +81,6 @@ class JobResult:
         provenance: versions, libraries, processor, commit and digests, in plain data.
         nominal: the model that the strategy started from; ``textbook`` too where the model as drawn
             has all that handbooks give.
-        surplus_partners: modes of it that could be partners of measured ones beyond those of the
-            nominal model, where they are too many for a prediction; else 0.
-        start_percent: rms error by block of the model that a strategy was given which is not
-            applicable; empty where that is the textbook model.
     """
 
     case: Name
@@ -101,7 +95,7 @@ class JobResult:
     negative_eigenvalues: Whole | None = None
     parameter_count: Whole | None = None
     evaluations: Whole | None = None
-    score: Score | None = None
+    gain: GainFigure | None = None
     rank: Rank | None = None
     parameters: tuple[Mapping[str, Figure], ...] = ()
     history: tuple[Mapping[str, Number], ...] = ()
@@ -110,8 +104,6 @@ class JobResult:
     key: Name = ""
     provenance: Mapping[str, Note] = field(default_factory=dict)
     nominal: Nominal = "drawn"
-    surplus_partners: Whole | None = None
-    start_percent: Mapping[str, Percent] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Keep texts to what can be read again, and take null of JSON for nan."""
@@ -133,9 +125,13 @@ class JobResult:
 
     @property
     def unphysical(self) -> bool:
-        """Tell whether rigid-body modes were lost, eigenvalues are negative or partners surplus."""
-        damage = self.rigid_modes_lost or self.negative_eigenvalues or self.surplus_partners
-        return self.status == "ok" and bool(damage)
+        """Tell whether rigid-body modes were lost or eigenvalues are negative."""
+        return self.status == "ok" and bool(self.rigid_modes_lost or self.negative_eigenvalues)
+
+    @property
+    def answered(self) -> bool:
+        """Tell whether there is a possible model; else that which was given counts."""
+        return self.status == "ok" and not self.unphysical
 
 
 _set = object.__setattr__  # of what nobody else has yet
@@ -153,9 +149,9 @@ def _with_values(parameter: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**parameter, **_with_nan({n: parameter.get(n) for n in ("before", "after")})}
 
 
-def rate(result: JobResult, score: float, rank: int) -> None:
-    """Give a result that nobody else has yet its score and rank."""
-    _set(result, "score", score)
+def rate(result: JobResult, gain: float | None, rank: int) -> None:
+    """Give a result that nobody else has yet its gain and rank."""
+    _set(result, "gain", gain)
     _set(result, "rank", rank)
 
 

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from statistics import geometric_mean, mean
 from typing import Any, Literal, get_args
 
 from femubench.core.errors import InputError
 from femubench.core.schema.results import BLOCKS, DONE, NOMINALS, JobResult, Nominal, Run
-from femubench.core.score.counting import block_shares, choose_blocks
-from femubench.core.score.ranking import OFFSET_PERCENT, geometric_mean, score_of
+from femubench.core.score.ranking import Scale
 from femubench.core.score.repeatability import environment_differences
-from femubench.core.score.statistics import ScoreTable, Significance, evidence_of, structures_of
+from femubench.core.score.statistics import Significance, structures_of, weigh_evidence
 
-Metric = Literal["unseen", "used", "higher", "modified", "seconds", "failures"]
+Metric = Literal["loss", "used", "higher", "modified", "seconds", "failures"]
 METRICS: tuple[Metric, ...] = get_args(Metric)
 Kind = Literal["lost", "gained", "other"]
-SCHEMA = 3
+SCHEMA = 4
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,8 @@ class Threshold:
     """The largest value of a metric that is still accepted.
 
     Arguments:
-        metric: a ratio B / A of errors (``unseen``: those that make the skill) or of seconds, or
-            ``failures``, the number of results that B lost.
+        metric: ``loss`` of gain, that in A less that in B; a ratio B / A of errors or of seconds;
+            or ``failures``, the number of results that B lost.
         most: exceeded means worse.
     """
 
@@ -34,7 +34,7 @@ class Threshold:
     most: float
 
 
-DEFAULT_THRESHOLDS = (Threshold("unseen", 1.01), Threshold("failures", 0.0))
+DEFAULT_THRESHOLDS = (Threshold("loss", 0.01), Threshold("failures", 0.0))
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class StatusChange(NamedJob):
 
 @dataclass(frozen=True)
 class RatioRow:
-    """Ratios B / A of one strategy in one scenario; less than 1 is better in B.
+    """Loss of gain and ratios B / A of one strategy in one scenario; less is better in B.
 
     Arguments:
         scenario: None for all of them together.
@@ -144,49 +144,28 @@ class Comparison:
 
 
 _ROUNDING = 1e-9  # relative; two machines may differ by it
+_OFFSET_PERCENT = 0.05  # added to both errors of a ratio: one that is met must not decide it
 
 
 @dataclass(frozen=True)
 class _JobPair:
-    """One job in both runs; the errors of the nominal model and its shares stand for both."""
+    """One job in both runs, and the gain that B lost; None on a case that does not count."""
 
     strategy: str
     before: JobResult
     after: JobResult
-    reference: Mapping[str, float]
-    shares: Mapping[str, float] | None
-
-    @property
-    def weight(self) -> float:
-        """Return how much it counts, nothing without unseen data where others have some."""
-        return 1.0 if self.shares is None else sum(self.shares.values())
+    loss: float | None
 
     @property
     def blocks(self) -> dict[str, float]:
         """Return the ratio of the errors of every block that both have."""
         first, second = self.before.blocks, self.after.blocks
         return {
-            name: (second[name].rms_percent + OFFSET_PERCENT)
-            / (first[name].rms_percent + OFFSET_PERCENT)
+            name: (second[name].rms_percent + _OFFSET_PERCENT)
+            / (first[name].rms_percent + _OFFSET_PERCENT)
             for name in BLOCKS
             if name in first and name in second
         }
-
-    @property
-    def unseen(self) -> float | None:
-        """Return the ratio of the scores; None where a failure has nothing to be set against."""
-        reference = self.reference
-        if not reference and self.before.status == self.after.status == "ok":
-            ratios = self.blocks
-            counted = [ratios[name] for name in choose_blocks(ratios)]
-            return geometric_mean(counted) if counted else None
-        if reference:
-            shares = self.shares
-            return score_of(self.after, reference, shares) / score_of(
-                self.before, reference, shares
-            )
-        scores = self.before.score, self.after.score
-        return None if scores[0] is None or scores[1] is None else scores[1] / scores[0]
 
 
 def compare_runs(
@@ -224,17 +203,13 @@ def compare_runs(
     if not shared:
         expected = "one (case, strategy, seed) with the same case files"
         raise InputError("the two runs have no job in common", expected=expected)
-    known = {**(after.meta.get("reference") or {}), **(before.meta.get("reference") or {})}
-    references = {
-        case: known[case] for case in dict.fromkeys(job.case for job in shared) if case in known
-    }
-    structures = {**structures_of(after), **structures_of(before)}
-    shares = block_shares(references, structures)
+    scale, structures = Scale.of(before.meta), {**structures_of(after), **structures_of(before)}
+    held = {job.case for job in shared if scale.holds_back(job.case)}
     pairs = [
-        _JobPair(j.strategy, old[j], new[j], references.get(j.case) or {}, shares.get(j.case))
+        _JobPair(j.strategy, old[j], new[j], _lost_gain(scale, old[j], new[j], held))
         for j in shared
     ]
-    rows = tuple(_rows(pairs))
+    rows = tuple(_rows(pairs, structures))
     excesses = (
         Excess(row.strategy, row.scenario, t.metric, value, t.most)
         for t in thresholds
@@ -243,9 +218,8 @@ def compare_runs(
     )
     stated = (t.metric for t in thresholds if all(row.values[t.metric] is None for row in rows))
     ran = list(dict.fromkeys(pair.strategy for pair in pairs))
-    columns = [[pair.before for pair in pairs if pair.strategy == name] for name in ran]
-    columns += [[pair.after for pair in pairs if pair.strategy == name] for name in ran]
-    table = ScoreTable.of(columns, references, structures)
+    losses = {n: _by_structure((p for p in pairs if p.strategy == n), structures) for n in ran}
+    evidence = weigh_evidence({name: [-lost for lost in own] for name, own in losses.items()})
     return Comparison(
         before=str(before.meta.get("run") or "A"),
         after=str(after.meta.get("run") or "B"),
@@ -253,7 +227,7 @@ def compare_runs(
         jobs=len(pairs),
         changes=_changes(pairs),
         rows=rows,
-        evidence=evidence_of({name: table.ratios(k, k + len(ran)) for k, name in enumerate(ran)}),
+        evidence=evidence,
         only_before=tuple(job for job in old if job not in new),
         only_after=tuple(job for job in new if job not in old),
         other_cases=tuple(other),
@@ -263,6 +237,30 @@ def compare_runs(
         excesses=tuple(excesses),
         untested=tuple(stated),
     )
+
+
+def _lost_gain(
+    scale: Scale, before: JobResult, after: JobResult, held: Collection[str]
+) -> float | None:
+    """Return what B gains less than A; None on a case without unseen data where others have some.
+
+    A job without a possible model counts as the one that was given.
+    """
+    if held and before.case not in held:
+        return None
+    gains = (scale.gain(r.case, scale.errors(r)).gain for r in (before, after))
+    lost = next(gains) - next(gains)
+    return None if math.isnan(lost) else lost
+
+
+def _by_structure(pairs: Iterable[_JobPair], structures: Mapping[str, str]) -> list[float]:
+    """Return the mean loss of every structure, over seeds and then over its cases."""
+    found: dict[str, dict[str, list[float]]] = {}
+    for pair in pairs:
+        if pair.loss is not None:
+            case = pair.before.case
+            found.setdefault(structures.get(case, case), {}).setdefault(case, []).append(pair.loss)
+    return [mean(map(mean, cases.values())) for cases in found.values()]
 
 
 def _notes(run: Run) -> list[str]:
@@ -355,12 +353,11 @@ def _damage(result: JobResult) -> str:
     counts = {
         "rigid-body modes lost": result.rigid_modes_lost,
         "eigenvalues < 0": result.negative_eigenvalues or 0,
-        "surplus partners": result.surplus_partners or 0,
     }
     return ", ".join(f"{number} {what}" for what, number in counts.items() if number)
 
 
-def _rows(pairs: Iterable[_JobPair]) -> Iterable[RatioRow]:
+def _rows(pairs: Iterable[_JobPair], structures: Mapping[str, str]) -> Iterable[RatioRow]:
     groups: dict[str, dict[str | None, list[_JobPair]]] = {}
     for pair in pairs:
         group = groups.setdefault(pair.strategy, {None: []})
@@ -368,11 +365,8 @@ def _rows(pairs: Iterable[_JobPair]) -> Iterable[RatioRow]:
         group.setdefault(pair.before.case.partition("/")[0], []).append(pair)
     for strategy, scenarios in groups.items():
         for scenario, listed in scenarios.items():
-            ratios = [(pair.unseen, pair.weight) for pair in listed if pair.weight > 0.0]
-            known = [(ratio, weight) for ratio, weight in ratios if ratio is not None]
-            values: dict[str, float | None] = {"unseen": None}
-            if known:
-                values["unseen"] = geometric_mean((r for r, _ in known), (w for _, w in known))
+            losses = _by_structure(listed, structures)
+            values: dict[str, float | None] = {"loss": mean(losses) if losses else None}
             for block in BLOCKS:
                 errors = [pair.blocks[block] for pair in listed if block in pair.blocks]
                 values[block] = geometric_mean(errors) if errors else None

@@ -6,198 +6,309 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from femubench.core.garbage import pause_collection
-from femubench.core.schema.results import BLOCKS, UNSEEN, JobResult, Run
+from femubench.core.schema.results import BLOCKS, JobResult, Nominal, Run, origins_of
 from femubench.core.score import predictive
-from femubench.core.score.counting import (
-    WHOLE,
-    References,
-    Weights,
-    block_weights,
+from femubench.core.score.bounded_gain import ModelErrors
+from femubench.core.score.ranking import TIE, Scale, rank_items
+from femubench.core.score.statistics import (
+    FEWEST,
+    Differences,
+    interval_of_mean,
+    structures_of,
+    tell_apart,
 )
-from femubench.core.score.ranking import (
-    OFFSET_PERCENT,
-    SCORE_OF_FAILURE,
-    rank_items,
-    rank_results,
-    score_in,
-)
-from femubench.core.score.statistics import FEWEST, interval_over_structures, structures_of
 from femubench.core.typing import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
 
 TESTED = "published test"  # the class of a scenario whose data were measured
-# What is added to all errors; ranks that move within are no ranks.
-FLOORS = (0.005, 0.02, OFFSET_PERCENT, 0.1, 0.2)  # percent
-_RESAMPLES = 999
+MUCH_WORSE = 1.25  # times the textbook model's error
+# What is averaged over seeds, then over the cases of a structure, then over structures.
+FIGURES = (
+    *("gain", "error_gain", "change_gain", "error_percent", "band_percent", "shape_error"),
+    "false_modes",
+)
+_COUNTS = ("parameter_count", "evaluations", "seconds")
 COLUMNS = (
-    *("rank", "strategy", "skill", "skill_low", "skill_high", "skill_drawn", "skill_tests"),
+    *("rank", "strategy", "yardstick", "gain", "gain_low", "gain_high"),
+    *("error_percent", "textbook_percent", "better_share", "worse_share"),
+    *("error_gain", "change_gain"),
+    *("gain_drawn", "gain_tests", "band_percent", "shape_error", "false_modes"),
     *(f"{block}_percent" for block in BLOCKS),
     *predictive.COLUMNS,
     *("rigid_modes_lost", "negative_eigenvalues", "parameters", "evaluations", "seconds"),
-    *("ok", "not_applicable", "total", "unphysical"),
+    *("answered", "ok", "not_applicable", "total", "unphysical", "better_than", "worse_than"),
 )
 
 
 @dataclass(frozen=True)
-class _Grid:
-    """All (case, block, seed) that a strategy is expected to have a result for.
+class GainTable:
+    """What the rows of a leaderboard are made from.
 
     Arguments:
-        cases: of the run.
-        weights: how much a block counts among those of its structure.
+        scale: what the results are measured by.
+        names: strategies.
+        cases: that count: those that hold data back, where one does.
         seeds: of the run.
-        structures: by case; one that is not named is a structure of its own.
-        reference: rms error of the nominal model in percent by case and block.
+        structures: of each case, by its place among them.
+        expected: jobs of every strategy, those on cases that do not count with them.
+        values: `FIGURES` by strategy, (cases, seeds, figures); what is missing counts as the model
+            that was given, and on twins not at all.
     """
 
+    scale: Scale
+    names: tuple[str, ...]
     cases: tuple[str, ...]
-    weights: Weights
     seeds: tuple[int, ...]
-    structures: dict[str, str]
-    reference: References
+    structures: tuple[str, ...]
+    expected: int
+    values: Mapping[str, FloatArray]
 
     @classmethod
-    def of(cls, run: Run) -> _Grid:
-        reference = run.meta.get("reference") or {}
-        cases = dict.fromkeys((*reference, *(result.case for result in run.ranked)))
-        seeds = {*run.meta.get("seeds", ()), *(result.seed for result in run.results)}
-        structures = structures_of(run)
-        weights = block_weights(reference, structures)
-        weights |= {(case, WHOLE): 1.0 for case in cases if case not in reference}
-        return cls(tuple(cases), weights, tuple(sorted(seeds)), structures, reference)
+    def of(
+        cls,
+        run: Run,
+        results: Iterable[JobResult],
+        nominal: Nominal,
+        origins: Mapping[str, str] | None = None,
+    ) -> GainTable:
+        """Return the figures of results.
 
-    def of_cases(self, cases: Iterable[str]) -> _Grid:
-        """Return what is expected on some of the cases."""
-        chosen = frozenset(cases)
-        weights = {unit: w for unit, w in self.weights.items() if unit[0] in chosen}
-        return _Grid(self.cases, weights, self.seeds, self.structures, self.reference)
+        Arguments:
+            run: that they belong to.
+            nominal: the model that they started from.
+            origins: from the twins that the results are on to their cases; those without a twin
+                have no part.
 
-    @property
-    def members(self) -> FloatArray:
-        """Return how much every block is of its structure's mean; (structures, blocks)."""
-        owners = [self.structures.get(case, case) for case, _ in self.weights]
-        names = {name: place for place, name in enumerate(dict.fromkeys(owners))}
-        member = np.zeros((len(names), len(owners)))
-        member[[names[name] for name in owners], range(len(owners))] = list(self.weights.values())
-        return np.asarray(member / member.sum(axis=1, keepdims=True))
-
-    def logs(self, results: Iterable[JobResult], floor_percent: float) -> FloatArray:
-        """Return the logarithms of a strategy's scores; (structures, seeds).
-
-        What is missing counts as a failure.
+        Raises:
+            InputError: when the run keeps too little to be scored.
         """
-        found = {(result.case, result.seed): result for result in results}
-        scores = [
-            SCORE_OF_FAILURE
-            if (result := found.get((case, seed))) is None
-            else score_in(result, block, self.reference.get(case) or {}, floor_percent)
-            for case, block in self.weights
-            for seed in self.seeds
-        ]
-        shape = len(self.weights), len(self.seeds)
-        logs = np.log(np.array(scores, dtype=float)).reshape(shape)
-        return np.asarray(self.members @ logs)
+        scale, listed = Scale.of(run.meta), list(results)
+        named = run.meta.get("models") or {}
+        cases = dict.fromkeys((*named, *(result.case for result in run.ranked)))
+        if origins is not None:
+            cases = dict.fromkeys(name for name in cases if name in set(origins.values()))
+        for case in cases:
+            scale.start(case, nominal)
+        held = [case for case in cases if scale.holds_back(case)] or list(cases)
+        seeds = {*run.meta.get("seeds", ()), *(result.seed for result in run.results)}
+        names = tuple(dict.fromkeys(run.meta.get("strategies", ())))
+        names += tuple(sorted({result.strategy for result in run.results} - set(names)))
+        own = structures_of(run)
+        found: dict[tuple[str, str, int], list[FloatArray]] = defaultdict(list)
+        for result in listed:
+            case = result.case if origins is None else origins.get(result.case, "")
+            if case in cases:
+                figures = _figures(scale, result.case, scale.errors(result))
+                found[result.strategy, case, result.seed].append(figures)
+        # Who did not run on a twin has no gain there.
+        given = {
+            case: _figures(scale, case, scale.start(case, nominal))
+            if origins is None
+            else np.full(len(FIGURES), math.nan)
+            for case in held
+        }
+        order = tuple(sorted(seeds))
+        values = {
+            name: np.array(
+                [
+                    np.mean(found.get((name, case, seed), [given[case]]), axis=0)
+                    for case in held
+                    for seed in order
+                ]
+            ).reshape(len(held), len(order), len(FIGURES))
+            for name in names
+        }
+        structures = tuple(own.get(case, case) for case in held)
+        return cls(scale, names, tuple(held), order, structures, len(cases) * len(order), values)
+
+    @cached_property
+    def units(self) -> tuple[str, ...]:
+        """Return the structures, each once."""
+        return tuple(dict.fromkeys(self.structures))
+
+    def by_structure(self, values: FloatArray, cases: Iterable[str] | None = None) -> FloatArray:
+        """Return the mean over the cases of every structure, (structures, seeds, figures).
+
+        Arguments:
+            values: of one strategy, (cases, seeds, figures).
+            cases: those that count; all where there are none.
+        """
+        chosen = frozenset(self.cases if cases is None else cases)
+        owners = np.array([
+            s if case in chosen else "" for case, s in zip(self.cases, self.structures, strict=True)
+        ])  # fmt: skip
+        units = [unit for unit in self.units if unit in owners]
+        shape = (len(units), *values.shape[1:])
+        return np.array([mean_known(values[owners == unit]) for unit in units]).reshape(shape)
+
+    def gains(self, name: str) -> FloatArray:
+        """Return the gain of a strategy on every structure, mean over the seeds, (structures,)."""
+        return mean_known(np.moveaxis(self.by_structure(self.values[name])[:, :, 0], 1, 0))
 
     @property
     def interval(self) -> str:
-        """Return what the intervals of the skills are over; nothing where there are none."""
-        count = len({self.structures.get(case, case) for case, _ in self.weights})
-        return "structures" if count >= FEWEST else "seeds" if len(self.seeds) > 1 else ""
+        """Return what intervals are over: ``structures``, ``seeds`` or nothing."""
+        return "structures" if len(self.units) >= FEWEST else "seeds" if len(self.seeds) > 1 else ""
+
+
+@dataclass(frozen=True)
+class Standings:
+    """A run as a board has it: the table of each strategy that counts, and who differs.
+
+    Arguments:
+        own: on the cases.
+        counted: by strategy the figures that count, on the cases or, where these are lower, on
+            their twins, (cases, seeds, figures).
+        apart: the differences that are shown.
+    """
+
+    own: GainTable
+    counted: Mapping[str, FloatArray]
+    apart: Differences
+
+    @classmethod
+    def of(cls, run: Run) -> Standings:
+        """Return the standings of a run.
+
+        Raises:
+            InputError: when the run keeps too little to be scored.
+        """
+        own = GainTable.of(run, run.ranked, run.nominals[0])
+        counted = dict(own.values)
+        if origins := origins_of(run.meta, "of"):
+            twins = GainTable.of(run, run.companions, run.nominals[0], origins)
+            rows = [own.cases.index(case) for case in twins.cases]
+            for name, values in counted.items():
+                other = values.copy()
+                there = np.isfinite(twins.values[name][:, :, :1])
+                other[rows] = np.where(there, twins.values[name], values[rows])
+                counted[name] = min((values, other), key=lambda item: _mean_gain(own, item))
+        gains = {n: own.by_structure(v)[:, :, 0].mean(axis=1) for n, v in counted.items()}
+        return cls(own, counted, tell_apart(gains))
+
+
+def _mean_gain(table: GainTable, values: FloatArray) -> float:
+    return float(table.by_structure(values)[:, :, 0].mean())
+
+
+def _figures(scale: Scale, case: str, errors: ModelErrors) -> FloatArray:
+    return np.array(list(scale.figures(case, errors).values()))
+
+
+def mean_known(values: FloatArray) -> FloatArray:
+    """Return the mean along the first axis of what is known; nan where nothing is."""
+    known = np.isfinite(values)
+    total = np.where(known, values, 0.0).sum(axis=0)
+    count = known.sum(axis=0)
+    return np.asarray(np.where(count > 0, total / np.maximum(count, 1), math.nan))
 
 
 def interval_kind(run: Run) -> str:
-    """Return what the intervals of the skills are over: ``structures``, ``seeds`` or nothing.
+    """Return what the intervals of the gains are over: ``structures``, ``seeds`` or nothing.
 
     Examples:
         >>> results.interval_kind(run)
         ''
     """
-    return _Grid.of(run).interval
+    return GainTable.of(run, (), run.nominals[0]).interval
 
 
 @pause_collection()
-def leaderboard(run: Run, floor_percent: float = OFFSET_PERCENT) -> pd.DataFrame:
-    """Return one row a strategy, best first: physical, then unphysical, then without any model.
+def leaderboard(run: Run) -> pd.DataFrame:
+    """Return one row a strategy, by gain; yardsticks stand in their place and have no rank.
 
-    Strategies of one skill share a rank.
+    Strategies of one gain share a rank.
 
-    `skill` is the part of the textbook model's error on unseen data that the strategy takes away:
-    1 leaves nothing of it, 0 is no better, less than 0 is worse. It is 1 - r, with r the geometric
-    mean over structures, each the mean of its unseen blocks, of (rms + 0.05 %) / (rms of the
-    textbook model + 0.05 %), with several seeds the median over them. A job without result counts
-    as 10 in r. `skill_low` and `skill_high` are its 95 % bootstrap interval: over structures where
-    there are enough of them, else over the seeds of those there are. `skill_drawn` is the skill
-    with which the strategy starts from the models as drawn, `skill_tests` that on tests alone,
-    without computed truths; nan where there is no such difference. The three errors are the median
-    over cases of the median over seeds of the rms error in percent, over the jobs that are ok; so
-    are `parameters`, `evaluations` and `seconds`. Rigid-body modes lost and negative eigenvalues
-    are sums. `coverage90`, `crps_percent` and `log_score` are those of docs/scoring.md.
+    `gain` is what a model gains over the textbook one, -1 to 1, mean over structures of the means
+    of `error_gain`, of the frequencies out of the given band, and `change_gain`, of their changes
+    by modifications; a job without a possible model counts as the model that was given. On twins
+    it is theirs where that is lower. `gain_low` and `gain_high` are its 95 % bootstrap interval:
+    over structures where there are enough of them, else over the seeds of those there are.
+    `error_percent` is the error out of band, `better_share` and `worse_share` the shares of the
+    structures where it is below the textbook model's, and above that by more than a quarter.
+    `band_percent` is the error of modified modes in the given band, `shape_error` the mean
+    1 - MAC, `false_modes` how many modes a test would see and did not. `gain_drawn` is the gain
+    with which the strategy starts from the models as drawn, `gain_tests` that on tests alone,
+    without computed truths; nan where there is no such difference. `used_percent` and the like are
+    rms errors, medians over cases of the medians over seeds, of jobs that are ok; so are
+    `parameters`, `evaluations` and `seconds`. Rigid-body modes lost and negative eigenvalues are
+    sums. `better_than` and `worse_than` are the strategies of which a difference is shown.
+    `coverage90`, `crps_percent` and `log_score` are those of docs/scoring.md.
 
     Arguments:
-        run: with `reference`, `seeds`, `seed` and `strategies` in its meta.
-        floor_percent: what is added to all errors.
+        run: with `rule`, `models`, `seeds` and `strategies` in its meta.
+
+    Raises:
+        InputError: when the run keeps too little to be scored.
 
     Examples:
-        >>> results.leaderboard(run)[["rank", "skill"]].round(2).values.tolist()
-        [[1.0, 0.47], [2.0, -1.97]]
+        >>> results.leaderboard(run)["gain"].round(2).tolist()
+        [0.6, -0.67]
     """
     import pandas as pd
 
-    table = _RankTable.of(run, floor_percent)
-    scored = run.ranked
-    if any(block == WHOLE for _, block in table.grid.weights):
-        reference = run.meta.get("reference") or None
-        scored = rank_results(scored, reference, run.meta.get("baseline"))
-    own: dict[str, list[JobResult]] = {name: [] for name in table.names}
-    for result in scored:
-        own[result.strategy].append(result)
-    rows = [_row(name, results, table) for name, results in own.items()]
-    listed = [{**row, "rank": rank} for rank, row in rank_items(rows, _order)]
-    return pd.DataFrame(listed, columns=list(COLUMNS))
+    return pd.DataFrame(list_rows(run), columns=list(COLUMNS)).astype({"rank": float})
+
+
+def list_rows(run: Run) -> list[dict[str, Any]]:
+    """Return the rows of `leaderboard`, best first; the rank of a yardstick is None.
+
+    Arguments:
+        run: as for `leaderboard`.
+
+    Raises:
+        InputError: when the run keeps too little to be scored.
+    """
+    standings = Standings.of(run)
+    if not standings.own.cases:
+        return []
+    by_name: dict[str, list[JobResult]] = {name: [] for name in standings.own.names}
+    for result in run.ranked:
+        by_name[result.strategy].append(result)
+    rows = [_row(run, name, results, standings) for name, results in by_name.items()]
+    if len(run.nominals) > 1:
+        drawn = GainTable.of(run, run.started_from("drawn"), "drawn")
+        for row in rows:
+            row["gain_drawn"] = _mean_gain(drawn, drawn.values[row["strategy"]])
+
+    def order(row: Mapping[str, Any]) -> tuple[tuple[float, ...], float, str]:
+        return (), -row["gain"], row["strategy"]
+
+    ranked = rank_items((row for row in rows if not row["yardstick"]), order)
+    ranks = {row["strategy"]: rank for rank, row in ranked}
+    rows = [row for _, row in rank_items(rows, order)]
+    return [{**row, "rank": ranks.get(row["strategy"])} for row in rows]
 
 
 def row_of(run: Run, strategy: str) -> dict[str, Any]:
-    """Return the row of one strategy on a leaderboard, without its rank; results have scores.
+    """Return the row of one strategy on a leaderboard, without its rank.
 
     Arguments:
         run: as for `leaderboard`.
         strategy: its name.
     """
     found = [result for result in run.ranked if result.strategy == strategy]
-    return _row(strategy, found, _RankTable.of(run, OFFSET_PERCENT))
-
-
-def ranks_by_floor(run: Run) -> dict[str, tuple[int, ...]]:
-    """Return the ranks of every strategy for each of `FLOORS`, in the order of the leaderboard.
-
-    Examples:
-        >>> list(results.ranks_by_floor(run).values())
-        [(1, 1, 1, 1, 1), (2, 2, 2, 2, 2)]
-    """
-    ranks = {floor: leaderboard(run, floor).set_index("strategy")["rank"] for floor in FLOORS}
-    order = ranks[OFFSET_PERCENT].index
-    return {name: tuple(int(found[name]) for found in ranks.values()) for name in order}
+    return _row(run, strategy, found, Standings.of(run))
 
 
 def find_basis(run: Run) -> str:
-    """Return on what the skill of a run is measured: ``unseen`` data, or the ``given`` modes.
+    """Return on what the gain of a run is measured: ``unseen`` data, or the ``given`` modes.
 
     Examples:
         >>> results.find_basis(run)
         'unseen'
     """
-    errors = run.meta.get("reference") or {}
-    found = errors.values() if errors else (result.blocks for result in run.results)
-    blocks = {name for listed in found for name in listed}
-    return "unseen" if blocks & set(UNSEEN) else "given"
+    scale = Scale.of(run.meta)
+    return "unseen" if any(map(scale.holds_back, scale.textbook)) else "given"
 
 
 def is_test(classes: Sequence[str] | None) -> bool:
@@ -213,116 +324,66 @@ def is_test(classes: Sequence[str] | None) -> bool:
     return not classes or TESTED in classes
 
 
-@dataclass(frozen=True)
-class _RankTable:
-    """What the rows of a leaderboard are made from.
-
-    Arguments:
-        names: strategies.
-        grid: of the ranks; `tests` of the cases whose truth is a test, None where all are or none.
-        drawn: the results from the models as drawn, by strategy; None with one nominal model.
-        seed: of the bootstrap.
-        floor_percent: what is added to all errors.
-    """
-
-    names: tuple[str, ...]
-    grid: _Grid
-    tests: _Grid | None
-    drawn: dict[str, list[JobResult]] | None
-    seed: int
-    floor_percent: float
-
-    @classmethod
-    def of(cls, run: Run, floor_percent: float) -> _RankTable:
-        grid = _Grid.of(run)
-        classes = run.meta.get("classes") or {}
-        tests = [case for case in grid.cases if is_test(classes.get(case))]
-        drawn: dict[str, list[JobResult]] | None = None
-        if len(run.nominals) > 1:
-            drawn = defaultdict(list)
-            for result in run.started_from("drawn"):
-                drawn[result.strategy].append(result)
-        names = tuple(dict.fromkeys(run.meta.get("strategies", ())))
-        names += tuple(sorted({result.strategy for result in run.results} - set(names)))
-        both = 0 < len(tests) < len(grid.cases)
-        seed = int(run.meta.get("seed", 0))
-        return cls(names, grid, grid.of_cases(tests) if both else None, drawn, seed, floor_percent)
-
-
-def _order(row: dict[str, Any]) -> tuple[tuple[bool, bool], float, str]:
-    """Put physical models first, then unphysical ones, then who never gave a model."""
-    nothing = row["ok"] + row["not_applicable"] == 0
-    return (nothing, row["unphysical"]), 1.0 - row["skill"], row["strategy"]
-
-
-def _row(strategy: str, results: Sequence[JobResult], table: _RankTable) -> dict[str, Any]:
-    grid = table.grid
-    logs = grid.logs(results, table.floor_percent)
-    left = np.exp(logs.mean(axis=0))
-    low, high = (
-        interval_over_structures(logs.mean(axis=1))
-        if grid.interval == "structures"
-        else _over_seeds(left, strategy, table.seed)
-    )
+def _row(
+    run: Run, strategy: str, results: Sequence[JobResult], standings: Standings
+) -> dict[str, Any]:
+    table, values = standings.own, standings.counted[strategy]
+    by_structure = table.by_structure(values)
+    gains = by_structure[:, :, 0]
+    over = {"structures": gains.mean(axis=1), "seeds": gains.mean(axis=0), "": gains[:1, 0]}
+    low, high = interval_of_mean(over[table.interval]) if table.interval else (math.nan, math.nan)
+    means = mean_known(mean_known(np.moveaxis(by_structure, 1, 0)))
+    figures = dict(zip(FIGURES, means.tolist(), strict=True))
+    error = by_structure[:, :, FIGURES.index("error_percent")].mean(axis=1)
+    known = [100.0 * table.scale.textbook[case].error for case in table.cases]
+    textbook = table.by_structure(np.array(known)[:, None, None])[:, 0, 0]
+    classes = run.meta.get("classes") or {}
+    tests = [case for case in table.cases if is_test(classes.get(case))]
     fine = [result for result in results if result.status == "ok"]
-    figures: dict[str, dict[str, list[float]]] = {
-        name: defaultdict(list) for name in (*BLOCKS, *_FIGURES)
+    medians: dict[str, dict[str, list[float]]] = {
+        name: defaultdict(list) for name in (*BLOCKS, *_COUNTS)
     }
     for result in fine:
-        case = result.case
         for name, block in result.blocks.items():
-            figures[name][case].append(block.rms_percent)
-        for name, value in zip(_FIGURES, _figures(result), strict=True):
+            medians[name][result.case].append(block.rms_percent)
+        for name, value in zip(_COUNTS, attrgetter(*_COUNTS)(result), strict=True):
             if value is not None:
-                figures[name][case].append(value)
-    lost = sum(result.rigid_modes_lost for result in fine)
-    negative = sum(result.negative_eigenvalues or 0 for result in fine)
+                medians[name][result.case].append(value)
+    owners = dict(zip(table.cases, table.structures, strict=True))
     return {
         "strategy": strategy,
-        "skill": 1.0 - float(np.median(left)),
-        "skill_low": 1.0 - high,
-        "skill_high": 1.0 - low,
-        "skill_drawn": _skill(
-            grid if table.drawn is not None else None,
-            (table.drawn or {}).get(strategy, ()),
-            table.floor_percent,
-        ),
-        "skill_tests": _skill(table.tests, results, table.floor_percent),
-        **{f"{block}_percent": _median(figures[block]) for block in BLOCKS},
-        **predictive.scores(fine, grid.structures),
-        "rigid_modes_lost": lost,
-        "negative_eigenvalues": negative,
-        "parameters": _median(figures["parameter_count"]),
-        "evaluations": _median(figures["evaluations"]),
-        "seconds": _median(figures["seconds"]),
+        "yardstick": (run.meta.get("yardsticks") or {}).get(strategy, ""),
+        **figures,
+        "gain_low": low,
+        "gain_high": high,
+        "textbook_percent": float(mean_known(textbook)),
+        "better_share": _share(error < textbook * (1.0 - TIE), textbook),
+        "worse_share": _share(error > MUCH_WORSE * textbook, textbook),
+        "gain_drawn": math.nan,
+        "gain_tests": float(table.by_structure(values, tests)[:, :, 0].mean())
+        if 0 < len(tests) < len(table.cases)
+        else math.nan,
+        **{f"{block}_percent": _median(medians[block]) for block in BLOCKS},
+        **predictive.scores(fine, owners),
+        "rigid_modes_lost": sum(result.rigid_modes_lost for result in fine),
+        "negative_eigenvalues": sum(result.negative_eigenvalues or 0 for result in fine),
+        "parameters": _median(medians["parameter_count"]),
+        "evaluations": _median(medians["evaluations"]),
+        "seconds": _median(medians["seconds"]),
+        "answered": sum(result.answered for result in results),
         "ok": len(fine),
         "not_applicable": sum(result.status == "not-applicable" for result in results),
-        "total": len(grid.cases) * len(grid.seeds),
+        "total": table.expected,
         "unphysical": any(result.unphysical for result in fine),
+        "better_than": standings.apart.better_than(strategy),
+        "worse_than": standings.apart.worse_than(strategy),
     }
 
 
-def _skill(grid: _Grid | None, results: Sequence[JobResult], floor_percent: float) -> float:
-    """Return a strategy's skill on a grid; nan where it is none or nothing on it counts."""
-    if grid is None or not grid.weights:
-        return math.nan
-    return 1.0 - float(np.median(np.exp(grid.logs(results, floor_percent).mean(axis=0))))
-
-
-def _over_seeds(left: FloatArray, strategy: str, seed: int) -> tuple[float, float]:
-    """Return the bootstrap interval of the median over seeds; nan with a single seed."""
-    if len(left) < 2:
-        return math.nan, math.nan
-    from scipy.stats import bootstrap
-
-    random = np.random.default_rng(np.random.SeedSequence([seed, *strategy.encode()]))
-    how: dict[str, Any] = {"method": "percentile", "n_resamples": _RESAMPLES}
-    found = bootstrap((left,), np.median, **how, random_state=random)
-    return float(found.confidence_interval.low), float(found.confidence_interval.high)
-
-
-_FIGURES = ("parameter_count", "evaluations", "seconds")
-_figures = attrgetter(*_FIGURES)
+def _share(which: FloatArray, known: FloatArray) -> float:
+    """Return the share of the structures that have an error."""
+    there = np.isfinite(known)
+    return float(which[there].mean()) if there.any() else math.nan
 
 
 def _median(by_case: Mapping[str, Sequence[float]]) -> float:

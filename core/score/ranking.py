@@ -1,88 +1,122 @@
-"""Scores and ranks: every model against the textbook one of its case, on what nobody was given."""
+"""Gains and ranks of jobs: every model against the textbook one of its case."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
-from typing import TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
-import numpy as np
+import msgspec
 
+from femubench.core.errors import InputError
 from femubench.core.garbage import pause_collection
-from femubench.core.schema.results import DONE, JobResult, Nominal
-from femubench.core.score.counting import WHOLE, choose_blocks
+from femubench.core.schema.records import to_plain
+from femubench.core.schema.results import BLOCKS, UNSEEN, Block, JobResult, Nominal, rate
+from femubench.core.score.bounded_gain import (
+    CaseGain,
+    ModelErrors,
+    Rule,
+    find_gain,
+    measure_errors,
+)
 
-# A block that the nominal model already meets to the last digit must not decide a ranking.
-OFFSET_PERCENT = 0.05
-SCORE_OF_FAILURE = 10.0
-SCORE_OF_NOTHING_DONE = 1.0
-TIE = 1e-6  # relative; scores that differ by less share a rank: rounding differs by 1e-9 or so
+TIE = 1e-6  # gains that differ by less share a rank: rounding differs by 1e-9 or so
 
 _Item = TypeVar("_Item")
+Models = Mapping[str, Mapping[Nominal, Mapping[str, Block]]]
 
 
-def score_of(
-    result: JobResult, reference: Mapping[str, float], shares: Mapping[str, float] | None = None
-) -> float:
-    """Return how much of the nominal error on unseen data is left: 1 is all of it, less is better.
-
-    It is the geometric mean over the unseen blocks of (rms + 0.05 %) / (nominal rms + 0.05 %); of
-    a case that holds nothing back, over the block of the given modes. A job without a model scores
-    10. A strategy that is not applicable scores as the model that it was given.
+@dataclass(frozen=True)
+class Scale:
+    """What the results of a run are measured by.
 
     Arguments:
-        reference: rms error of the nominal model in percent by block name.
-        shares: how much each block counts; alike by default.
+        rule: of the gains.
+        blocks: what the textbook model of every case predicts.
+        textbook: its errors.
+        starts: the errors of the model that strategies were given, by case and nominal model.
     """
-    fixed = _score_without_errors(result)
-    if fixed is not None or not reference:
-        return SCORE_OF_FAILURE if fixed is None else fixed
-    known = shares or dict.fromkeys(choose_blocks(reference), 1.0)
-    return geometric_mean(
-        (score_in(result, name, reference) for name in known), weights=known.values()
-    )
 
+    rule: Rule
+    blocks: Mapping[str, Mapping[str, Block]]
+    textbook: Mapping[str, ModelErrors]
+    starts: Mapping[tuple[str, Nominal], ModelErrors]
 
-def score_in(
-    result: JobResult,
-    block: str,
-    reference: Mapping[str, float],
-    floor_percent: float = OFFSET_PERCENT,
-) -> float:
-    """Return (rms + floor) / (nominal rms + floor) of one block.
+    @classmethod
+    def of(cls, meta: Mapping[str, Any]) -> Scale:
+        """Return the scale of a run; one made before there was a rule gives it no case.
 
-    Arguments:
-        block: its name; empty for the score that the result comes with, where no nominal error
-            is known.
-        reference: rms error of the nominal model in percent by block name.
-        floor_percent: what is added to both errors.
-    """
-    fixed = _score_without_errors(result)
-    if fixed is not None:
-        return fixed
-    if block == WHOLE:
-        return SCORE_OF_FAILURE if result.score is None else result.score
-    error = result.start_percent.get(block)
-    if result.status == "ok":
-        error = result.blocks[block].rms_percent if block in result.blocks else None
-    if error is None:
-        return SCORE_OF_FAILURE
-    return (error + floor_percent) / (reference[block] + floor_percent)
+        Raises:
+            InputError: for a rule, or models, that are none.
+        """
+        rule = Rule.of(meta)
+        listed = {**(meta.get("models") or {}), **((meta.get("twins") or {}).get("models") or {})}
+        return cls.of_models(msgspec.convert(listed, Models), rule, meta.get("yardstick"))
 
+    @classmethod
+    def of_models(cls, models: Models, rule: Rule, yardstick: Nominal | None) -> Scale:
+        """Return the scale that models give.
 
-def _score_without_errors(result: JobResult) -> float | None:
-    """Return the score of a job without model, or with the textbook model; None of any other."""
-    if result.status not in DONE:
-        return SCORE_OF_FAILURE
-    idle = result.status == "not-applicable" and not result.start_percent
-    return SCORE_OF_NOTHING_DONE if idle else None
+        Arguments:
+            models: what the nominal models of every case predict.
+            yardstick: the one that all others are measured against.
 
+        Raises:
+            InputError: when a case lacks that one.
+        """
+        try:
+            blocks = {case: own[yardstick or "drawn"] for case, own in models.items()}
+        except KeyError as fault:
+            what = f"a case has no {fault.args[0]} model to be measured against"
+            raise InputError(what, expected="a run of this version: run it again") from fault
+        errors: dict[tuple[str, Nominal], ModelErrors] = {
+            (case, nominal): measure_errors(found, blocks[case], rule)
+            for case, own in models.items()
+            for nominal, found in own.items()
+        }
+        textbook = {case: errors[case, yardstick or "drawn"] for case in models}
+        return cls(rule, blocks, textbook, errors)
 
-def geometric_mean(values: Iterable[float], weights: Iterable[float] | None = None) -> float:
-    """Return the weighted geometric mean of positive numbers."""
-    numbers = np.array(list(values), dtype=float)
-    shares = np.ones(len(numbers)) if weights is None else np.array(list(weights), dtype=float)
-    return float(np.exp(np.average(np.log(numbers), weights=shares)))
+    def holds_back(self, case: str) -> bool:
+        """Tell whether a case has data that no strategy is given."""
+        self.start(case, "drawn")  # of one that is not kept it says so
+        return any(name in UNSEEN for name in self.blocks[case])
+
+    def start(self, case: str, nominal: Nominal) -> ModelErrors:
+        """Return the errors of a model that a strategy was given.
+
+        Raises:
+            InputError: when the run does not keep it, as one made before there was a rule.
+        """
+        if case not in self.textbook:
+            what = f"the run keeps no candidate partners of case {case!r}, on which gains rest"
+            raise InputError(what, expected="a run of this version: run it again")
+        return self.starts.get((case, nominal), self.textbook[case])
+
+    def errors(self, result: JobResult) -> ModelErrors:
+        """Return the errors of a result; without a possible model, of the one that was given."""
+        start = self.start(result.case, result.nominal)
+        if not result.answered:
+            return start
+        return measure_errors(result.blocks, self.blocks[result.case], self.rule)
+
+    def figures(self, case: str, errors: ModelErrors) -> dict[str, float]:
+        """Return what is averaged over seeds, cases and structures, by the name of its column."""
+        gain = self.gain(case, errors)
+        return {
+            "gain": gain.gain,
+            "error_gain": gain.error,
+            "change_gain": gain.change,
+            "error_percent": 100.0 * errors.error,
+            "band_percent": 100.0 * errors.band,
+            "shape_error": errors.shape,
+            "false_modes": float(errors.false_modes),
+        }
+
+    def gain(self, case: str, errors: ModelErrors) -> CaseGain:
+        """Return what a model with these errors gains over the textbook one of a case."""
+        return find_gain(errors, self.textbook[case], self.rule)
 
 
 def rank_items(
@@ -90,127 +124,72 @@ def rank_items(
 ) -> list[tuple[int, _Item]]:
     """Return the items with their ranks, best first; equal ones share a rank: 1, 2, 2, 4.
 
-    Sorted scores are split where the gap to the next one exceeds 1e-6 of it, so that anyone who is
+    Sorted numbers are split where the gap to the next one exceeds 1e-6, so that anyone who is
     tied with one of a group is tied with all of it.
 
     Arguments:
-        key: tier, score and name; the tier counts first, then the score, less being better. The
+        key: tier, number and name; the tier counts first, then the number, less being better. The
             name orders those that share a rank.
 
     Examples:
-        >>> skills = {"b": 1.0, "a": 1.0, "c": 2.0}
-        >>> results.rank_items(skills, lambda name: ((), skills[name], name))
+        >>> errors = {"b": 1.0, "a": 1.0, "c": 2.0}
+        >>> results.rank_items(errors, lambda name: ((), errors[name], name))
         [(1, 'a'), (1, 'b'), (3, 'c')]
     """
     keyed = sorted(((*key(item), item) for item in items), key=lambda entry: entry[:3])
     found: list[tuple[int, str, _Item]] = []
     rank = 0
-    for place, (tier, score, name, item) in enumerate(keyed):
+    for place, (tier, number, name, item) in enumerate(keyed):
         before = keyed[place - 1]
-        if not rank or tier != before[0] or score - before[1] > TIE * abs(score):
+        if not rank or tier != before[0] or number - before[1] > TIE:
             rank = place + 1
         found.append((rank, name, item))
     return [(rank, item) for rank, _, item in sorted(found, key=lambda entry: entry[:2])]
 
 
 @pause_collection()
-def rank_results(
-    results: Iterable[JobResult],
-    reference: Mapping[str, Mapping[str, float]] | None = None,
-    baseline: str | None = None,
-) -> tuple[JobResult, ...]:
-    """Return the results with their ranks within case, seed and nominal model, and their scores.
+def rank_results(results: Iterable[JobResult], meta: Mapping[str, Any]) -> tuple[JobResult, ...]:
+    """Return results with their gains, and their ranks within case, seed and nominal model.
 
-    Physical models come first, then unphysical ones, then jobs without a model; within each the
-    score counts. Equal scores share a rank.
+    Equal gains share a rank. A job without a possible model counts as the one that it was given.
 
     Arguments:
         results: in any order, which is kept.
-        reference: from case to the nominal rms errors by block; scores are computed anew from
-            them. None keeps the scores that the results have; one that has none scores against
-            the result of the baseline in the same group, or 10 where there is none.
-        baseline: name of the strategy that leaves the model as it is, where one ran.
+        meta: of their run; results on a case whose models it does not keep stay as they are.
 
     Examples:
-        >>> [(round(one.score, 2), one.rank) for one in results.rank_results(run.results)]
-        [(2.97, 2), (0.53, 1)]
+        >>> ranked = results.rank_results(run.results, run.meta)
+        >>> [(round(one.gain, 2), one.rank) for one in ranked]
+        [(-0.67, 2), (0.6, 1)]
     """
-    listed = tuple(results)
-    found = scores_and_ranks(listed, reference, baseline)
-    return tuple(
-        replace(result, score=score, rank=rank)
-        for result, score, rank in zip(listed, *found, strict=True)
-    )
+    listed = [replace(result) for result in results]
+    rate_results(listed, Scale.of(meta))
+    return tuple(listed)
 
 
-def scores_and_ranks(
-    results: Sequence[JobResult],
-    reference: Mapping[str, Mapping[str, float]] | None = None,
-    baseline: str | None = None,
-) -> tuple[list[float], list[int]]:
-    """Return the scores and ranks of results; arguments and order as for `rank_results`."""
-    if reference is not None:
-        scores = _scores_against(results, reference)
-    else:
-        given = {
-            _group(item): {name: block.rms_percent for name, block in item.blocks.items()}
-            for item in results
-            if item.strategy == baseline
-        }
-        scores = [
-            score_of(item, given.get(_group(item), {})) if item.score is None else item.score
-            for item in results
-        ]
-    groups: dict[tuple[str, int, Nominal], int] = {}
-    group = [groups.setdefault(_group(result), len(groups)) for result in results]
-    names = {name: n for n, name in enumerate(sorted({result.strategy for result in results}))}
-    parts = (
-        [names[result.strategy] for result in results],
-        scores,
-        [result.unphysical for result in results],
-        [result.status not in DONE for result in results],
-        group,
-    )
-    keys = np.array([np.array(part, dtype=float) for part in parts])
-    order = np.lexsort(keys)
-    _, score, *tier, place = keys[:, order]
-    # As `ranked` does in each group.
-    first = np.ones(len(order), dtype=bool)
-    first[1:] = place[1:] != place[:-1]
-    apart = first.copy()
-    for part in tier:
-        apart[1:] |= part[1:] != part[:-1]
-    apart[1:] |= score[1:] - score[:-1] > TIE * np.abs(score[1:])
-    steps = np.arange(len(order))
-    starts = [np.maximum.accumulate(np.where(new, steps, 0)) for new in (first, apart)]
-    ranks = np.empty(len(order), dtype=int)
-    ranks[order] = 1 + starts[1] - starts[0]
-    return scores, ranks.tolist()
+def rate_results(results: Sequence[JobResult], scale: Scale) -> None:
+    """Give results that nobody else has yet their gains and ranks."""
+    groups: dict[tuple[str, int, Nominal], list[tuple[float, JobResult]]] = {}
+    for result in results:
+        if result.case in scale.textbook:
+            gain = scale.gain(result.case, scale.errors(result)).gain
+            group = result.case, result.seed, result.nominal
+            groups.setdefault(group, []).append((gain, result))
+    for listed in groups.values():
+        for rank, (gain, result) in rank_items(listed, _order):
+            rate(result, None if math.isnan(gain) else gain, rank)
 
 
-def _scores_against(
-    results: Sequence[JobResult], reference: Mapping[str, Mapping[str, float]]
-) -> list[float]:
-    """Return what `score_of` gives for each result, many at a time."""
-    scores = [SCORE_OF_FAILURE] * len(results)
-    blocks = {case: choose_blocks(errors) for case, errors in reference.items()}
-    by_count: dict[int, tuple[list[int], list[list[float]]]] = {}
-    for place, result in enumerate(results):
-        errors = reference.get(result.case) or {}
-        fixed = _score_without_errors(result)
-        if fixed is not None:
-            scores[place] = fixed
-        elif errors:
-            row = [score_in(result, name, errors) for name in blocks[result.case]]
-            places, rows = by_count.setdefault(len(row), ([], []))
-            places.append(place)
-            rows.append(row)
-    for count, (places, rows) in by_count.items():
-        means = np.exp(np.log(np.array(rows)).sum(axis=1) / count)
-        for place, mean in zip(places, means.tolist(), strict=True):
-            scores[place] = mean
-    return scores
+def _order(item: tuple[float, JobResult]) -> tuple[tuple[bool, ...], float, str]:
+    gain, result = item
+    return (math.isnan(gain),), 0.0 if math.isnan(gain) else -gain, result.strategy
 
 
-def _group(result: JobResult) -> tuple[str, int, Nominal]:
-    return result.case, result.seed, result.nominal
+def list_models(models: Models) -> dict[str, Any]:
+    """Return what nominal models predict as the meta data of a run have it."""
+    plain: dict[str, Any] = to_plain(models)
+    order = {name: place for place, name in enumerate(BLOCKS)}
+    return {
+        case: {n: dict(sorted(own.items(), key=lambda b: order[b[0]])) for n, own in known.items()}
+        for case, known in plain.items()
+    }

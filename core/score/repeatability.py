@@ -9,11 +9,11 @@ from femubench.core.schema.records import result_to_json
 from femubench.core.schema.results import JobResult, Nominal, Run, origins_of
 
 # What belongs to a run, or to the past, rather than to a result.
-_VOLATILE = frozenset({"seconds", "rank", "score", "key", "provenance", "traceback", "unphysical"})
+_VOLATILE = frozenset({"seconds", "rank", "gain", "key", "provenance", "traceback", "unphysical"})
 # Figures of a result that depend on nothing but its provenance.
 _COUNTS = (
     *("rigid_body_modes", "rigid_body_modes_expected", "negative_eigenvalues"),
-    *("surplus_partners", "parameter_count", "evaluations"),
+    *("parameter_count", "evaluations"),
 )
 _MODEL = ("rigid_body_modes", "negative_eigenvalues", "parameter_count")
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
 import scipy.linalg as la
+from msgspec import structs
 
 from femubench.core.case.case import Case, Modification
 from femubench.core.fem.model import Model
@@ -27,14 +28,9 @@ from femubench.core.modal.pairing import LEAST_SENSORS, WINDOW, pair_measured
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block
-from femubench.core.score.partners import surplus_partners
+from femubench.core.score.bounded_gain import find_candidates, find_tested_modes
 from femubench.core.score.predicted_spread import MORE, Spread
-from femubench.core.score.ranking import (
-    TIE,
-    rank_results as rank_results,
-    score_of as score_of,
-)
-from femubench.core.typing import FloatArray, IntArray
+from femubench.core.typing import FloatArray
 
 _SAME_MOTION = 0.9  # squared cosine between a zero mode and the nominal rigid-body motions
 
@@ -47,14 +43,11 @@ class Reference:
         blocks: the errors of the nominal model by block name.
         zero: eigenvalue up to which a mode counts as one of zero frequency, rad^2/s^2.
         rigid: the rigid-body motions that the nominal model leaves free, (n, r).
-        choices: how many of its modes could be the partner of each measured one, of the structure
-            as tested and then of its modifications, (m,).
     """
 
     blocks: Mapping[str, Block]
     zero: float
     rigid: FloatArray
-    choices: IntArray
 
     @property
     def rms_percent(self) -> dict[str, float]:
@@ -70,16 +63,11 @@ class JudgedModel:
         blocks: errors by block name.
         rigid_body_modes: zero-frequency modes that are rigid-body motions of the nominal model.
         negative_eigenvalues: of the model as tested, without modifications.
-        surplus_partners: modes that could be partners of measured ones beyond those that the
-            nominal model has, where they are too many for a prediction; else 0.
-        reason: tells both numbers then.
     """
 
     blocks: dict[str, Block]
     rigid_body_modes: int
     negative_eigenvalues: int
-    surplus_partners: int = 0
-    reason: str = ""
 
 
 def frequency_error(mode: PairedMode) -> float:
@@ -92,14 +80,6 @@ def frequency_error(mode: PairedMode) -> float:
     if mode.predicted_hz is None or mode.predicted_hz <= 0.0:
         return 1.0
     return abs(mode.predicted_hz / mode.measured_hz - 1.0)
-
-
-@dataclass(frozen=True)
-class _Predicted:
-    """Measured modes with their partners, and how many modes could have been those, (m,)."""
-
-    pairs: tuple[PairedMode, ...]
-    choices: IntArray
 
 
 def predict_block(
@@ -119,7 +99,7 @@ def predict_block(
         >>> [round(mode.predicted_hz) for mode in results.predict_block(model, measurement, None)]
         [256, 278, 581]
     """
-    return _predict(model, _modes_for(model, (measurement,)), measurement, modification).pairs
+    return _predict(model, _modes_for(model, (measurement,)), measurement, modification)
 
 
 def pair_modified(
@@ -137,13 +117,8 @@ def pair_modified(
     Raises:
         ModelError: when the modified model has no modes or a sensor lies off the structure.
     """
-    return _modified(model, change, spread, many).pairs
 
-
-def _modified(
-    model: Model, change: Modification, spread: Spread | None, many: ManyChanges | None
-) -> _Predicted:
-    def make() -> tuple[Modification, Spread | None, _Predicted]:
+    def make() -> tuple[Modification, Spread | None, tuple[PairedMode, ...]]:
         changed, modes = model.attach(change.masses, change.springs), None
         if many is not None:
             count, top = len(change.measurement) + MORE, _highest((change.measurement,))
@@ -189,7 +164,7 @@ def score_model(case: Case, model: Model) -> dict[str, Block]:
         >>> {name: round(block.rms_percent, 1) for name, block in scored.items()}
         {'used': 8.8, 'higher': 6.8}
     """
-    return _blocks(case, model, _modes_for(model, (case.measurement,)))[0]
+    return _blocks(case, model, _modes_for(model, (case.measurement,)))
 
 
 def reference_of(case: Case) -> Reference:
@@ -199,28 +174,23 @@ def reference_of(case: Case) -> Reference:
         ModelError: when the nominal model has no modes.
     """
     modes = _modes_for(case.model, (case.measurement,))
-    blocks, choices = _blocks(case, case.model, modes)
-    return Reference(blocks, zero_tolerance(modes), rigid_modes_of(case.model), choices)
-
-
-def find_given_errors(case: Case, reference: Mapping[str, float]) -> dict[str, float]:
-    """Return the rms error by block of a case's own model; nothing where it is the reference's.
-
-    Arguments:
-        reference: rms error of the textbook model in percent by block name.
-
-    Raises:
-        ModelError: when the model has no modes.
-    """
-    own = {name: block.rms_percent for name, block in score_model(case, case.model).items()}
-    same = all(abs(error - reference[name]) <= TIE * error for name, error in own.items())
-    return {} if same else own
+    blocks = _blocks(case, case.model, modes)
+    if "modified" in blocks:
+        tested = [
+            mode
+            for change in case.modifications
+            for mode in find_tested_modes(case.measurement, change.measurement)
+        ]
+        pairs = zip(blocks["modified"].modes, tested, strict=True)
+        linked = tuple(structs.replace(pair, before=mode) for pair, mode in pairs)
+        blocks["modified"] = replace(blocks["modified"], modes=linked)
+    return Reference(blocks, zero_tolerance(modes), rigid_modes_of(case.model))
 
 
 def judge(
     case: Case, model: Model, reference: Reference, spread: Spread | None = None
 ) -> JudgedModel:
-    """Return errors, rigid-body modes kept, negative eigenvalues and surplus partners of a model.
+    """Return errors, rigid-body modes kept and negative eigenvalues of a model.
 
     A rigid-body mode is kept where |lambda| <= 1e-6 times the first elastic eigenvalue of the
     nominal model, an eigenvalue is negative below minus that.
@@ -233,8 +203,7 @@ def judge(
     """
     modes = _modes_for(model, (case.measurement,))
     negative = int(np.count_nonzero(modes.eigenvalues < -reference.zero))
-    blocks, choices = _blocks(case, model, modes, spread)
-    surplus, reason = surplus_partners(choices, reference.choices)
+    blocks = _blocks(case, model, modes, spread)
     # Of the rigid-body motions that are kept the spaces are compared, not the modes: among several
     # zero modes the eigenvectors are arbitrary.
     still = modes.shapes[:, np.abs(modes.eigenvalues) <= reference.zero]
@@ -249,7 +218,7 @@ def judge(
         basis = still @ (turn[:, keep] / np.sqrt(values[keep]))
         cosines = la.svdvals(rigid.T @ (mass @ basis))
         kept = int(np.count_nonzero(np.square(cosines) > _SAME_MOTION))
-    return JudgedModel(blocks, kept, negative, surplus, reason)
+    return JudgedModel(blocks, kept, negative)
 
 
 def _modes_for(model: Model, measurements: Sequence[Measurement]) -> Modes:
@@ -276,7 +245,7 @@ def _predict(
     measurement: Measurement,
     modification: str | None,
     spread: Spread | None = None,
-) -> _Predicted:
+) -> tuple[PairedMode, ...]:
     elastic = modes.elastic
     readings = np.asarray(model.observe(measurement.sensors) @ elastic.shapes)
     readings = np.where(find_seen_modes(readings), readings, 0.0)
@@ -289,7 +258,7 @@ def _predict(
     if spread is not None:
         whole = np.append(np.flatnonzero(~modes.rigid), -1)[pairing.index]
         std = spread.std_of(modes, whole, measurement.frequency_std)
-    pairs = tuple(
+    return tuple(
         PairedMode(
             number=number,
             measured_hz=float(measured),
@@ -297,38 +266,38 @@ def _predict(
             mac=None if np.isnan(likeness) else float(likeness),
             modification=modification,
             predicted_std_hz=deviation,
+            candidates=others,
         )
-        for number, measured, partner, likeness, deviation in zip(
+        for number, measured, partner, likeness, deviation, others in zip(
             measurement.numbers,
             measurement.frequencies,
             pairing.index,
             pairing.mac,
             std,
+            find_candidates(measurement, frequencies, readings, pairing),
             strict=True,
         )
     )
-    return _Predicted(pairs, pairing.choices)
 
 
 def _blocks(
     case: Case, model: Model, modes: Modes, spread: Spread | None = None
-) -> tuple[dict[str, Block], IntArray]:
+) -> dict[str, Block]:
     tested = case.measurement.select(chain(case.used, case.held_out))
     own = _predict(model, modes, tested, None, spread)
     shaped = _with_shape(tested)
     first, changes = len(case.used), case.modifications
     many = many_modifications(model, changes, modes)
-    modified = [_modified(model, change, spread, many) for change in changes]
+    modified = [pair_modified(model, change, spread, many) for change in changes]
     parts = {
-        "used": (own.pairs[:first], shaped[:first]),
-        "higher": (own.pairs[first:], shaped[first:]),
+        "used": (own[:first], shaped[:first]),
+        "higher": (own[first:], shaped[first:]),
         "modified": (  # every mode of every change counts alike
-            tuple(pair for change in modified for pair in change.pairs),
+            tuple(pair for pairs in modified for pair in pairs),
             [flag for change in changes for flag in _with_shape(change.measurement)],
         ),
     }
-    blocks = {name: _block(*part) for name, part in parts.items() if part[0]}
-    return blocks, np.concatenate([each.choices for each in (own, *modified)])
+    return {name: _block(*part) for name, part in parts.items() if part[0]}
 
 
 def _with_shape(measurement: Measurement) -> list[bool]:

@@ -1,1 +1,1 @@
-"""How does skill depend on the conditions?"""
+"""How does gain depend on the conditions?"""

@@ -20,7 +20,7 @@ class VariedCase(Case):
     """A case of which a strategy is given a noisier or a smaller part.
 
     Strategies see its `used_measurement`. Scores rest on `measurement` and `modifications`, which
-    are those of the case: skill compares along the axes.
+    are those of the case: gain compares along the axes.
 
     Arguments:
         origin: the case as it is, with the same model.

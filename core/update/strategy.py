@@ -96,7 +96,9 @@ class Strategy(ABC):
         settings: other values of its options that are as good a reading of its source, in the words
             after the colon of ``bench run -s``; `benchmarks/tuning.py` compares them.
         baseline: whether it is the one that leaves the model as it is, to compare with.
-        yardstick: whether `bench plugins check` compares time and memory with its own.
+        yardstick: of one that is a line of every board and has no rank, what it stands for; empty
+            for all others.
+        cost_reference: whether `bench plugins check` compares time and memory with its own.
     """
 
     name: ClassVar[str]
@@ -105,7 +107,8 @@ class Strategy(ABC):
     promises: ClassVar[frozenset[str]] = frozenset()
     settings: ClassVar[tuple[str, ...]] = ()
     baseline: ClassVar[bool] = False
-    yardstick: ClassVar[bool] = False
+    yardstick: ClassVar[str] = ""
+    cost_reference: ClassVar[bool] = False
 
     @abstractmethod
     def update(

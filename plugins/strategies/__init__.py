@@ -7,6 +7,8 @@ from femubench import hookimpl
 CLASSES = {
     "unchanged": "unchanged:Unchanged",
     "textbook": "textbook:Textbook",
+    "meet": "given_frequencies:Meet",
+    "shifted": "given_frequencies:Shifted",
     "baruch": "baruch:Baruch",
     "berman": "berman:Berman",
     "secant": "secant:Secant",

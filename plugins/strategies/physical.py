@@ -32,7 +32,7 @@ class Physical(ElementStrategy):
         "model updating, section 4.2, table 3"
     )
     needs: ClassVar[frozenset[str]] = frozenset({"shapes", "parts"})
-    yardstick: ClassVar[bool] = True
+    cost_reference: ClassVar[bool] = True
     promises: ClassVar[frozenset[str]] = frozenset({"no-negative-eigenvalue"})
 
     def family(self, structure: Structure) -> ElementFamily:

@@ -23,6 +23,7 @@ class Textbook(Strategy):
         "no update: Bredt (1896) and St Venant for torsion, Timoshenko (1921) and Cowper (1966) "
         "for shear and rotary inertia"
     )
+    yardstick: ClassVar[str] = "handbooks"
     needs: ClassVar[frozenset[str]] = frozenset({"elements"})
     promises: ClassVar[frozenset[str]] = frozenset({"rigid-body-modes", "no-negative-eigenvalue"})
 

@@ -15,6 +15,7 @@ class Unchanged(Strategy):
     name: ClassVar[str] = "unchanged"
     citation: ClassVar[str] = "no update: the nominal finite element model"
     baseline: ClassVar[bool] = True
+    yardstick: ClassVar[str] = "the models that were given"
     promises: ClassVar[frozenset[str]] = frozenset({"rigid-body-modes", "no-negative-eigenvalue"})
 
     def update(

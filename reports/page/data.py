@@ -26,20 +26,19 @@ from femubench.reports.summary import (
 from femubench.reports.twins import suspicions, twins_by_strategy
 from femubench.results import (
     FEWEST,
-    OFFSET_PERCENT,
-    SCORE_OF_FAILURE,
     TIE,
     JobResult,
     Reporter,
     Run,
+    Scale,
+    Standings,
     find_basis,
     interval_tail,
     is_test,
-    leaderboard,
+    list_rows,
     predictive,
     rank_results,
     structures_of,
-    tell_apart,
     unsteady,
 )
 
@@ -71,15 +70,14 @@ class ExhibitSource(Protocol):
 def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]:
     """Return everything that the page of a run shows.
 
-    Errors, scores and skills are those of the run to the last digit; other numbers are rounded.
+    Errors and gains are those of the run to the last digit; other numbers are rounded.
 
     Arguments:
         exhibits: what the store has to draw.
     """
-    board = leaderboard(run).to_dict("records")
-    tested = tell_apart(run, [row["strategy"] for row in board])
+    board, apart, scale = list_rows(run), Standings.of(run).apart, Scale.of(run.meta)
     shared = {
-        "finding": finding(run, board, tested.tiers),
+        "finding": finding(run, board),
         "lead": lead(run),
         "scored_on": "unseen data" if find_basis(run) == "unseen" else "the modes that were given",
         "yardstick": run.meta.get("yardstick"),
@@ -99,9 +97,9 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
             too_large.append(f"{title}: too large for the page; {more}")
     notes = [*notes_of(run), *suspicions(run), *map(plain, getattr(exhibits, "notes", ()))]
     baseline = run.meta.get("baseline")
-    run = Run(run.meta, rank_results(run.ranked, run.meta.get("reference") or None, baseline))
+    run = Run(run.meta, rank_results(run.ranked, run.meta))
     cases, strategies = cases_of(run), strategies_of(run)
-    listed = [_case(run, case, exhibits) for case in cases]
+    listed = [_case(run, case, exhibits, scale) for case in cases]
     stages = {case["name"]: case["stage"] for case in listed}
     details, left_out = _details(run, stages, exhibits)
     return {
@@ -110,33 +108,37 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
         "header": [list(item) for item in header(run)],
         "notes": [*notes, *left_out, *too_large],
         "blocks": list(BLOCKS),
-        "offset_percent": OFFSET_PERCENT,
-        "score_of_failure": SCORE_OF_FAILURE,
         "tie": TIE,
         "seeds": seeds_of(run),
         "scenarios": list(dict.fromkeys(case["scenario"] for case in listed)),
         "baseline": baseline,
         "cases": listed,
         "results": [
-            _result(found, cases.index(found.case), strategies.index(found.strategy))
+            _result(found, cases.index(found.case), strategies.index(found.strategy), scale)
             for found in run.results
         ],
-        "board": [{str(key): clean(value) for key, value in row.items()} for row in board],
+        "board": list(map(_cleaned, board)),
         "statistics": {
             "pairs": [
                 [strategies.index(a), strategies.index(b), round_figures(p, 4)]
-                for a, b, p in tested.pairs
+                for a, b, p in apart.pairs
             ],
-            "groups": [list(map(strategies.index, group)) for group in tested.groups],
-            "tiers": [list(map(strategies.index, tier)) for tier in tested.tiers],
-            "note": tested.note,
+            "note": apart.note,
             "fewest": FEWEST,
-            "tails": [interval_tail(n) if n >= FEWEST else None for n in range(len(cases) + 1)],
+            "tails": [
+                interval_tail(n) if n > 1 else None
+                for n in range(max(len(cases), len(seeds_of(run))) + 1)
+            ],
         },
         "details": details,
         "papers": papers_of(run),
         "downloads": downloads,
     }
+
+
+def _cleaned(figures: _Named) -> dict[str, Any]:
+    """Return figures as they are, null for what is not known."""
+    return {name: clean(value) for name, value in figures.items()}
 
 
 def _strategies(run: Run) -> list[dict[str, Any]]:
@@ -150,6 +152,7 @@ def _strategies(run: Run) -> list[dict[str, Any]]:
             "name": name,
             "citation": citations.get(name, ""),
             "version": versions.get(name, ""),
+            "yardstick": (run.meta.get("yardsticks") or {}).get(name, ""),
             "twins": twins.get(name),
             "unsteady": name in differing,
         }
@@ -157,7 +160,7 @@ def _strategies(run: Run) -> list[dict[str, Any]]:
     ]
 
 
-def _case(run: Run, case: str, exhibits: ExhibitSource | None) -> dict[str, Any]:
+def _case(run: Run, case: str, exhibits: ExhibitSource | None, scale: Scale) -> dict[str, Any]:
     about = (run.meta.get("cases") or {}).get(case) or {}
     digest = (run.meta.get("drawings") or {}).get(case, about.get("digest"))
     stage = exhibits.case(digest) if exhibits is not None and isinstance(digest, str) else None
@@ -168,6 +171,9 @@ def _case(run: Run, case: str, exhibits: ExhibitSource | None) -> dict[str, Any]
         "name": case,
         "scenario": case.partition("/")[0],
         "structure": structures_of(run).get(case, case),
+        "start": _cleaned(scale.figures(case, scale.start(case, run.nominals[0]))),
+        "textbook_percent": clean(100.0 * scale.textbook[case].error),
+        "counts": scale.holds_back(case) or find_basis(run) == "given",
         "test": is_test((run.meta.get("classes") or {}).get(case)),
         "title": about.get("title") or "",
         "reference": {name: reference[name] for name in BLOCKS if name in reference},
@@ -175,7 +181,7 @@ def _case(run: Run, case: str, exhibits: ExhibitSource | None) -> dict[str, Any]
     }
 
 
-def _result(result: JobResult, case: int, strategy: int) -> dict[str, Any]:
+def _result(result: JobResult, case: int, strategy: int, scale: Scale) -> dict[str, Any]:
     blocks = [result.blocks.get(name) for name in BLOCKS]
     lost = (result.rigid_body_modes_expected or 0) - (result.rigid_body_modes or 0)
     return {
@@ -184,8 +190,8 @@ def _result(result: JobResult, case: int, strategy: int) -> dict[str, Any]:
         "seed": result.seed,
         "status": result.status,
         "reason": shorten_text(plain(result.reason), _LONGEST_REASON),
-        "score": clean(result.score),
-        "start": [clean(result.start_percent.get(name)) for name in BLOCKS],
+        **_cleaned(scale.figures(result.case, scale.errors(result))),
+        "answered": result.answered,
         "rms": [None if block is None else clean(block.rms_percent) for block in blocks],
         "seconds": round_figures(result.seconds, 4),
         "parameters": result.parameter_count,
@@ -246,7 +252,7 @@ def _details(
     if len(found) < len(done):
         notes.append(
             f"{len(done) - len(found)} {models} are without modes, history and parameters, to keep "
-            "the page small; those with the best scores have them"
+            "the page small; those with the best gains have them"
         )
     return found, notes
 

@@ -124,7 +124,7 @@ def with_a_failure(run: Run) -> Run:
     job = JobResult(lost.case, lost.strategy, lost.seed, "failed", why)
     failed = replace(job, key=lost.key, provenance=lost.provenance)
     listed = [failed if result is lost else result for result in run.results]
-    return Run(run.meta, rank_results(listed, run.meta["reference"]))
+    return Run(run.meta, rank_results(listed, run.meta))
 
 
 # Not for the whole session: its event loop would be in the way of tests elsewhere.

@@ -16,20 +16,23 @@ from synthetic_run import synthetic_run
 from femubench import report
 from femubench.core.schema.records import read_run
 from femubench.reports.page import data as page_data_module
+from femubench.reports.summary import finding
 from femubench.results import (
     JobResult,
     Run,
     leaderboard,
+    list_rows,
     predictive,
     rank_results,
     run_to_json,
     structures_of,
 )
 
-BLOCKS = ("used", "higher", "modified")
 ROUNDED = {"seconds": 1e-3}  # figures that the page holds with fewer digits
 KEYS = (
-    *("rank", "skill", "skill_tests", "used_percent", "higher_percent", "modified_percent"),
+    *("rank", "gain", "error_percent", "better_share", "worse_share", "error_gain", "change_gain"),
+    *("gain_tests", "band_percent", "shape_error", "false_modes"),
+    *("used_percent", "higher_percent", "modified_percent"),
     *("coverage90", "crps_percent", "parameters", "seconds"),
 )
 
@@ -47,7 +50,6 @@ def part(
     run: Run,
     *,
     cases: Collection[str] | None = None,
-    blocks: Collection[str] = BLOCKS,
     strategies: Collection[str] | None = None,
 ) -> Run:
     """Return the run as if there were nothing but these."""
@@ -55,20 +57,12 @@ def part(
     def kept(name: str) -> bool:
         return cases is None or name in cases
 
-    reference = {
-        case: {block: value for block, value in errors.items() if block in blocks}
-        for case, errors in run.meta["reference"].items()
-        if kept(case)
-    }
     names = [n for n in run.meta["strategies"] if strategies is None or n in strategies]
-    results = [
-        replace(result, blocks={k: v for k, v in result.blocks.items() if k in blocks})
-        for result in run.results
-        if kept(result.case) and result.strategy in names
-    ]
-    meta = {**run.meta, "reference": reference, "strategies": names}
-    meta["cases"] = {name: about for name, about in run.meta["cases"].items() if kept(name)}
-    return Run(meta, rank_results(results, reference))
+    results = [r for r in run.results if kept(r.case) and r.strategy in names]
+    meta = {**run.meta, "strategies": names}
+    for key in ("cases", "reference", "models"):
+        meta[key] = {name: own for name, own in run.meta[key].items() if kept(name)}
+    return Run(meta, rank_results(results, meta))
 
 
 def shown(page: Page) -> dict[str, dict[str, float | None]]:
@@ -82,7 +76,7 @@ def shown(page: Page) -> dict[str, dict[str, float | None]]:
               !td.hidden && td.dataset.value !== undefined ? [[keys[k], td.dataset.value]] : []);
             const flags = tr.querySelector("[data-lost]").dataset;
             const { ok, total } = tr.querySelector("[data-ok]").dataset;
-            return [tr.dataset.strategy, [...figures, ["ok", ok], ["total", total],
+            return [tr.dataset.strategy, [...figures, ["answered", ok], ["total", total],
               ["rigid_modes_lost", flags.lost], ["negative_eigenvalues", flags.negative]]];
           });
         }"""
@@ -96,8 +90,9 @@ def assert_shows(page: Page, run: Run, *, without: Collection[str] = ()) -> None
     assert list(found) == [row["strategy"] for row in board]
     for row in board:
         ours = found[row["strategy"]]
-        expected = {*KEYS, "ok", "total", "rigid_modes_lost", "negative_eigenvalues"} - {*without}
-        assert set(ours) == expected
+        more = {"answered", "total", "rigid_modes_lost", "negative_eigenvalues"}
+        expected = {*KEYS, *more} - {*without}
+        assert set(ours) - {"better_than", "worse_than"} == expected
         for key in expected:
             value = None if row[key] is None or row[key] != row[key] else row[key]
             room = ROUNDED.get(key, 1e-9)
@@ -129,13 +124,11 @@ def test_opens_from_disk_and_is_the_leaderboard(page: Page, real: Any) -> None:
 
 
 def test_the_headline_and_the_lines_below_are_made_from_the_figures(page: Page, real: Any) -> None:
-    best = leaderboard(real.run).iloc[0]
+    first, *rest = finding(real.run, list_rows(real.run))
+    assert page.locator("h1").inner_text() == first
     # One seed on two structures: no interval, no test.
-    assert page.locator("h1").inner_text() == (
-        "No strategy improves on the textbook models on unseen data; the best, "
-        f"{best['strategy']}, has a skill of {best['skill']:.3f}."
-    ).replace("-", "\u2212")
-    assert page.locator("p.finding").inner_text().startswith("Whether the others differ")
+    assert page.locator("p.finding").inner_text() == " ".join(rest)
+    assert "No difference between any two lines of the board is shown." in rest
     foot = page.locator("footer").inner_text()
     assert "openblas" in foot
     assert "openblas" not in page.locator("main").inner_text()
@@ -148,7 +141,7 @@ def test_who_leads_is_seen_without_scrolling(page: Page) -> None:
         assert box is not None
         assert box["y"] + box["height"] <= 900
     chart = page.locator("figure.chart").first.text_content() or ""
-    for words in ("Skill of every strategy on unseen data", "unchanged", "without data"):
+    for words in ("Gain of every strategy on unseen data", "unchanged", "without data"):
         assert words in chart
 
 
@@ -184,14 +177,12 @@ def test_calibration_is_that_of_the_results(view: Callable[..., Any], tmp_path: 
 def test_who_was_not_applicable_stands_where_the_run_says(
     view: Callable[..., Any], real: Any, tmp_path: Path
 ) -> None:
-    given = {name: 1.5 * error for name, error in real.run.meta["reference"]["frame"].items()}
-
     def spared(result: JobResult) -> JobResult:
         if (result.case, result.strategy) != ("frame", "local"):
             return result
-        return replace(result, status="not-applicable", blocks={}, start_percent=given)
+        return replace(result, status="not-applicable", blocks={})
 
-    listed = rank_results(map(spared, real.run.results), real.run.meta["reference"])
+    listed = rank_results(map(spared, real.run.results), real.run.meta)
     run, file = Run(real.run.meta, listed), tmp_path / "spared.html"
     report(run, file)
     page = view(file).page
@@ -199,7 +190,8 @@ def test_who_was_not_applicable_stands_where_the_run_says(
     assert_shows(page, run)
     tick(page, "scenarios", "hframe", "frame-solid")
     assert_shows(page, part(run, cases={"frame"}))
-    assert shown(page)["local"]["skill"] == pytest.approx(1.0 - 1.5, abs=0.02)
+    rows = shown(page)
+    assert rows["local"]["gain"] == pytest.approx(rows["unchanged"]["gain"], abs=1e-9)
 
 
 def stated_run() -> Run:
@@ -255,11 +247,11 @@ def test_case_by_case_has_every_figure_beside_the_baseline(page: Page, real: Any
       return rows.map((tr) => [tr.cells[0].textContent, Object.fromEntries(
         [...tr.cells].slice(1).map((td, k) => [names[k + 1], td.dataset.value]))]);
     }"""
-    scores = {(r.case, r.strategy): r.score for r in real.run.results}
+    gains = {(r.case, r.strategy): r.gain for r in real.run.results}
     for case, cells in page.evaluate(read):
         assert next(iter(cells)) == "unchanged"
         for name, value in cells.items():
-            assert float(value) == pytest.approx(scores[case, name])
+            assert float(value) == pytest.approx(gains[case, name], abs=1e-12)
     page.get_by_label("Figure of every case").select_option("higher")
     errors = {(r.case, r.strategy): r.blocks.get("higher") for r in real.run.results}
     for case, cells in page.evaluate(read):
@@ -296,19 +288,21 @@ def test_names_and_the_baseline_stay_in_view(
 
 
 def test_sorts_by_mouse_and_keyboard(page: Page) -> None:
-    skill = {name: row["skill"] for name, row in shown(page).items()}
-    falling = sorted(skill, key=lambda name: -(skill[name] or 0.0))
-    assert order(page) != falling  # unphysical ones stand below
-    head = page.locator("th[data-key=skill]")
+    gain = {name: row["gain"] for name, row in shown(page).items()}
+    falling = sorted(gain, key=lambda name: -(gain[name] or 0.0))
+    assert order(page) == falling
+    page.locator("th[data-key=strategy] button").click()
+    head = page.locator("th[data-key=gain]")
     head.locator("button").click()
     assert (order(page), head.get_attribute("aria-sort")) == (falling, "descending")
     head.locator("button").focus()
     page.keyboard.press("Enter")
-    assert (order(page), head.get_attribute("aria-sort")) == (falling[::-1], "ascending")
+    assert head.get_attribute("aria-sort") == "ascending"
+    assert [gain[name] for name in order(page)] == sorted(gain.values())
     name = page.locator("th[data-key=strategy]")
     name.locator("button").focus()
     page.keyboard.press("Space")
-    assert order(page) == sorted(skill)
+    assert order(page) == sorted(gain)
     assert name.get_attribute("aria-sort") == "ascending"
     assert head.get_attribute("aria-sort") is None
 
@@ -338,8 +332,7 @@ def test_filter_of_scenarios(page: Page, real: Any) -> None:
 @pytest.mark.parametrize("off", [("modified",), ("used", "modified"), ("higher",)])
 def test_filter_of_blocks(page: Page, real: Any, off: tuple[str, ...]) -> None:
     tick(page, "blocks", *off)
-    kept = [name for name in BLOCKS if name not in off]
-    assert_shows(page, part(real.run, blocks=kept), without=[f"{name}_percent" for name in off])
+    assert_shows(page, real.run, without=[f"{name}_percent" for name in off])
 
 
 def test_filter_of_strategies(page: Page, real: Any) -> None:
@@ -358,9 +351,7 @@ def test_all_filters_at_once(page: Page, real: Any) -> None:
     tick(page, "blocks", "used")
     tick(page, "strategies", "unchanged", "kabe")
     kept = [n for n in real.run.meta["strategies"] if n not in ("unchanged", "kabe")]
-    whole = part(
-        real.run, cases=["hframe", "frame-solid"], blocks=["higher", "modified"], strategies=kept
-    )
+    whole = part(real.run, cases=["hframe", "frame-solid"], strategies=kept)
     assert_shows(page, whole, without=["used_percent"])
 
 
@@ -373,7 +364,7 @@ def test_charts_tell_their_values_by_keyboard(page: Page) -> None:
     first = readout.inner_text()
     page.keyboard.press("ArrowRight")
     assert before != first != readout.inner_text()
-    assert "skill, part of the error taken away" in first
+    assert "gain over the" in first
 
 
 def test_intervals_of_a_part_are_over_its_structures(
@@ -391,20 +382,19 @@ def test_intervals_of_a_part_are_over_its_structures(
     page.wait_for_selector("html[data-ready=yes]")
 
     def intervals() -> dict[str, list[float]]:
-        read = "() => bench.board.rows().map((r) => [r.strategy, [r.skill_low, r.skill_high]])"
+        read = "() => bench.board.rows().map((r) => [r.strategy, [r.gain_low, r.gain_high]])"
         return dict(page.evaluate(read))
 
     def expected(whole: Run) -> dict[str, list[float]]:
         rows = leaderboard(whole).to_dict("records")
-        return {row["strategy"]: [row["skill_low"], row["skill_high"]] for row in rows}
+        return {row["strategy"]: [row["gain_low"], row["gain_high"]] for row in rows}
 
     assert "over structures" in page.locator("#board-table thead").inner_text()
     assert intervals() == {name: pytest.approx(ends) for name, ends in expected(run).items()}
     tick(page, "scenarios", "scenario-03")
     kept = [case for case in run.meta["cases"] if case != "scenario-03"]
     for name, ends in expected(part(run, cases=kept)).items():
-        left = [1.0 - end for end in intervals()[name]]
-        assert left == pytest.approx([1.0 - end for end in ends], rel=0.05), name
+        assert intervals()[name] == pytest.approx(ends, abs=0.05), name
 
 
 def test_both_nominal_models_stand_side_by_side(
@@ -417,8 +407,8 @@ def test_both_nominal_models_stand_side_by_side(
     page.wait_for_selector("html[data-ready=yes]")
     board = leaderboard(read_run(data)).set_index("strategy")
     for name, row in shown(page).items():
-        assert row["skill_drawn"] == pytest.approx(board.loc[name, "skill_drawn"])
-        assert row["skill_drawn"] < -1.0 < row["skill"]
+        assert row["gain_drawn"] == pytest.approx(board.loc[name, "gain_drawn"])
+        assert row["gain_drawn"] < -0.5 < row["gain"]
     assert "Ranks are from the textbook models" in page.locator("p.lead").inner_text()
     view_case = view(file, "#case/frame").page
     text = view_case.locator("table.case-frequencies").inner_text()

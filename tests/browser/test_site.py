@@ -149,7 +149,7 @@ def test_a_large_board_is_sorted_and_filtered_with_the_keyboard(
         return found
 
     assert column(2) == names
-    assert [float(text) for text in column(3)] == [row["skill"] for row in board["rows"]]
+    assert [float(text) for text in column(3)] == [row["gain"] for row in board["rows"]]
     for number, key in ((2, str), (3, float), (5, float), (8, float)):
         head = table.locator("thead th").nth(number - 1)
         head.locator("button").focus()
@@ -170,7 +170,7 @@ def test_the_best_is_seen_without_scrolling(view: Callable[..., Any], large: Pat
     for place in (".answer", "figure svg", "figcaption"):
         box = page.locator(place).first.bounding_box()
         assert box["y"] + box["height"] <= 900
-    assert " with skill 0." in page.locator(".answer").inner_text()
+    assert "Its gain is 0." in page.locator(".answer").inner_text()
 
 
 @pytest.mark.nightly

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pyuff
 
-from femubench.results import Block, JobResult, PairedMode, Run, run_to_json
+from femubench.core.schema.records import to_plain
+from femubench.results import Block, JobResult, PairedMode, Rule, Run, run_to_json
 
 ROOT = Path(__file__).parents[2]
 CASES = sorted(
@@ -148,7 +149,7 @@ def a_run() -> Run:
         for seed in (0, 1):
             ok = {"rigid_body_modes": 3, "rigid_body_modes_expected": 3, "negative_eigenvalues": 0}
             results += [
-                JobResult(case, "unchanged", seed, "ok", blocks=blocks, score=1.0, rank=1, **ok),
+                JobResult(case, "unchanged", seed, "ok", blocks=blocks, gain=0.0, rank=1, **ok),
                 JobResult(
                     case, "baruch", seed, "ok", "", 0.1, blocks, 2, 3, 1, 4, 5, 0.5, 2,
                     ({"name": "EI", "before": 1.0, "after": 1.1},), ({"step": 1.0},),
@@ -163,7 +164,8 @@ def a_run() -> Run:
         "machine": {"cpu": "x", "cpu_count": 2}, "git_commit": None, "plan": "p",
         "cases": {"frame": {"title": "Frame", "digest": "d"}, "set/part": {"title": "P"}},
         "strategies": ["unchanged", "baruch", "kabe"], "citations": {"kabe": "K. (1985)"},
-        "reference": {"frame": errors, "set/part": errors},
+        "reference": {"frame": errors, "set/part": errors}, "rule": Rule().to_json(),
+        "models": {case: {"drawn": to_plain(blocks)} for case in ("frame", "set/part")},
     }  # fmt: skip
     return Run(meta, tuple(results))
 

@@ -31,7 +31,7 @@ def failed(data: Data, strategy: str, status: str = "failed") -> Data:
     for result in made["results"]:
         if result["strategy"] == strategy:
             result |= {"status": status, "reason": "made up", "used": None, "higher": None}
-            result |= {"modified": None, "score": None}
+            result |= {"modified": None, "gain": None}
     return made
 
 

@@ -7,11 +7,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from msgspec import structs, to_builtins
 
-from femubench.results import Block, JobResult, PairedMode, Run, rank_results
+from femubench.core.schema.paired_modes import ModeBefore, PartnerCandidate
+from femubench.results import Block, JobResult, PairedMode, Rule, Run, rank_results
 
 BLOCKS = ("used", "higher", "modified")
-MODES = {"used": (1, 2, 3), "higher": (4, 5), "modified": (1, 2)}
+MODES = {"used": (1, 2, 3), "higher": (4, 5), "modified": (1, 4)}
+FIRST = {"used": 0.0, "higher": 0.0, "modified": -20.0}  # Hz that a first mode is off 100
 CHANGE = "mass at 6"
 CASES_IN_A_SCENARIO = 2  # of every tenth scenario; the others have a case of their own
 
@@ -25,7 +28,7 @@ def synthetic_run(
     failing: float = 0.03,
     random_seed: int = 20260101,
 ) -> Run:
-    """Return a run with scores and ranks; the same arguments give the same run.
+    """Return a run with gains and ranks; the same arguments give the same run.
 
     Strategies get worse with their number, more or less. Some jobs fail, some do
     not apply, some models are unphysical; `unchanged` is the last strategy.
@@ -39,15 +42,19 @@ def synthetic_run(
     random = np.random.default_rng(random_seed)
     named = [*names, *(f"strategy-{n:03d}" for n in range(len(names), strategies - 1)), "unchanged"]
     cases = case_names(scenarios)
-    reference = {case: _nominal(random, number) for number, case in enumerate(cases)}
-    skills = np.geomspace(0.05, 1.5, len(named))
+    nominal = {case: _nominal(random, number) for number, case in enumerate(cases)}
+    reference = {
+        case: {name: block.rms_percent for name, block in blocks.items()}
+        for case, blocks in nominal.items()
+    }
+    gains = np.geomspace(0.05, 1.5, len(named))
     drawn = tuple(range(1, seeds + 1)) if seeds > 1 else (0,)
     results = [
-        _result(random, case, name, seed, reference[case], 1.0 if name == "unchanged" else skill)
+        _result(random, case, name, seed, nominal[case], gain)
         if name == "unchanged" or random.random() >= failing
         else _failure(random, case, name, seed)
         for case in cases
-        for name, skill in zip(named, skills, strict=True)
+        for name, gain in zip(named, gains, strict=True)
         for seed in drawn
     ]
     meta = {
@@ -68,9 +75,24 @@ def synthetic_run(
         "baseline": "unchanged",
         "citations": {name: f"A. Author (2001), {name}" for name in named},
         "reference": reference,
+        "rule": Rule().to_json(),
+        "yardsticks": {"unchanged": "the models that were given"},
+        "models": {case: {"drawn": _plain(blocks)} for case, blocks in nominal.items()},
         "notes": [],
     }
-    return Run(meta, rank_results(results, reference))
+    return Run(meta, rank_results(results, meta))
+
+
+def _plain(blocks: dict[str, Block]) -> dict[str, object]:
+    """Return what a nominal model predicts, with the modes before the change."""
+    found = dict(blocks)
+    if "modified" in found:
+        modes = (
+            structs.replace(mode, before=ModeBefore(mode.number, 0.97))
+            for mode in found["modified"].modes
+        )
+        found["modified"] = replace(found["modified"], modes=tuple(modes))
+    return {name: to_builtins(block) for name, block in found.items()}
 
 
 def case_names(scenarios: int) -> list[str]:
@@ -86,10 +108,10 @@ def case_names(scenarios: int) -> list[str]:
     ]
 
 
-def _nominal(random: np.random.Generator, number: int) -> dict[str, float]:
-    """Return the errors of the nominal model; every fourth case has no design change."""
-    blocks = BLOCKS[:2] if number % 4 == 3 else BLOCKS
-    return {name: float(random.uniform(3.0, 12.0)) for name in blocks}
+def _nominal(random: np.random.Generator, number: int) -> dict[str, Block]:
+    """Return what the nominal model predicts; every fourth case has no design change."""
+    names = BLOCKS[:2] if number % 4 == 3 else BLOCKS
+    return {name: _block(random, name, float(random.uniform(3.0, 12.0))) for name in names}
 
 
 def _result(
@@ -97,19 +119,23 @@ def _result(
     case: str,
     strategy: str,
     seed: int,
-    nominal: dict[str, float],
-    skill: float,
+    nominal: dict[str, Block],
+    gain: float,
 ) -> JobResult:
     still = strategy == "unchanged"
-    factor = 1.0 if still else skill * random.lognormal(0.0, 0.6)
-    negative = 0 if still else int(skill > 1.0 and random.random() < 0.1)
+    factor = gain * random.lognormal(0.0, 0.6)
+    negative = 0 if still else int(gain > 1.0 and random.random() < 0.1)
     return JobResult(
         case=case,
         strategy=strategy,
         seed=seed,
         status="ok",
         seconds=float(random.lognormal(-2.0, 1.0)),
-        blocks={name: _block(random, name, rms * factor) for name, rms in nominal.items()},
+        blocks=nominal
+        if still
+        else {
+            name: _block(random, name, own.rms_percent * factor) for name, own in nominal.items()
+        },
         rigid_body_modes=3,
         rigid_body_modes_expected=3,
         negative_eigenvalues=negative,
@@ -128,12 +154,26 @@ def _block(random: np.random.Generator, name: str, percent: float) -> Block:
     change = CHANGE if name == "modified" else None
     modes = tuple(
         PairedMode(
-            n, 100.0 * n, 100.0 * n * (1.0 + float(e)), float(random.uniform(0.9, 1)), change
+            n,
+            100.0 * n + FIRST[name],
+            (100.0 * n + FIRST[name]) * (1.0 + float(e)),
+            float(random.uniform(0.9, 1)),
+            change,
+            candidates=_others(random, 100.0 * n),
         )
         for n, e in zip(numbers, errors, strict=True)
     )
     macs = [mode.mac for mode in modes if mode.mac is not None]
     return Block(percent, sum(macs) / len(macs), modes)
+
+
+def _others(random: np.random.Generator, hertz: float) -> tuple[PartnerCandidate, ...]:
+    """Return now and then another mode that may stand for the measured one."""
+    if random.random() > 0.1:
+        return ()
+    return (
+        PartnerCandidate(hertz * float(random.uniform(0.9, 1.1)), float(random.uniform(0, 1)), 0.8),
+    )
 
 
 def _parameters(random: np.random.Generator) -> tuple[dict[str, object], ...]:

@@ -318,7 +318,7 @@ def colossus(model: Model) -> Model:
 @animal("failed", "the result cannot be read")
 def liar(model: Model) -> None:
     """Writes its own verdict where the worker writes its answer."""
-    text = b'{"status": "ok", "score": 0.0}'
+    text = b'{"status": "ok", "gain": 1.0}'
     data = len(text).to_bytes(8, "big") + text
     for descriptor in range(3, 64):
         try:

@@ -1,4 +1,4 @@
-// The leaderboard: a sortable table, filters that compute it anew, and the scores case by case.
+// The leaderboard: a sortable table, filters that compute it anew, and the gains case by case.
 {
   const { el, data, number, count, share, small, cell, ranking, overview } = bench;
   const LAZY = 4000; // rows times cases from which intervals come after the table
@@ -6,28 +6,37 @@
   const parts = {};
 
   bench.blockName = (k) => (data.blocks[k] === "used" ? "given" : data.blocks[k]);
-  bench.errorLeft = ({ logs }, place) => (logs[0][place] === null ? null : bench.median(logs.map((own) => Math.exp(own[place]))));
   const twinsOf = (row) => data.strategies[row.index].twins;
 
-  // A column: key, title, hint, what makes its cell of a row; words are left, and figures of skill sort downwards first.
+  // A column: key, title, hint, what makes its cell of a row; words are left, and figures of gain sort downwards first.
   const figure = (key, title, hint, say, more) => ({ key, title, hint, cell: (row) => cell(row[key], say), right: true, ...more });
-  const skill = (key, title, hint) => (key === "skill" || data.board.some((row) => row[key] !== null)) && figure(key, title, hint, share, { down: true });
+  const known = (key) => data.board.some((row) => row[key] !== null);
+  const gain = (key, title, hint) => (key === "gain" || known(key)) && figure(key, title, hint, share, { down: true });
+  const percent = (value) => (Number.isFinite(value) ? `${Math.round(100 * value)}` : "–");
   const COLUMNS = [
-    figure("rank", "Rank", null, count),
+    { key: "rank", title: "Rank", right: true, hint: "yardsticks, which know nothing of the structure, have none", cell: (row) => cell(row.rank, (v) => (row.yardstick ? "=" : count(v)), { "data-sort": row.place }) },
     { key: "strategy", title: "Strategy", cell: nameCell },
-    skill("skill", "Skill", `part of the ${ranking.yardstick}'s error on ${data.scored_on} that is taken away: 1 is all of it, 0 none, less than 0 is worse; more is better`),
-    { title: "95 % interval", right: true, cell: ({ skill_low: low, skill_high: high }) => el("td", { class: "right range", "data-low": low ?? "", "data-high": high ?? "" }, low === null ? "–" : `${share(low)} to ${share(high)}`) },
-    skill("skill_drawn", "From drawn", `skill of the start from the models as drawn, against the ${ranking.yardstick}s too`),
-    skill("skill_tests", "On tests", "skill on tests alone, without computed truths"),
-    data.strategies.some(({ twins }) => twins) && { key: "twins", title: "On twins", right: true, down: true, cell: (row) => cell(twinsOf(row)?.skill, (v) => (twinsOf(row) ? `${share(v)} (${share(twinsOf(row).original_skill)})` : number(v))),
-      hint: "skill on similar structures under other names, drawn when the run began; next to it, in brackets, on the cases that have such twins" },
-    ...data.blocks.map((block, k) => figure(`${block}_percent`, `${bench.blockName(k)} rms, %`, `rms frequency error of the ${block === "used" ? "modes that were given; no part of the skill" : `${block} modes`}; median over the cases`, small, { block: k })),
+    gain("gain", "Gain", `what the models gain over the ${ranking.yardstick}s on ${data.scored_on}, -1 to 1: mean of the two gains to the right; a job without a possible model counts as the model that was given`),
+    { title: "95 % interval", right: true, cell: ({ gain_low: low, gain_high: high }) => el("td", { class: "right range", "data-low": low ?? "", "data-high": high ?? "" }, low === null ? "–" : `${share(low)} to ${share(high)}`) },
+    figure("error_percent", "Off, %", "mean |ln(f_p / f_m)| in percent of the modes out of the given band", small),
+    figure("better_share", "Better, %", `share of the structures where that is less than the ${ranking.yardstick}'s`, percent, { down: true }),
+    figure("worse_share", "Worse, %", "share of the structures where it is larger by more than a quarter", percent),
+    gain("error_gain", "Out of band", "gain by the frequencies out of the given band"),
+    gain("change_gain", "Of changes", "gain by the changes of frequencies by modifications"),
+    gain("gain_drawn", "From drawn", `gain of the start from the models as drawn, over the ${ranking.yardstick}s too`),
+    gain("gain_tests", "On tests", "gain on tests alone, without computed truths"),
+    data.strategies.some(({ twins }) => twins) && { key: "twins", title: "On twins", right: true, down: true, cell: (row) => cell(twinsOf(row)?.gain, (v) => (twinsOf(row) ? `${share(v)} (${share(twinsOf(row).original_gain)})` : number(v))),
+      hint: "gain on similar structures under other names, drawn when the run began; next to it, in brackets, on the cases that have such twins; the lower one counts" },
+    known("band_percent") && figure("band_percent", "In band, %", "error of modified modes in the given band, where the given frequencies nearly are the answer", small),
+    known("shape_error") && figure("shape_error", "1 - MAC", "of the unseen modes, mean", share),
+    figure("false_modes", "False modes", "modes that a test would see and did not, mean over the structures", small),
+    ...data.blocks.map((block, k) => figure(`${block}_percent`, `${bench.blockName(k)} rms, %`, `rms frequency error of the ${block === "used" ? "modes that were given; no part of the gain" : `${block} modes`}; median over the cases`, small, { block: k })),
     figure("coverage90", "In 90 %", "share of unseen modes in the 90 % interval that the strategy states", share),
     figure("crps_percent", "CRPS, %", "continuous ranked probability score of unseen modes in percent of the frequency, mean over the structures; the absolute error where no uncertainty is stated", small),
     { key: "flags", title: "Flags", cell: flagCell },
-    { key: "coverage", title: "Models", hint: "jobs that gave a model", cell: coverageCell },
-    { key: "tier", title: "Tier", right: true, hint: "1: no difference from the best shown; 2: none from the best of the others", cell: ({ index }) => cellOf("right", overview.tierOf.get(index) ?? "", count(overview.tierOf.get(index))) },
-    { key: "letters", title: "Group", hint: "strategies that share a letter: no difference shown", cell: ({ index }) => cellOf("letters", overview.letters(index), overview.letters(index)) },
+    { key: "coverage", title: "Answered", hint: "jobs that gave a possible model", cell: coverageCell },
+    { key: "better_than", title: "Above", right: true, down: true, hint: "lines of the board that it is shown to be better than, after correction for all pairs", cell: (row) => cell(row.better_than.length, count, { title: row.better_than.join(", ") }) },
+    { key: "worse_than", title: "Below", right: true, hint: "lines of the board that it is shown to be worse than", cell: (row) => cell(row.worse_than.length, count, { title: row.worse_than.join(", ") }) },
     figure("parameters", "Un\u00adknowns", "free parameters, median over the cases", count),
     figure("seconds", "Time, s", "wall time, median over the cases", small),
   ].filter(Boolean);
@@ -38,7 +47,7 @@
   }
   function nameCell(row) {
     const open = ({ currentTarget: button }) => toggle(row, button);
-    return el("th", { scope: "row", class: "name" }, el("button", { type: "button", class: "expand", title: "scores case by case", "aria-expanded": "false", "aria-controls": `cases-${row.index}`, onclick: open }, row.strategy));
+    return el("th", { scope: "row", class: "name" }, el("button", { type: "button", class: "expand", title: "gains case by case", "aria-expanded": "false", "aria-controls": `cases-${row.index}`, onclick: open }, row.strategy));
   }
   function flagCell(row) {
     const { rigid_modes_lost: lost, negative_eigenvalues: negative } = row;
@@ -53,12 +62,12 @@
     const misses = d3.rollups(row.results.filter((r) => r.status !== "ok"), (own) => own.length, (r) => r.status);
     if (row.total > row.results.length) misses.push(["missing", row.total - row.results.length]);
     const stated = misses.map(([status, n]) => el("div", { class: status === "not-applicable" ? "soft" : "bad" }, `${n} ${bench.statusWord(status)}`));
-    return el("td", { class: "coverage", "data-ok": row.ok, "data-total": row.total, "data-sort": -row.ok - row.not_applicable / 1e6 }, `${row.ok} of ${row.total}`, stated);
+    return el("td", { class: "coverage", "data-ok": row.answered, "data-total": row.total, "data-sort": -row.answered - row.not_applicable / 1e6 }, `${row.answered} of ${row.total}`, stated);
   }
 
-  // Return the scores of a strategy case by case.
+  // Return the gains of a strategy case by case.
   function detail(row) {
-    const seeds = row.logs.length;
+    const seeds = row.perSeed.length;
     const lines = row.cases.map((c, place) => {
       const own = row.results.filter((r) => r.c === c);
       const fine = own.filter((r) => r.status === "ok");
@@ -69,11 +78,11 @@
         ...new Set(own.filter((r) => r.status !== "ok").map((r) => `${bench.statusText(r.status)}${r.reason ? `: ${r.reason}` : ""}`)),
         own.length < seeds && `${bench.statusText("missing")}${seeds > 1 ? ` for ${bench.plural(seeds - own.length, "seed")}` : ""}`,
       ];
-      return [bench.caseLink(data.cases[c]), cell(bench.errorLeft(row, place)), ...data.blocks.map((_, k) => middle((r) => r.rms[k], small)),
+      return [bench.caseLink(data.cases[c]), cell(row.gains[place], share), ...data.blocks.map((_, k) => middle((r) => r.rms[k], small)),
         middle((r) => bench.median(r.mac.filter((v) => v !== null))), middle((r) => r.parameters, count), middle((r) => r.seconds, small),
         el("td", { class: "said" }, said.filter(Boolean).join("; "))];
     });
-    const heads = ["Case", "Error left", ...data.blocks.map((block) => `${block} rms, %`), "MAC", "Unknowns", "Time, s", "Outcome"];
+    const heads = ["Case", "Gain", ...data.blocks.map((block) => `${block} rms, %`), "MAC", "Unknowns", "Time, s", "Outcome"];
     const { citation, version } = data.strategies[row.index];
     return [citation && el("p", { class: "soft" }, citation, version && ` (version ${version})`), bench.table(`${row.strategy}, case by case; medians over the seeds`, heads, lines)];
   }
@@ -113,7 +122,7 @@
     const { blocks } = state.filter;
     const hidden = ({ block }) => block !== undefined && !blocks.includes(block);
     const lines = rows.map((row) => {
-      const name = [row.unphysical && "unphysical", row.strategy === data.baseline && "baseline"].filter(Boolean).join(" ");
+      const name = [row.unphysical && "unphysical", row.strategy === data.baseline && "baseline", row.yardstick && "yardstick"].filter(Boolean).join(" ");
       return el("tr", { class: name, "data-strategy": row.strategy }, COLUMNS.map((column) => Object.assign(column.cell(row), { hidden: hidden(column) })));
     });
     parts.body.replaceChildren(...(rows.length ? lines : [el("tr", {}, el("td", { colspan: COLUMNS.length }, "Nothing to show: no result passes the filters."))]));
@@ -124,9 +133,9 @@
       parts.heads[k].hidden = hidden(column);
     });
     const [changed, fewer] = [!ranking.isWhole(state.filter), rows.length < data.strategies.length];
-    const anew = changed ? "Skills, intervals, errors and ranks are computed anew for these" : "Ranks are among these";
+    const anew = changed ? "Gains, intervals, errors and ranks are computed anew for these, without twins" : "Ranks are among these";
     parts.status.textContent = `${rows.length} of ${bench.plural(data.strategies.length, "strategy", "strategies")}, ${rows[0]?.cases.length ?? 0} of ${bench.plural(data.cases.length, "case")}, ${blocks.length} of ${bench.plural(data.blocks.length, "block")}.`
-      + (changed || fewer ? ` ${anew}; the tiers and groups are those of the whole run.` : "");
+      + (changed || fewer ? ` ${anew}; what is shown to differ is that of the whole run.` : "");
     parts.status.classList.toggle("changed", changed || fewer);
   }
 

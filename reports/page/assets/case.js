@@ -22,7 +22,7 @@
       const detail = data.details[`${c}:${result.s}`] ?? null;
       return { name: data.strategies[result.s].name, result, detail, ok: result.status === "ok" && detail !== null, exhibit: detail?.exhibit ?? null };
     });
-    return d3.sort(entries, ({ ok }) => !ok, ({ result }) => result.score ?? Infinity);
+    return d3.sort(entries, ({ ok }) => !ok, ({ result }) => -(result.gain ?? -Infinity));
   };
 
   const factsOf = ({ name, scenario, stage, reference }) => {
@@ -164,7 +164,7 @@
       refill();
       for (const { box, build } of parts) box.replaceChildren(...[build()].flat(Infinity).filter(Boolean));
     };
-    const labels = entries.map(({ name, ok, result }) => [name, `${name} (${ok ? `error left ${bench.number(result.score)}${result.unphysical ? ", unphysical" : ""}` : bench.statusWord(result.status)})`]);
+    const labels = entries.map(({ name, ok, result }) => [name, `${name} (${ok ? `gain ${bench.share(result.gain)}${result.unphysical ? ", unphysical" : ""}` : bench.statusWord(result.status)})`]);
     const picker = (side) => el("label", {}, `${side.toUpperCase()} `, bench.select(`Strategy ${side.toUpperCase()}`, labels, state[side].name, (name) => {
       state[side] = find(name);
       fill();

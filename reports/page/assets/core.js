@@ -45,8 +45,6 @@ const bench = {};
       if (text.length <= width) return text;
       return tail.length < width - 2 ? `${text.slice(0, width - tail.length - 1)}…${tail}` : `${text.slice(0, width - 1)}…`;
     },
-    // Return the letter of a group: a to z, then aa, ab, ...
-    letter: (n) => (n < 26 ? "" : bench.letter(Math.floor(n / 26) - 1)) + String.fromCharCode(97 + (n % 26)),
     median(values) {
       const sorted = Float64Array.from(values).sort();
       const half = sorted.length >> 1;

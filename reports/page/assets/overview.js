@@ -1,13 +1,12 @@
-// Charts of the run page: skills with intervals, calibration, profiles, cost, mean ranks with groups.
+// Charts of the run page: gains with intervals, calibration, profiles, cost, mean ranks with groups.
 {
   const { el, data, ranking } = bench;
   const MOST_CURVES = 8;
+  const OFFSET = 0.05; // percent, so that an error that is met does not decide a ratio
   const MOST_ROWS = 40;
   const FARTHEST = 1000;
   const LEVELS = [...d3.range(0.1, 0.95, 0.1).map((level) => Number(level.toFixed(1))), 0.95];
-  const { tiers, groups, note, pairs } = data.statistics;
-  const tierOf = new Map(tiers.flatMap((tier, t) => tier.map((s) => [s, t + 1])));
-  const lettersOf = d3.rollup(groups.flatMap((group, g) => group.map((s) => [s, bench.letter(g)])), (own) => own.map(([, letter]) => letter).join(" "), ([s]) => s);
+  const { note, pairs } = data.statistics;
 
   // Return the first rows, and the baseline with them.
   function first(rows, most) {
@@ -16,20 +15,20 @@
   }
   const left = (rows, shown) => (rows.length > shown.length ? ` Drawn: ${shown.length} of ${rows.length}; filter the strategies to see others.` : "");
 
-  function skills(rows) {
+  function gains(rows) {
     const shown = first(rows, MOST_ROWS);
-    const nameOf = (row) => `${row.strategy}${tiers.length > 1 && tierOf.has(row.index) ? `, tier ${tierOf.get(row.index)}` : ""}${row.unphysical ? " ▲" : ""}`;
+    const nameOf = (row) => `${row.yardstick ? "= " : ""}${row.strategy}${row.unphysical ? " ▲" : ""}`;
     const names = shown.map(nameOf);
     const kind = ranking.intervalKind(rows);
-    const drawn = shown.filter((row) => row.skill_drawn !== null);
+    const drawn = shown.filter((row) => row.gain_drawn !== null);
     const given = `${ranking.yardstick}s`;
     return bench.draw({
-      kind: "interval", title: `Skill of every strategy on ${data.scored_on}`,
-      note: `${kind && `The line is the 95 % interval over ${kind}. `}0: the ${given}, which no data have changed; 1: no error left.${shown.some((row) => row.unphysical) ? " ▲: unphysical." : ""}${left(rows, shown)}`,
-      x: { label: "skill, part of the error taken away", unit: "1", high: 1 }, y: { names }, marks: [{ axis: "x", value: 0, label: "without data" }],
+      kind: "interval", title: `Gain of every strategy on ${data.scored_on}`,
+      note: `${kind && `The line is the 95 % interval over ${kind}. `}0: the ${given}; 1: no error left; =: yardsticks that know nothing of the structure.${shown.some((row) => row.unphysical) ? " ▲: unphysical." : ""}${left(rows, shown)}`,
+      x: { label: `gain over the ${given}`, unit: "1", high: 1 }, y: { names }, marks: [{ axis: "x", value: 0, label: "without data" }],
       series: [
-        { name: `from the ${given}`, names, x: shown.map((row) => row.skill), y: names, low: shown.map((row) => row.skill_low), high: shown.map((row) => row.skill_high) },
-        ...(drawn.length ? [{ name: "from the models as drawn", role: "nominal", x: drawn.map((row) => row.skill_drawn), y: drawn.map(nameOf), names: drawn.map(nameOf) }] : []),
+        { name: `from the ${given}`, names, x: shown.map((row) => row.gain), y: names, low: shown.map((row) => row.gain_low), high: shown.map((row) => row.gain_high) },
+        ...(drawn.length ? [{ name: "from the models as drawn", role: "nominal", x: drawn.map((row) => row.gain_drawn), y: drawn.map(nameOf), names: drawn.map(nameOf) }] : []),
       ],
     });
   }
@@ -51,7 +50,7 @@
     const shown = first(rows, MOST_CURVES);
     const problems = ranking.problems(rows, filter);
     if (!problems.length) return null;
-    const offset = data.offset_percent;
+    const offset = OFFSET;
     const ratios = d3.transpose(problems.map((errors) => {
       const best = d3.min(errors.filter((e) => e !== null));
       return errors.map((e) => (e === null ? Infinity : (e + offset) / (best + offset)));
@@ -65,58 +64,45 @@
     });
     return bench.draw({
       kind: "steps", title: "Performance profiles",
-      note: `How often is a strategy within a factor τ of the best one? ${bench.plural(problems.length, "problem")}, one a case and block; rms errors with ${offset} % added as in the score. Left edge: how often it is the best; high and left is good.${left(rows, shown)}`,
-      x: { label: "factor τ of the best rms error", unit: "1", log: true, low: 1, high: end }, y: { label: "share of problems", unit: "1", low: 0, high: 1.02 }, series,
+      note: `How often is a strategy within a factor τ of the best one? ${bench.plural(problems.length, "problem")}, one a case; errors out of the given band with ${offset} % added. Left edge: how often it is the best; high and left is good.${left(rows, shown)}`,
+      x: { label: "factor τ of the best error", unit: "1", log: true, low: 1, high: end }, y: { label: "share of problems", unit: "1", low: 0, high: 1.02 }, series,
     });
   }
 
   function cost(rows) {
-    const found = rows.filter((row) => row.ok && row.seconds > 0);
+    const found = rows.filter((row) => row.ok && row.seconds > 0 && row.error_percent > 0);
+    const textbook = data.board[0]?.textbook_percent;
     if (!found.length) return null;
     const series = [["physical", false, 2], ["unphysical", true, 1]].map(([name, unphysical, style]) => {
       const own = found.filter((row) => row.unphysical === unphysical);
-      return { name, style, x: own.map((row) => row.seconds), y: own.map((row) => 1 - row.skill), names: own.map((row) => row.strategy) };
+      return { name, style, x: own.map((row) => row.seconds), y: own.map((row) => row.error_percent), names: own.map((row) => row.strategy) };
     });
     return bench.draw({
       kind: "scatter", title: "Accuracy against cost",
-      note: `What is left of the error (1 − skill; 1 = the ${ranking.yardstick}) against wall time, median over the cases. Low and left is good.`,
-      x: { label: "wall time, median over the cases", unit: "s", log: true }, y: { label: "error left", unit: "1", log: true },
-      marks: [{ axis: "y", value: 1, label: ranking.yardstick }], series: series.filter((s) => s.x.length),
+      note: "Error out of the given band, mean over the structures, against wall time, median over the cases. Low and left is good.",
+      x: { label: "wall time, median over the cases", unit: "s", log: true }, y: { label: "error out of band", unit: "%", log: true },
+      marks: textbook > 0 ? [{ axis: "y", value: textbook, label: ranking.yardstick }] : [], series: series.filter((s) => s.x.length),
     });
   }
 
-  // Return the mean rank of every strategy over the structures by its score; equal scores share ranks.
-  function meanRanks() {
-    const rows = ranking.rows(ranking.everything());
-    const places = (rows[0]?.structures ?? []).map((_, c) => {
-      const values = rows.map((row) => bench.median(row.perStructure.map((logs) => logs[c])));
-      return values.map((v) => d3.sum(values, (w) => (w < v - data.tie ? 1 : w <= v + data.tie ? 0.5 : 0)) + 0.5);
-    });
-    return d3.sort(rows.map(({ index, strategy }, k) => ({ s: index, name: strategy, rank: d3.mean(places, (own) => own[k]) })), (item) => item.rank, (item) => item.s);
-  }
-
+  // Draw between how many lines of the board a difference is shown.
   function comparison() {
-    const ranks = meanRanks();
-    if (ranks.length < 2) return null;
-    const shown = ranks.slice(0, MOST_ROWS);
-    const names = shown.map(({ s, name }) => (lettersOf.has(s) ? `${name} · ${lettersOf.get(s)}` : name));
+    const rows = data.board.filter((row) => row.better_than.length + row.worse_than.length).slice(0, MOST_ROWS);
+    const names = rows.map((row) => `${row.yardstick ? "= " : ""}${row.strategy}`);
     const apart = pairs.filter(([, , p]) => p < 0.05).length;
-    const chart = bench.draw({
-      kind: "interval", title: "Which strategies differ by more than chance",
-      note: [note, pairs.length && `${apart} of ${bench.plural(pairs.length, "pair")} differ. Strategies that share a letter: no difference shown.`, `Ranks are by score alone, and for the whole run whatever the filter.${left(ranks, shown)}`].filter(Boolean).join(" "),
-      x: { label: "mean rank over the structures (1 is best)", low: 1 }, y: { names },
-      series: [{ name: "mean rank", x: shown.map((item) => item.rank), y: names, names }],
+    if (!pairs.length) return null;
+    if (!rows.length) return el("figure", {}, el("figcaption", {}, el("b", {}, "Which strategies differ by more than chance"), ` None of ${bench.plural(pairs.length, "pair")}. ${note}`));
+    return bench.draw({
+      kind: "scatter", title: "Which strategies differ by more than chance",
+      note: `${apart} of ${bench.plural(pairs.length, "pair")} differ. ${note} For the whole run whatever the filter.`,
+      x: { label: "lines that it is shown to be better than", unit: "1", low: 0 }, y: { label: "lines that it is shown to be worse than", unit: "1", low: 0 },
+      series: [{ name: "lines of the board", x: rows.map((row) => row.better_than.length), y: rows.map((row) => row.worse_than.length), names }],
     });
-    const listed = groups.map((group, g) => el("li", {}, el("b", {}, `${bench.letter(g)}: `), ranks.filter((item) => group.includes(item.s)).map((item) => item.name).join(", ")));
-    if (listed.length) chart.append(bench.fold("Groups in words", () => el("ul", {}, listed), "numbers"));
-    return chart;
   }
 
   let whole = null;
   bench.overview = {
-    tierOf,
-    letters: (s) => lettersOf.get(s) ?? (groups.length ? "alone" : "–"),
-    top: (rows) => [skills(rows), calibration(rows)].filter(Boolean),
+    top: (rows) => [gains(rows), calibration(rows)].filter(Boolean),
     figures: (rows, filter) => [profile(rows, filter), cost(rows), (whole ??= comparison())].filter(Boolean),
   };
 }

@@ -1,4 +1,4 @@
-"""Skill by axes: every cell is a leaderboard of its own, relative to the textbook models."""
+"""Gain by axes: every cell is a leaderboard of its own, relative to the textbook models."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
 
 _Arm = tuple[Nominal, str, str]  # nominal model, case and strategy, as the run names them
 FIGURES = (
-    *("skill", "skill_low", "skill_high", "ok", "failed", "not_applicable", "missing", "jobs"),
+    *("gain", "gain_low", "gain_high", "ok", "failed", "not_applicable", "missing", "jobs"),
     *("unphysical", "seconds"),
 )
 
 
-def skill_by(run: Run, *axes: str) -> pd.DataFrame:
-    """Return one row a cell: the values of the axes, skill, and how many of its jobs failed.
+def gain_by(run: Run, *axes: str) -> pd.DataFrame:
+    """Return one row a cell: the values of the axes, gain, and how many of its jobs failed.
 
-    The skill of a cell is that of the leaderboard with nothing else on it: cases are taken
+    The gain of a cell is that of the leaderboard with nothing else on it: cases are taken
     together with every structure counted once, and so are the values of the axes left out; with
-    several seeds it is the median over them. `skill_low` and `skill_high` are its 95 % interval,
+    several seeds it is the mean over them. `gain_low` and `gain_high` are its 95 % interval,
     over structures where there are six or more, else over seeds. A job that failed or is missing
-    counts ten times the textbook model's error. Of an axis of options there are the cells of its
+    counts as the model that was given. Of an axis of options there are the cells of its
     strategy alone, unless ``strategy`` is an axis too: then the others have none there.
 
     Arguments:
@@ -41,8 +41,8 @@ def skill_by(run: Run, *axes: str) -> pd.DataFrame:
         InputError: for an axis that the run does not have.
 
     Examples:
-        >>> results.skill_by(run, "strategy")["skill"].round(2).tolist()
-        [-1.97, 0.47]
+        >>> results.gain_by(run, "strategy")["gain"].round(2).tolist()
+        [-0.67, 0.6]
     """
     import pandas as pd
 
@@ -73,7 +73,8 @@ def skill_by(run: Run, *axes: str) -> pd.DataFrame:
 
 def _figures(run: Run, arms: Sequence[_Arm], by_arm: dict[_Arm, list[JobResult]]) -> dict[str, Any]:
     """Return the figures of a cell, whose jobs go as one strategy on distinct cases."""
-    structures, reference = run.meta.get("structures") or {}, run.meta.get("reference") or {}
+    structures, models = run.meta.get("structures") or {}, run.meta.get("models") or {}
+    yardstick = run.meta.get("yardstick") or "drawn"
     names = {arm: f"{number}" for number, arm in enumerate(arms)}
     results = tuple(
         replace(result, case=name, strategy="cell", nominal="drawn")
@@ -85,10 +86,19 @@ def _figures(run: Run, arms: Sequence[_Arm], by_arm: dict[_Arm, list[JobResult]]
         "seed": run.meta.get("seed", 0),
         "strategies": ["cell"],
         "structures": {name: structures.get(arm[1], arm[1]) for arm, name in names.items()},
-        "reference": {n: reference[arm[1]] for arm, n in names.items() if arm[1] in reference},
+        "rule": run.meta.get("rule"),
+        "yardstick": "textbook",
+        "models": {
+            name: {
+                "textbook": models[case][yardstick],
+                "drawn": models[case].get(nominal, models[case][yardstick]),
+            }
+            for (nominal, case, _), name in names.items()
+            if case in models
+        },
     }
     row = row_of(Run(meta, results), "cell")
-    stated = {name: row[name] for name in ("skill", "skill_low", "skill_high", "ok", "unphysical")}
+    stated = {name: row[name] for name in ("gain", "gain_low", "gain_high", "ok", "unphysical")}
     failed = sum(result.status not in DONE for result in results)
     jobs = int(row["total"])
     return {

@@ -1,0 +1,315 @@
+"""The rule of the boards: what a model gains over the textbook one out of the given band.
+
+The rule was fixed in version 1, before any structure was made to decide on it. Its numbers and its
+version stand in every run, and the version names the numbers that are not its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from femubench.core.errors import InputError
+from femubench.core.modal.correlation import mac
+from femubench.core.modal.measurement import Measurement
+from femubench.core.modal.pairing import LEAST_SENSORS, Pairing
+from femubench.core.schema.paired_modes import ModeBefore, PairedMode, PartnerCandidate
+from femubench.core.schema.results import Block
+from femubench.core.typing import FloatArray
+
+LEAST_KEPT_MAC = 0.3  # of what a run keeps, so that rules with other limits can be tried on it
+
+
+@dataclass(frozen=True)
+class Rule:
+    """The numbers of the rule.
+
+    Arguments:
+        window: largest |ln(f_j / f_i)| of a candidate: a mode that is off by more than a factor of
+            two does not describe the measured one, as in the pairing.
+        mac: least MAC of a candidate: below one half, shapes share less than they differ in.
+        above: candidates reach up to so many times the highest measured frequency of their state;
+            above, nobody measured, and a model must not pay for what a test could not find.
+        cap: largest error of a mode, ln 1.4: a lost mode costs no more than one that is off by the
+            widest window of a pairing by frequency alone, so that no prediction is worse than none.
+        same_mac: least MAC of a tested and a modified mode that are one: 393 of the first suite's
+            500 modified modes have such a tested one, and at less two modes have mixed.
+        change_cap: largest error of a change by a modification: beyond it the change was missed,
+            and how far says nothing more.
+        floor: of both errors of a gain: 0.2 % is what a good test repeats, and differences below
+            are no gain.
+        change_share: of a gain, the change under a modification: it needs the right cause, the
+            frequencies out of band the right size, and neither replaces the other.
+        visible: least weight, of a partner's, of a candidate that counts as a false mode: a tenth
+            of a peak's height is seen next to it.
+    """
+
+    window: float = math.log(2.0)
+    mac: float = 0.5
+    above: float = 1.1
+    cap: float = math.log(1.4)
+    same_mac: float = 0.8
+    change_cap: float = 0.1
+    floor: float = 0.002
+    change_share: float = 0.5
+    visible: float = 0.1
+    version: ClassVar[str] = "1"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the numbers with the version, which names the numbers that are not its own."""
+        usual = Rule()
+        changed = [f.name for f in fields(self) if getattr(self, f.name) != getattr(usual, f.name)]
+        return {"version": " ".join([self.version, *changed]), **asdict(self)}
+
+    @classmethod
+    def of(cls, meta: Mapping[str, Any]) -> Rule:
+        """Return the rule of a run; of one that states none, that of this version.
+
+        Raises:
+            InputError: for a number that is out of its bounds.
+        """
+        stated = {k: v for k, v in (meta.get("rule") or {}).items() if k != "version"}
+        return cls().changed(f"{name}={value}" for name, value in stated.items())
+
+    def changed(self, words: Iterable[str]) -> Rule:
+        """Return the rule with other numbers.
+
+        Arguments:
+            words: ``KEY=VALUE`` each.
+
+        Raises:
+            InputError: for another key, or a number that is out of its bounds.
+        """
+        found, names = self, [f.name for f in fields(self)]
+        for word in words:
+            name, _, value = word.partition("=")
+            if name not in names:
+                raise InputError(f"the rule has no {name!r}", expected=f"one of {', '.join(names)}")
+            least, most = _BOUNDS.get(name, (0.0, 10.0))
+            try:
+                number = float(value)
+            except ValueError:
+                number = math.nan
+            if not least <= number <= most:
+                what = f"{name} of the rule is {value!r}"
+                raise InputError(what, expected=f"a number from {least:g} to {most:g}")
+            found = replace(found, **{name: number})
+        return found
+
+
+# Beyond these a run keeps no candidates, or a share is none.
+_BOUNDS = {
+    "window": (0.0, 0.6932),
+    "mac": (LEAST_KEPT_MAC, 1.0),
+    "same_mac": (LEAST_KEPT_MAC, 1.0),
+    "floor": (1e-6, 1.0),
+    "cap": (1e-6, 10.0),
+    "change_cap": (1e-6, 10.0),
+    "change_share": (0.0, 1.0),
+}
+
+
+@dataclass(frozen=True)
+class ModelErrors:
+    """The errors of a model on a case; nan where the case has no such modes.
+
+    Arguments:
+        error: mean |ln(f_p / f_m)| out of band: of the held-out modes, and of the modified ones
+            above the highest given frequency, each block with the same weight; of a case that holds
+            nothing back, of the given modes.
+        change: mean error of the change of a mode's ln f by a modification.
+        band: as `error`, of the modified modes in the given band.
+        shape: mean 1 - MAC of the unseen modes with a measured shape.
+        false_modes: modes that the sensors would see and no test found.
+    """
+
+    error: float
+    change: float
+    band: float
+    shape: float
+    false_modes: int
+
+
+@dataclass(frozen=True)
+class CaseGain:
+    """What a model gains over the textbook model of its case, each in [-1, 1].
+
+    Arguments:
+        gain: the mean of the two others, by the share of the rule.
+        error: of the frequencies out of band; nan where there are none.
+        change: of the changes by modifications; nan where there are none.
+    """
+
+    gain: float
+    error: float
+    change: float
+
+
+def find_candidates(
+    measurement: Measurement, frequencies: FloatArray, readings: FloatArray, pairing: Pairing
+) -> list[tuple[PartnerCandidate, ...]]:
+    """Return by measured mode the predicted ones that may stand for it, but are nobody's partner.
+
+    The weight w = (phi_i' r_j)^2 / (phi_i' phi_i) is the height of the peak of mode j in a response
+    that is filtered for the measured shape phi_i; it is given in parts of the partner's.
+
+    Arguments:
+        measurement: m modes.
+        frequencies: of the model, in Hz, (p,).
+        readings: of its mass-normalised shapes at the sensors, (n_sensors, p).
+        pairing: of the two.
+    """
+    taken = np.isin(np.arange(len(frequencies)), pairing.index)
+    shapes = np.where(np.isfinite(measurement.shapes), measurement.shapes, 0.0)
+    heights = np.square(np.abs(shapes.conj().T @ readings))
+    likeness = mac(measurement.shapes, readings)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        apart = np.abs(np.log(frequencies[None, :] / measurement.frequencies[:, None]))
+    kept = (likeness >= LEAST_KEPT_MAC) & (apart <= math.log(2.0)) & ~taken
+    found = []
+    for i, partner in enumerate(pairing.index):
+        shaped = partner >= 0 and np.isfinite(pairing.mac[i])
+        columns = np.flatnonzero(kept[i]) if shaped else ()
+        weights = {j: float(heights[i, j] / heights[i, partner]) for j in columns}
+        found.append(
+            tuple(
+                PartnerCandidate(float(frequencies[j]), weight, float(likeness[i, j]))
+                for j, weight in weights.items()
+                if np.isfinite(weight)
+            )
+        )
+    return found
+
+
+def find_tested_modes(tested: Measurement, modified: Measurement) -> list[ModeBefore | None]:
+    """Return by modified mode the tested one of its shape, where each is the other's nearest.
+
+    Arguments:
+        tested, modified: the modes of the structure before and after a modification.
+    """
+    if tested.sensors.labels != modified.sensors.labels or not len(tested):
+        return [None] * len(modified)
+    there = [np.isfinite(item.shapes).sum(axis=0) >= LEAST_SENSORS for item in (modified, tested)]
+    likeness = np.where(
+        there[0][:, None] & there[1][None, :], mac(modified.shapes, tested.shapes), 0.0
+    )
+    nearest = likeness.argmax(axis=1)
+    rows = range(len(modified))
+    return [
+        ModeBefore(tested.numbers[j], float(likeness[i, j]))
+        if likeness[i, j] >= LEAST_KEPT_MAC and likeness[:, j].argmax() == i
+        else None
+        for i, j in zip(rows, nearest.tolist(), strict=True)
+    ]
+
+
+def measure_errors(
+    blocks: Mapping[str, Block], reference: Mapping[str, Block], rule: Rule
+) -> ModelErrors:
+    """Return the errors of a model on a case.
+
+    Arguments:
+        blocks: what it predicts.
+        reference: what the textbook model predicts of the same modes, which tells their states
+            apart and has the tested modes of modified ones.
+    """
+    highest: dict[str | None, float] = {}
+    for block in reference.values():
+        for mode in block.modes:
+            known = highest.get(mode.modification, 0.0)
+            highest[mode.modification] = max(known, mode.measured_hz)
+    given = [mode.measured_hz for mode in _modes(reference, "used")]
+    top = max(given, default=0.0)
+    parts: dict[str, list[float]] = {"used": [], "higher": [], "above": [], "band": []}
+    false: set[tuple[str | None, float]] = set()
+    shapes = []
+    for name in ("used", "higher", "modified"):
+        for mode in _modes(blocks, name):
+            where = name if name != "modified" else "above" if mode.measured_hz > top else "band"
+            state = highest.get(mode.modification, mode.measured_hz)
+            found = _find_partners(mode, rule, rule.above * state)
+            parts[where].append(_mean_error(mode, found, rule.cap))
+            false |= {(mode.modification, c.hz) for c in found[1:] if c.weight >= rule.visible}
+            if name != "used" and mode.mac is not None:
+                shapes.append(1.0 - mode.mac)
+    unseen = [parts[name] for name in ("higher", "above") if parts[name]]
+    change = _mean(_change_errors(blocks, reference, rule))
+    if not unseen and math.isnan(change):
+        unseen = [parts["used"]]
+    error = _mean([_mean(part) for part in unseen])
+    return ModelErrors(error, change, _mean(parts["band"]), _mean(shapes), len(false))
+
+
+def find_gain(own: ModelErrors, textbook: ModelErrors, rule: Rule) -> CaseGain:
+    """Return what a model gains: the part of the textbook model's error that it removes.
+
+    (R - E) / max(R, E, floor), which is minus the part of its own error that it adds where that is
+    the larger one; out of band and of the changes, where the case has both the mean of the two.
+
+    Arguments:
+        own, textbook: their errors on one case.
+    """
+    parts = [
+        (r - e) / max(r, e, rule.floor)
+        for e, r in ((own.error, textbook.error), (own.change, textbook.change))
+    ]
+    shares = (1.0 - rule.change_share, rule.change_share)
+    known = [(part, share) for part, share in zip(parts, shares, strict=True) if part == part]
+    total = sum(share for _, share in known)
+    gain = sum(part * share for part, share in known) / total if total else math.nan
+    return CaseGain(gain, *parts)
+
+
+def _find_partners(mode: PairedMode, rule: Rule, highest: float) -> list[PartnerCandidate]:
+    """Return the partner of a measured mode, then what else of the model may stand for it."""
+    if mode.predicted_hz is None:
+        return []
+    others = (
+        other
+        for other in mode.candidates
+        if other.mac >= rule.mac
+        and other.hz <= highest
+        and abs(math.log(other.hz / mode.measured_hz)) <= rule.window
+    )
+    return [PartnerCandidate(mode.predicted_hz, 1.0, 1.0), *others]
+
+
+def _mean_error(mode: PairedMode, found: list[PartnerCandidate], cap: float) -> float:
+    """Return the weighted mean error of a mode; the cap without a partner of a real frequency."""
+    if not found or found[0].hz <= 0.0:
+        return cap
+    errors = [min(abs(math.log(one.hz / mode.measured_hz)), cap) for one in found]
+    return float(np.average(errors, weights=[one.weight for one in found]))
+
+
+def _change_errors(
+    blocks: Mapping[str, Block], reference: Mapping[str, Block], rule: Rule
+) -> list[float]:
+    """Return the error of every change of a mode that was found before and after."""
+    tested = {mode.number: mode for name in ("used", "higher") for mode in _modes(blocks, name)}
+    own = {(mode.modification, mode.number): mode for mode in _modes(blocks, "modified")}
+    found = []
+    for known in _modes(reference, "modified"):
+        link = known.before
+        if link is None or link.mac < rule.same_mac or link.number not in tested:
+            continue
+        before, after = tested[link.number], own.get((known.modification, known.number))
+        error = rule.change_cap
+        if after is not None and (before.predicted_hz or 0.0) > 0.0 < (after.predicted_hz or 0.0):
+            predicted = math.log((after.predicted_hz or 1.0) / (before.predicted_hz or 1.0))
+            change = predicted - math.log(after.measured_hz / before.measured_hz)
+            error = min(abs(change), rule.change_cap)
+        found.append(error)
+    return found
+
+
+def _modes(blocks: Mapping[str, Block], name: str) -> tuple[PairedMode, ...]:
+    return blocks[name].modes if name in blocks else ()
+
+
+def _mean(values: list[float]) -> float:
+    return float(np.mean(values)) if values else math.nan

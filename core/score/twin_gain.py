@@ -1,0 +1,119 @@
+"""Is a strategy as good on twins of the cases as on the cases? Who is not may know them by heart.
+
+A twin is another structure under other names. From the data of a similar one, which are those of
+the case times known factors, a strategy that reckons makes the same errors, up to the random
+numbers it draws; on one with a geometry of its own, errors of about the same size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from femubench.core.schema.results import JobResult, Run, origins_of
+from femubench.core.score.leaderboard import GainTable
+from femubench.core.score.ranking import Scale
+from femubench.core.score.statistics import weigh_evidence
+
+# How much more it gains on cases than on twins: on half of the structures, with a small p; and, as
+# multiples of what is left of the error, on every twin of a case, where there is nothing to test.
+CLEAR, KNOWN = 0.1, 2.0
+# The latter on twins of a geometry of their own, where the errors of an honest strategy vary: of 72
+# pairs of twins where a strategy was good on the case the worst had 3.0 and 3.4.
+KNOWN_APART = 5.0
+_ALIKE = ["similar"]  # kinds of twins on which errors are the same
+_LEVEL = 0.01  # of p, that a search by chance is not marked where it was lucky
+_GOOD = 0.5  # of the error is left on a case at most, where somebody knows it
+_FEWEST_TWINS = 2  # of a single case
+_STOPPED = frozenset({"timeout", "crashed"})  # what they say is of the machine
+
+
+@dataclass(frozen=True)
+class TwinGain:
+    """What the twins say of a strategy.
+
+    Arguments:
+        gain: on the twins, mean over structures.
+        original_gain: the same on the cases that have twins.
+        p: that they differ by chance, corrected for all strategies; None with few structures.
+        worse: whether it is shown to gain less on the twins, by 0.1 at least on half of them.
+        known: cases on which it leaves less than half of the error, and on each of the twins more
+            than twice as much; five times as much on those of a geometry of their own.
+    """
+
+    gain: float
+    original_gain: float
+    p: float | None
+    worse: bool
+    known: tuple[str, ...]
+
+    @property
+    def suspicious(self) -> bool:
+        """Tell whether the strategy is clearly better on cases than on their twins."""
+        return self.worse or bool(self.known)
+
+
+def twin_gains(run: Run) -> dict[str, TwinGain]:
+    """Return what the twins say of every strategy; nothing of a run without twins.
+
+    Raises:
+        InputError: when the run keeps too little to be scored.
+
+    Examples:
+        >>> results.twin_gains(run)
+        {}
+    """
+    origins = origins_of(run.meta, "of")
+    if not origins:
+        return {}
+    ran = [r for r in run.companions if r.case in origins and r.status not in _STOPPED]
+    twins = GainTable.of(run, ran, run.nominals[0], origins)
+    first = [r for r in run.ranked if r.status not in _STOPPED]
+    own = GainTable.of(run, first, run.nominals[0], {case: case for case in origins.values()})
+    names = [n for n in own.names if np.isfinite(twins.gains(n)).any()]
+    pairs = {name: (own.gains(name), twins.gains(name)) for name in names}
+    there = {name: np.isfinite(before - after) for name, (before, after) in pairs.items()}
+    pairs = {n: (a[there[n]], b[there[n]]) for n, (a, b) in pairs.items() if there[n].any()}
+    lost = {name: before - after for name, (before, after) in pairs.items()}
+    kinds = run.meta["twins"].get("kinds") or {}
+    known = {name: _known(run, name, ran, kinds) for name in pairs}
+    return {
+        item.strategy: TwinGain(
+            gain=float(pairs[item.strategy][1].mean()),
+            original_gain=float(pairs[item.strategy][0].mean()),
+            p=item.p,
+            worse=item.p is not None
+            and item.p < _LEVEL
+            and float(np.median(lost[item.strategy])) > CLEAR,
+            known=known[item.strategy],
+        )
+        for item in weigh_evidence(lost)
+    }
+
+
+def _known(
+    run: Run, strategy: str, ran: Sequence[JobResult], kinds: Mapping[str, Sequence[str]]
+) -> tuple[str, ...]:
+    """Return the cases on which a strategy is good, and on each of their twins much worse.
+
+    Arguments:
+        ran: results on twins.
+        kinds: of the twins; similar ones where not stated.
+    """
+    scale, origins = Scale.of(run.meta), origins_of(run.meta, "of")
+    left: dict[str, list[float]] = {}
+    for result in (*run.ranked, *ran):
+        if result.strategy == strategy and result.case in scale.textbook:
+            gain = scale.gain(result.case, scale.errors(result)).gain
+            left.setdefault(result.case, []).append(1.0 - gain)
+    found = []
+    for case in dict.fromkeys(origins.values()):
+        own = float(np.mean(left.get(case, [1.0])))
+        twins = {name: left[name] for name, of in origins.items() if of == case and name in left}
+        most = {n: KNOWN if list(kinds.get(n, _ALIKE)) == _ALIKE else KNOWN_APART for n in twins}
+        far = (float(np.mean(there)) > own * most[name] for name, there in twins.items())
+        if len(twins) >= _FEWEST_TWINS and own < _GOOD and all(far):
+            found.append(case)
+    return tuple(found)
