@@ -267,6 +267,10 @@ def list_rows(run: Run) -> list[dict[str, Any]]:
 
     Raises:
         InputError: when the run keeps too little to be scored.
+
+    Examples:
+        >>> [round(row["gain"], 2) for row in results.list_rows(run)]
+        [0.6, -0.67]
     """
     standings = Standings.of(run)
     if not standings.own.cases:

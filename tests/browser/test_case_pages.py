@@ -84,7 +84,7 @@ def test_frequencies_are_those_of_the_json(
             )
         for block in blocks:
             for mode in result[block]["modes"] if result[block] else ():
-                key = f"{block}|{mode['modification'] or ''}|{mode['mode']}"
+                key = f"{block}|{mode.get('modification') or ''}|{mode['mode']}"
                 text, ours = found.pop(key), mode["predicted_hz"]
                 measured = float(own["measured"][key])
                 assert measured == pytest.approx(mode["measured_hz"], abs=0.0501)
@@ -273,8 +273,7 @@ def test_supports_and_rotations_are_drawn_as_what_they_are(
     assert "At the drive sensor turn" not in page.locator("main").inner_text()
     page.goto(path.resolve().as_uri() + "#board")
     # One structure, however many its blocks and draws: nothing is claimed.
-    assert set(page.locator("#board-table td.letters").all_inner_texts()) == {"–"}
-    assert "Ranks are not tested" in page.locator("#board").inner_text()
+    assert "No difference between any two lines" in page.locator("#board").inner_text()
     found.assert_quiet(path)
 
 
