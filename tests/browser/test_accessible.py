@@ -53,11 +53,11 @@ def unfolded(page: Any) -> None:
         ("board", "light"),
         ("diagnosis", "dark"),
         ("compared", "light"),
-        # A change of the whole matrix; the next one is element by element.
-        ("hframe", "dark"),
         *(
             pytest.param(name, scheme, marks=pytest.mark.nightly)
             for name, scheme in (
+                # A change of the whole matrix, and one element by element.
+                ("hframe", "dark"),
                 ("frame", "light"),
                 ("board", "dark"),
                 ("diagnosis", "light"),

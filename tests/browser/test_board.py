@@ -263,7 +263,7 @@ def test_case_by_case_has_every_figure_beside_the_baseline(page: Page, real: Any
     assert order == sorted(order, reverse=True)
 
 
-@pytest.mark.parametrize("size", [(1440, 900), (390, 844)])
+@pytest.mark.parametrize("size", [(390, 844), pytest.param((1440, 900), marks=pytest.mark.nightly)])
 def test_names_and_the_baseline_stay_in_view(
     view: Callable[..., Any], tmp_path: Path, size: tuple[int, int]
 ) -> None:
