@@ -298,7 +298,8 @@ def gain(families: Mapping[str, TruthFamily]) -> dict[str, TwinGain]:
 
 def test_who_knows_ratios_by_heart_is_marked_by_stretched_twins_alone() -> None:
     similar, stretched_too = gain({"similar": FAMILIES["similar"]}), gain(FAMILIES)
-    assert similar["ratios"].original_gain > 0.5
+    # It knows the frequencies and not how a change moves them.
+    assert similar["ratios"].original_gain > 0.4
     assert similar["ratios"].gain == pytest.approx(similar["ratios"].original_gain, abs=1e-3)
     assert not similar["ratios"].suspicious
     assert stretched_too["ratios"].known == ("suite/stiffened-strip",)

@@ -140,7 +140,7 @@ def test_a_regression_fails_with_one_line_and_keeps_the_file(repository: Reposit
     assert code == 1
     (line,) = [line for line in stated.splitlines() if "worse than the baseline" in line]
     assert re.fullmatch(
-        r"bench: fitted is worse than the baseline: unseen, as a ratio: \S+, allowed 1.01", line
+        r"bench: fitted is worse than the baseline: loss of gain: \S+, allowed 0.01", line
     )
     assert "not accepted: worse.json" in stated.splitlines()
     assert summary.startswith("# Submission: not accepted\n- fitted is worse than the baseline")
