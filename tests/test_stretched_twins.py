@@ -296,13 +296,13 @@ def gain(families: Mapping[str, TruthFamily]) -> dict[str, TwinGain]:
     return twin_gains(run_jobs([case], able, jobs=1, starts=starts))
 
 
-def test_who_knows_ratios_by_heart_is_marked_by_stretched_twins_alone() -> None:
+def test_who_knows_ratios_by_heart_gains_nothing_on_stretched_twins() -> None:
     similar, stretched_too = gain({"similar": FAMILIES["similar"]}), gain(FAMILIES)
     # It knows the frequencies and not how a change moves them.
     assert similar["ratios"].original_gain > 0.4
     assert similar["ratios"].gain == pytest.approx(similar["ratios"].original_gain, abs=1e-3)
     assert not similar["ratios"].suspicious
-    assert stretched_too["ratios"].known == ("suite/stiffened-strip",)
+    assert stretched_too["ratios"].gain < 0.1 * stretched_too["ratios"].original_gain
     assert not stretched_too["unchanged"].suspicious
 
 

@@ -103,17 +103,23 @@ def _known(
         kinds: of the twins; similar ones where not stated.
     """
     scale, origins = Scale.of(run.meta), origins_of(run.meta, "of")
-    left: dict[str, list[float]] = {}
+    # Frequencies and changes apart: who knows one of the two by heart need not know the other.
+    left: dict[tuple[str, str], list[float]] = {}
     for result in (*run.ranked, *ran):
         if result.strategy == strategy and result.case in scale.textbook:
-            gain = scale.gain(result.case, scale.errors(result)).gain
-            left.setdefault(result.case, []).append(1.0 - gain)
-    found = []
-    for case in dict.fromkeys(origins.values()):
-        own = float(np.mean(left.get(case, [1.0])))
-        twins = {name: left[name] for name, of in origins.items() if of == case and name in left}
-        most = {n: KNOWN if list(kinds.get(n, _ALIKE)) == _ALIKE else KNOWN_APART for n in twins}
-        far = (float(np.mean(there)) > own * most[name] for name, there in twins.items())
-        if len(twins) >= _FEWEST_TWINS and own < _GOOD and all(far):
-            found.append(case)
-    return tuple(found)
+            own, given = scale.errors(result), scale.textbook[result.case]
+            for part in ("error", "change"):
+                e, r = (max(getattr(errors, part), scale.rule.floor) for errors in (own, given))
+                left.setdefault((result.case, part), []).append(e / r)
+    known: dict[str, None] = {}
+    for case, part in list(left):
+        twins = [name for name, of in origins.items() if of == case and (name, part) in left]
+        here = float(np.mean(left[case, part]))
+        far = (
+            float(np.mean(left[name, part]))
+            > here * (KNOWN if list(kinds.get(name, _ALIKE)) == _ALIKE else KNOWN_APART)
+            for name in twins
+        )
+        if len(twins) >= _FEWEST_TWINS and here < _GOOD and all(far):
+            known[case] = None
+    return tuple(known)
