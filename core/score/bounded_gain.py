@@ -21,7 +21,8 @@ from femubench.core.schema.paired_modes import ModeBefore, PairedMode, PartnerCa
 from femubench.core.schema.results import Block
 from femubench.core.typing import FloatArray
 
-LEAST_KEPT_MAC = 0.3  # of what a run keeps, so that rules with other limits can be tried on it
+# What a run keeps of candidates, so that rules with other limits can be tried on it.
+LEAST_KEPT_MAC, WIDEST_KEPT = 0.3, math.log(2.0)
 
 
 @dataclass(frozen=True)
@@ -169,7 +170,7 @@ def find_candidates(
     likeness = mac(measurement.shapes, readings)
     with np.errstate(divide="ignore", invalid="ignore"):
         apart = np.abs(np.log(frequencies[None, :] / measurement.frequencies[:, None]))
-    kept = (likeness >= LEAST_KEPT_MAC) & (apart <= math.log(2.0)) & ~taken
+    kept = (likeness >= LEAST_KEPT_MAC) & (apart <= WIDEST_KEPT) & ~taken
     found = []
     for i, partner in enumerate(pairing.index):
         shaped = partner >= 0 and np.isfinite(pairing.mac[i])
