@@ -7,7 +7,9 @@ ARGS ?=
 KERNELS ?= SkylakeX Haswell Nehalem Sandybridge Zen
 
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip --disable-pip-version-check
+# uv, where it is there, installs the same packages in a fifth of the time.
+INSTALL := $(if $(shell command -v uv),uv pip install --python $(BIN)/python,$(BIN)/python -m pip \
+	--disable-pip-version-check install)
 
 ifeq ($(wildcard femubench/core/__init__.py),)
 $(error femubench/core is no link to the folder core: clone once more with \
@@ -108,13 +110,13 @@ $(BIN)/python:
 
 # Installed by link: a change of a source file needs no other install, one of the dependencies does.
 $(VENV)/.installed: pyproject.toml | $(BIN)/python
-	$(PIP) install --quiet -e .
+	$(INSTALL) --quiet -e .
 	touch $@
 
 $(VENV)/.installed-test: pyproject.toml | $(BIN)/python
-	$(PIP) install --quiet -e '.[test]'
+	$(INSTALL) --quiet -e '.[test]'
 	touch $@ $(VENV)/.installed
 
 $(VENV)/.installed-truths: pyproject.toml | $(BIN)/python
-	$(PIP) install --quiet -e '.[truths]'
+	$(INSTALL) --quiet -e '.[truths]'
 	touch $@ $(VENV)/.installed

@@ -1,24 +1,25 @@
 """How far the board of the suite rests on the numbers of the rule and on single structures.
 
-python benchmarks/board_checks.py    # docs/data/board-rules.csv and board-families.csv; a minute
+python benchmarks/board_checks.py    # board-rules, -families and -means.csv in docs/data; a minute
 
-Both are of the run that docs/figures keeps: nothing is run.
+All are of the run that docs/figures keeps: nothing is run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.stats import trim_mean
 
 import femubench
 from femubench import Run
 from femubench.core.score.leaderboard import GainTable
 from femubench.core.score.statistics import tell_apart
 from femubench.core.typing import FloatArray
-from femubench.results import Rule, leaderboard, structures_of
+from femubench.results import Rule, leaderboard
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data"
@@ -37,32 +38,49 @@ VARIED = {
 TRIALS = 200
 
 
-def ranks_of(run: Run) -> dict[str, int]:
-    """Return the place of every line of a board, yardsticks among them, by gain."""
+# What could stand in place of the mean over structures, of gains by structure and strategy.
+MEANS: dict[str, Callable[[pd.DataFrame], pd.Series]] = {
+    "mean": lambda gains: gains.mean().round(6),
+    "median": lambda gains: gains.median().round(6),
+    "mean without a twentieth at either end": lambda gains: pd.Series(
+        trim_mean(gains, 0.05, axis=0), gains.columns
+    ),
+    "mean place": lambda gains: -gains.rank(axis=1, ascending=False).mean().round(6),
+    "mean in hundredths": lambda gains: gains.mean().round(2),
+}
+
+
+def gains_of(run: Run) -> pd.DataFrame:
+    """Return the gains of what has a rank, by structure and strategy."""
     table = GainTable.of(run, run.ranked, run.nominals[0])
-    gains = pd.Series({name: float(table.gains(name).mean()) for name in table.names})
-    ranks: dict[str, int] = gains.round(6).rank(ascending=False, method="min").to_dict()
-    return ranks
+    ranked = [name for name in table.names if name not in run.meta["yardsticks"]]
+    return pd.DataFrame({name: table.gains(name) for name in ranked}, index=list(table.units))
 
 
-def without(run: Run) -> Iterator[tuple[str, Run]]:
-    """Yield the run without each of its structures."""
-    owners = structures_of(run)
-    for structure in dict.fromkeys(owners.values()):
-        kept = {case for case, owner in owners.items() if owner != structure}
-        models = {case: own for case, own in run.meta["models"].items() if case in kept}
-        meta = {**run.meta, "models": models}
-        yield structure, Run(meta, tuple(r for r in run.results if r.case in kept))
+def places(figures: pd.Series) -> pd.Series:
+    """Return the place of every strategy by a figure of which more is better."""
+    return figures.rank(ascending=False, method="min").astype(int)
+
+
+def ranks_of(run: Run) -> pd.Series:
+    """Return the rank of every strategy on the board of a run."""
+    return places(MEANS["mean"](gains_of(run)))
+
+
+def leave_one_out(gains: pd.DataFrame, mean: str) -> pd.DataFrame:
+    """Return the place of every strategy without each structure, by strategy and structure."""
+    found = {unit: places(MEANS[mean](gains.drop(unit))) for unit in gains.index}
+    return pd.DataFrame(found)
 
 
 def vary(run: Run) -> pd.DataFrame:
-    """Return the place of every line by the rule, without one structure, and by varied rules."""
+    """Return the place of every strategy by the rule, without a structure, and by varied rules."""
     board = leaderboard(run).set_index("strategy")
-    base = ranks_of(run)
-    left = pd.DataFrame({name: ranks_of(part) for name, part in without(run)})
+    gains = gains_of(run)
+    left = leave_one_out(gains, "mean")
     found = {
         "gain": board["gain"].round(4),
-        "place": pd.Series(base),
+        "place": ranks_of(run),
         "one_left_out_best": left.min(axis=1),
         "one_left_out_worst": left.max(axis=1),
     }
@@ -70,8 +88,8 @@ def vary(run: Run) -> pd.DataFrame:
         for value in values:
             rule = Rule().changed([f"{name}={value}"]).to_json()
             varied = Run({**run.meta, "rule": rule}, run.results)
-            found[f"{name}={value:.3g}"] = pd.Series(ranks_of(varied))
-    table = pd.DataFrame(found).loc[board.index]
+            found[f"{name}={value:.3g}"] = ranks_of(varied)
+    table = pd.DataFrame(found).loc[[name for name in board.index if name in gains]]
     whole = [column for column in table if column != "gain"]
     return table.astype(dict.fromkeys(whole, int))
 
@@ -110,12 +128,29 @@ def families(run: Run) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def compare_means(run: Run) -> pd.DataFrame:
+    """Return by kind of mean the first strategy, and how far one structure moves a place."""
+    gains = gains_of(run)
+    usual, rows = ranks_of(run), []
+    for name, mean in MEANS.items():
+        own = places(mean(gains))
+        moves = leave_one_out(gains, name).sub(own, axis=0).abs().max(axis=1)
+        rows.append(
+            {"mean": name, "first": own.idxmin(), "largest_move": moves.max(),
+             "moved_by_more_than_4": int((moves > 4).sum()),
+             "largest_difference": (own - usual).abs().max()}
+        )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
 def main() -> None:
-    """Write both tables."""
+    """Write the tables."""
     run = femubench.read_run(RUN)
-    for name, table in (("board-rules", vary(run)), ("board-families", families(run))):
+    made = {"rules": vary(run), "families": families(run), "means": compare_means(run)}
+    for name, table in made.items():
         print(table.to_string())
-        table.to_csv(DATA / f"{name}.csv", index=name == "board-rules", lineterminator="\n")
+        file = DATA / f"board-{name}.csv"
+        table.to_csv(file, index=name == "rules", lineterminator="\n")
 
 
 if __name__ == "__main__":

@@ -25,6 +25,7 @@ import numpy as np
 from femubench.core.run.recording import Results, begin_run
 from femubench.core.run.store import Store
 from femubench.core.run.upkeep import find_store_faults
+from femubench.core.score.ranking import list_models
 from femubench.results import Block, JobResult, PairedMode, leaderboard
 
 CASES, STRATEGIES = 25, 20
@@ -43,6 +44,7 @@ class Slot(NamedTuple):
 def meta_of(seeds: int) -> dict[str, Any]:
     """Return the meta data of a run that nobody made."""
     cases = [f"case-{n:02d}" for n in range(CASES)]
+    draw = [3.0, 2.5, 0.0, 0.0, 3.0, -2.0, 4.0, -5.0, 6.0]
     return {
         "run": RUN,
         "seed": 0,
@@ -50,7 +52,8 @@ def meta_of(seeds: int) -> dict[str, Any]:
         "plan": "plan",
         "cases": {name: {"title": name, "digest": f"{n:064d}"} for n, name in enumerate(cases)},
         "strategies": [f"strategy-{n:02d}" for n in range(STRATEGIES)],
-        "reference": {name: {"used": 3.0, "higher": 2.5} for name in cases},
+        "yardstick": "textbook",
+        "models": list_models({name: {"textbook": _blocks_of(draw, 0)} for name in cases}),
     }
 
 
@@ -63,10 +66,7 @@ def results_of(meta: dict[str, Any]) -> Iterator[JobResult]:
         for seed in meta["seeds"]:
             for strategy in meta["strategies"]:
                 draw = random.lognormal(0.0, 0.5, 48).tolist()
-                blocks = {
-                    "used": _block(draw[0], draw[4:7], 1, strategy),
-                    "higher": _block(draw[1], draw[7:9], 4, strategy),
-                }
+                blocks = _blocks_of(draw, int(strategy[-2:]))
                 steps = [draw[9 + 3 * n : 12 + 3 * n] for n in range(10)]
                 yield JobResult(
                     case,
@@ -92,11 +92,18 @@ def results_of(meta: dict[str, Any]) -> Iterator[JobResult]:
                 )
 
 
-def _block(percent: float, errors: list[float], first: int, strategy: str) -> Block:
-    std = 0.5 if int(strategy[-2:]) % 2 else None
+def _blocks_of(draw: list[float], strategy: int) -> dict[str, Block]:
+    return {
+        "used": _block(draw[0], draw[4:7], 1, strategy),
+        "higher": _block(draw[1], draw[7:9], 4, strategy),
+    }
+
+
+def _block(percent: float, errors: list[float], first: int, strategy: int) -> Block:
+    std = 0.5 if strategy % 2 else None
     modes = (
         PairedMode(
-            first + n, 100.0 * (first + n), 100.0 * (first + n) + e, 1.0 / (1.0 + e), None, std
+            first + n, 100.0 * (first + n), 100.0 * (first + n) + e, 1.0 / (1.0 + abs(e)), None, std
         )
         for n, e in enumerate(errors)
     )
