@@ -30,7 +30,6 @@ from femubench.core.library.cases import read_cases
 from femubench.core.library.rank import textbook_of
 from femubench.core.modal.eigen import DENSE_LIMIT, Modes, modes_of
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.score.bounded_gain import measure_errors
 from femubench.core.score.ranking import Scale
 from femubench.core.score.scoring import reference_of, score_model
 from femubench.core.typing import FloatArray, SparseArray
@@ -206,7 +205,7 @@ class Problem:
         name, scale = self.case.name, self.scale
         own = replace(self.case, model=self.model(MAKERS["textbook"](self.given)))
         blocks = score_model(own, self.model(make(self.given)))
-        return scale.figures(name, measure_errors(blocks, scale.blocks[name], scale.rule))
+        return scale.figures(name, scale.modes[name].errors(blocks))
 
 
 def problems_of(words: Sequence[str]) -> list[Problem]:

@@ -15,12 +15,12 @@ from femubench.core.modal.pairing import Pairing
 from femubench.core.schema.paired_modes import ModeBefore, PartnerCandidate
 from femubench.core.schema.results import Block
 from femubench.core.score.bounded_gain import (
+    MeasuredModes,
     ModelErrors,
     Rule,
     find_candidates,
     find_gain,
     find_tested_modes,
-    measure_errors,
 )
 from femubench.results import PairedMode
 
@@ -47,7 +47,7 @@ TEXTBOOK = blocks(
 
 
 def test_two_modes_by_hand() -> None:
-    found = measure_errors(TEXTBOOK, TEXTBOOK, RULE)
+    found = MeasuredModes.of(TEXTBOOK, RULE).errors(TEXTBOOK)
     assert found.error == pytest.approx((math.log(1.1) + math.log(200 / 190)) / 2, rel=1e-12)
     assert found.band == pytest.approx(math.log(95 / 90), rel=1e-12)
     changes = (math.log(95 / 104 / (90 / 100)), math.log(200 / 220 / (190 / 200)))
@@ -61,7 +61,7 @@ def test_two_modes_by_hand() -> None:
             mode(2, 190.0, 199.5, modification="mass"),
         ),
     )
-    own = measure_errors(better, TEXTBOOK, RULE)
+    own = MeasuredModes.of(TEXTBOOK, RULE).errors(better)
     assert own.error == pytest.approx(math.log(1.05), rel=1e-12)
     assert own.change == pytest.approx(0.0, abs=1e-12)
     gain = find_gain(own, found, RULE)
@@ -92,7 +92,7 @@ def test_a_gain_is_bounded_and_does_not_jump_where_errors_are_small(
 def test_a_false_mode_next_to_a_partner_takes_part_by_what_sensors_see_of_it() -> None:
     def error(*others: PartnerCandidate) -> tuple[float, int]:
         own = {**TEXTBOOK, "higher": Block(0.0, None, (mode(2, 200.0, 200.0, candidates=others),))}
-        found = measure_errors(own, TEXTBOOK, RULE)
+        found = MeasuredModes.of(TEXTBOOK, RULE).errors(own)
         return 2 * found.error - math.log(200 / 190), found.false_modes
 
     assert error() == (pytest.approx(0.0, abs=1e-12), 0)
@@ -110,7 +110,7 @@ def test_a_false_mode_next_to_a_partner_takes_part_by_what_sensors_see_of_it() -
 @pytest.mark.parametrize("predicted", [None, -150.0, 100.0])
 def test_no_prediction_costs_more_than_a_lost_mode(predicted: float | None) -> None:
     own = {**TEXTBOOK, "higher": Block(0.0, None, (mode(2, 200.0, predicted),))}
-    found = measure_errors(own, TEXTBOOK, RULE)
+    found = MeasuredModes.of(TEXTBOOK, RULE).errors(own)
     assert 2 * found.error - math.log(200 / 190) == pytest.approx(math.log(1.4))
     assert found.change == pytest.approx((abs(math.log(95 / 104 / 0.9)) + RULE.change_cap) / 2)
 
@@ -122,17 +122,17 @@ def test_a_shift_of_all_frequencies_changes_no_change() -> None:
         return Block(0.0, None, tuple(modes))
 
     own = {name: shifted(block) for name, block in TEXTBOOK.items()}
-    changes = [measure_errors(one, TEXTBOOK, RULE).change for one in (own, TEXTBOOK)]
+    changes = [MeasuredModes.of(TEXTBOOK, RULE).errors(one).change for one in (own, TEXTBOOK)]
     assert changes[0] == pytest.approx(changes[1], rel=1e-12)
 
 
 def test_what_a_case_lacks_does_not_count() -> None:
     alone = {name: TEXTBOOK[name] for name in ("used", "higher")}
-    found = measure_errors(alone, alone, RULE)
+    found = MeasuredModes.of(alone, RULE).errors(alone)
     assert found.error == pytest.approx(math.log(1.1))
     assert math.isnan(found.change)
     given = {"used": TEXTBOOK["used"]}
-    assert measure_errors(given, given, RULE).error == pytest.approx(math.log(1.04))
+    assert MeasuredModes.of(given, RULE).errors(given).error == pytest.approx(math.log(1.04))
 
 
 def test_weights_are_heights_of_peaks_in_a_filtered_response() -> None:

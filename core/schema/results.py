@@ -6,6 +6,8 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
+from operator import methodcaller
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict, get_args
 
 from femubench.core.display import Shown, count_noun
@@ -113,7 +115,7 @@ class JobResult:
             _set(self, "traceback", self.traceback[-LONGEST_TEXT:])
         if self.parameters:
             _set(self, "parameters", tuple(map(_with_values, self.parameters)))
-        if any(None in row.values() for row in self.history):
+        if None in chain.from_iterable(map(methodcaller("values"), self.history)):
             _set(self, "history", tuple(map(_with_nan, self.history)))
         if None in self.diagnostics.values():
             _set(self, "diagnostics", _with_nan(self.diagnostics))

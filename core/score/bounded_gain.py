@@ -7,7 +7,7 @@ version stand in every run, and the version names the numbers that are not its o
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, ClassVar
 
@@ -208,41 +208,92 @@ def find_tested_modes(tested: Measurement, modified: Measurement) -> list[ModeBe
     ]
 
 
-def measure_errors(
-    blocks: Mapping[str, Block], reference: Mapping[str, Block], rule: Rule
-) -> ModelErrors:
-    """Return the errors of a model on a case.
+@dataclass(frozen=True)
+class MeasuredModes:
+    """The measured modes of a case, as the errors of models on it rest on them.
 
     Arguments:
-        blocks: what it predicts.
-        reference: what the textbook model predicts of the same modes, which tells their states
-            apart and has the tested modes of modified ones.
+        rule: of the boards.
+        top: highest given frequency, Hz.
+        limits: up to which frequency a mode may be a candidate, Hz, by modification.
+        tested: from a modified mode, its modification and number, to the number of the tested one
+            of its shape.
     """
-    highest: dict[str | None, float] = {}
-    for block in reference.values():
-        for mode in block.modes:
-            known = highest.get(mode.modification, 0.0)
-            highest[mode.modification] = max(known, mode.measured_hz)
-    given = [mode.measured_hz for mode in _modes(reference, "used")]
-    top = max(given, default=0.0)
-    parts: dict[str, list[float]] = {"used": [], "higher": [], "above": [], "band": []}
-    false: set[tuple[str | None, float]] = set()
-    shapes = []
-    for name in ("used", "higher", "modified"):
-        for mode in _modes(blocks, name):
-            where = name if name != "modified" else "above" if mode.measured_hz > top else "band"
-            state = highest.get(mode.modification, mode.measured_hz)
-            found = _find_partners(mode, rule, rule.above * state)
-            parts[where].append(_mean_error(mode, found, rule.cap))
-            false |= {(mode.modification, c.hz) for c in found[1:] if c.weight >= rule.visible}
-            if name != "used" and mode.mac is not None:
-                shapes.append(1.0 - mode.mac)
-    unseen = [parts[name] for name in ("higher", "above") if parts[name]]
-    change = _mean(_change_errors(blocks, reference, rule))
-    if not unseen and math.isnan(change):
-        unseen = [parts["used"]]
-    error = _mean([_mean(part) for part in unseen])
-    return ModelErrors(error, change, _mean(parts["band"]), _mean(shapes), len(false))
+
+    rule: Rule
+    top: float
+    limits: Mapping[str | None, float]
+    tested: Mapping[tuple[str | None, int], int]
+
+    @classmethod
+    def of(cls, textbook: Mapping[str, Block], rule: Rule) -> MeasuredModes:
+        """Return the modes of a case from what its textbook model predicts of them."""
+        limits: dict[str | None, float] = {}
+        for mode in (mode for block in textbook.values() for mode in block.modes):
+            known = limits.get(mode.modification, 0.0)
+            limits[mode.modification] = max(known, rule.above * mode.measured_hz)
+        tested = {
+            (mode.modification, mode.number): mode.before.number
+            for mode in _modes(textbook, "modified")
+            if mode.before is not None and mode.before.mac >= rule.same_mac
+        }
+        top = max((mode.measured_hz for mode in _modes(textbook, "used")), default=0.0)
+        return cls(rule, top, limits, tested)
+
+    def errors(self, blocks: Mapping[str, Block]) -> ModelErrors:
+        """Return the errors of a model on the case.
+
+        Arguments:
+            blocks: what it predicts.
+        """
+        rule = self.rule
+        parts: dict[str, list[float]] = {"used": [], "higher": [], "above": [], "band": []}
+        false: set[tuple[str | None, float]] = set()
+        shapes = []
+        for name in ("used", "higher", "modified"):
+            for mode in _modes(blocks, name):
+                in_band = mode.measured_hz <= self.top
+                where = name if name != "modified" else "band" if in_band else "above"
+                others = self._others(mode) if mode.candidates else []
+                parts[where].append(_mean_error(mode, others, rule.cap))
+                false |= {(mode.modification, c.hz) for c in others if c.weight >= rule.visible}
+                if name != "used" and mode.mac is not None:
+                    shapes.append(1.0 - mode.mac)
+        unseen = [parts[name] for name in ("higher", "above") if parts[name]]
+        change = _mean(self._change_errors(blocks))
+        if not unseen and math.isnan(change):
+            unseen = [parts["used"]]
+        error = _mean([_mean(part) for part in unseen])
+        return ModelErrors(error, change, _mean(parts["band"]), _mean(shapes), len(false))
+
+    def _others(self, mode: PairedMode) -> list[PartnerCandidate]:
+        """Return what else of the model than its partner may stand for a measured mode."""
+        rule = self.rule
+        highest = self.limits.get(mode.modification, rule.above * mode.measured_hz)
+        return [
+            other
+            for other in mode.candidates
+            if mode.predicted_hz is not None
+            and other.mac >= rule.mac
+            and other.hz <= highest
+            and abs(math.log(other.hz / mode.measured_hz)) <= rule.window
+        ]
+
+    def _change_errors(self, blocks: Mapping[str, Block]) -> list[float]:
+        """Return the error of every change of a mode that was found before and after."""
+        known = {m.number: m for name in ("used", "higher") for m in _modes(blocks, name)}
+        own = {(m.modification, m.number): m for m in _modes(blocks, "modified")}
+        cap, found = self.rule.change_cap, []
+        for mode, number in self.tested.items():
+            if number not in known:
+                continue
+            before, after, error = known[number], own.get(mode), cap
+            hz = before.predicted_hz or 0.0, (after and after.predicted_hz) or 0.0
+            if after is not None and min(hz) > 0.0:
+                measured = math.log(after.measured_hz / before.measured_hz)
+                error = min(abs(math.log(hz[1] / hz[0]) - measured), cap)
+            found.append(error)
+        return found
 
 
 def find_gain(own: ModelErrors, textbook: ModelErrors, rule: Rule) -> CaseGain:
@@ -265,48 +316,16 @@ def find_gain(own: ModelErrors, textbook: ModelErrors, rule: Rule) -> CaseGain:
     return CaseGain(gain, *parts)
 
 
-def _find_partners(mode: PairedMode, rule: Rule, highest: float) -> list[PartnerCandidate]:
-    """Return the partner of a measured mode, then what else of the model may stand for it."""
-    if mode.predicted_hz is None:
-        return []
-    others = (
-        other
-        for other in mode.candidates
-        if other.mac >= rule.mac
-        and other.hz <= highest
-        and abs(math.log(other.hz / mode.measured_hz)) <= rule.window
-    )
-    return [PartnerCandidate(mode.predicted_hz, 1.0, 1.0), *others]
-
-
-def _mean_error(mode: PairedMode, found: list[PartnerCandidate], cap: float) -> float:
+def _mean_error(mode: PairedMode, others: Sequence[PartnerCandidate], cap: float) -> float:
     """Return the weighted mean error of a mode; the cap without a partner of a real frequency."""
-    if not found or found[0].hz <= 0.0:
+    if mode.predicted_hz is None or mode.predicted_hz <= 0.0:
         return cap
     # numpy takes ten times as long for the few that there are, and a board has 1e5 modes.
-    errors = (one.weight * min(abs(math.log(one.hz / mode.measured_hz)), cap) for one in found)
-    return sum(errors) / sum(one.weight for one in found)
-
-
-def _change_errors(
-    blocks: Mapping[str, Block], reference: Mapping[str, Block], rule: Rule
-) -> list[float]:
-    """Return the error of every change of a mode that was found before and after."""
-    tested = {mode.number: mode for name in ("used", "higher") for mode in _modes(blocks, name)}
-    own = {(mode.modification, mode.number): mode for mode in _modes(blocks, "modified")}
-    found = []
-    for known in _modes(reference, "modified"):
-        link = known.before
-        if link is None or link.mac < rule.same_mac or link.number not in tested:
-            continue
-        before, after = tested[link.number], own.get((known.modification, known.number))
-        error = rule.change_cap
-        if after is not None and (before.predicted_hz or 0.0) > 0.0 < (after.predicted_hz or 0.0):
-            predicted = math.log((after.predicted_hz or 1.0) / (before.predicted_hz or 1.0))
-            change = predicted - math.log(after.measured_hz / before.measured_hz)
-            error = min(abs(change), rule.change_cap)
-        found.append(error)
-    return found
+    total, weights = min(abs(math.log(mode.predicted_hz / mode.measured_hz)), cap), 1.0
+    for one in others:
+        total += one.weight * min(abs(math.log(one.hz / mode.measured_hz)), cap)
+        weights += one.weight
+    return total / weights
 
 
 def _modes(blocks: Mapping[str, Block], name: str) -> tuple[PairedMode, ...]:

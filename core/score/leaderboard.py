@@ -120,7 +120,7 @@ class GainTable:
         values = {
             name: np.array(
                 [
-                    np.mean(found.get((name, case, seed), [given[case]]), axis=0)
+                    _mean_of(found.get((name, case, seed)) or [given[case]])
                     for case in held
                     for seed in order
                 ]
@@ -194,6 +194,11 @@ class Standings:
                 counted[name] = min((values, other), key=lambda item: _mean_gain(own, item))
         gains = {n: own.by_structure(v)[:, :, 0].mean(axis=1) for n, v in counted.items()}
         return cls(own, counted, tell_apart(gains))
+
+
+def _mean_of(rows: Sequence[FloatArray]) -> FloatArray:
+    """Return the mean of rows, of which there is nearly always one."""
+    return rows[0] if len(rows) == 1 else np.asarray(np.mean(rows, axis=0))
 
 
 def _mean_gain(table: GainTable, values: FloatArray) -> float:

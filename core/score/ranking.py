@@ -15,10 +15,10 @@ from femubench.core.schema.records import to_plain
 from femubench.core.schema.results import BLOCKS, UNSEEN, Block, JobResult, Nominal, rate
 from femubench.core.score.bounded_gain import (
     CaseGain,
+    MeasuredModes,
     ModelErrors,
     Rule,
     find_gain,
-    measure_errors,
 )
 
 TIE = 1e-6  # gains that differ by less share a rank: rounding differs by 1e-9 or so
@@ -34,12 +34,14 @@ class Scale:
     Arguments:
         rule: of the gains.
         blocks: what the textbook model of every case predicts.
-        textbook: its errors.
+        modes: that were measured of every case.
+        textbook: the errors of its textbook model.
         starts: the errors of the model that strategies were given, by case and nominal model.
     """
 
     rule: Rule
     blocks: Mapping[str, Mapping[str, Block]]
+    modes: Mapping[str, MeasuredModes]
     textbook: Mapping[str, ModelErrors]
     starts: Mapping[tuple[str, Nominal], ModelErrors]
 
@@ -70,13 +72,14 @@ class Scale:
         except KeyError as fault:
             what = f"a case has no {fault.args[0]} model to be measured against"
             raise InputError(what, expected="a run of this version: run it again") from fault
+        modes = {case: MeasuredModes.of(own, rule) for case, own in blocks.items()}
         errors: dict[tuple[str, Nominal], ModelErrors] = {
-            (case, nominal): measure_errors(found, blocks[case], rule)
+            (case, nominal): modes[case].errors(found)
             for case, own in models.items()
             for nominal, found in own.items()
         }
         textbook = {case: errors[case, yardstick or "drawn"] for case in models}
-        return cls(rule, blocks, textbook, errors)
+        return cls(rule, blocks, modes, textbook, errors)
 
     def holds_back(self, case: str) -> bool:
         """Tell whether a case has data that no strategy is given."""
@@ -99,7 +102,7 @@ class Scale:
         start = self.start(result.case, result.nominal)
         if not result.answered:
             return start
-        return measure_errors(result.blocks, self.blocks[result.case], self.rule)
+        return self.modes[result.case].errors(result.blocks)
 
     def figures(self, case: str, errors: ModelErrors) -> dict[str, float]:
         """Return what is averaged over seeds, cases and structures, by the name of its column."""
