@@ -9,6 +9,8 @@ import click
 from click.core import ParameterSource
 
 from femubench.core.cli import options
+from femubench.core.cli.registry import plugins_for
+from femubench.core.schema.run_options import Where
 
 if TYPE_CHECKING:
     from femubench.core.challenge.score import Judgement
@@ -107,6 +109,45 @@ def score(folder: Path, answer: Path, sealed: Path | None, json_file: Path | Non
     for line in _lines(scored.judgement):
         click.echo(line)
     click.echo(f"sealed truth sha256 {scored.commitment}")
+
+
+@challenge.command()
+@click.argument("folder", type=options.PATH)
+@click.argument("cases", nargs=-1, required=True, type=options.PATH, metavar="CASE...")
+def close(folder: Path, cases: tuple[Path, ...]) -> None:
+    """Write CASEs into FOLDER with their unseen data encrypted.
+
+    Strategies run on the open halves; the key is what FEMUBENCH_CLOSED_KEY is in the environment.
+    """
+    from femubench.core.library.challenge import close_cases
+
+    written = close_cases(cases, folder)
+    for path in written:
+        click.echo(f"wrote {path}")
+    click.echo(f"Now: bench submit -s STRATEGY --answers FILE {folder}/*")
+
+
+@challenge.command()
+@click.argument("folder", type=options.PATH)
+@click.argument("answers", nargs=-1, required=True, type=options.PATH, metavar="ANSWERS...")
+@options.of_fields(Where, "jobs")
+@click.option("--json", "json_file", type=options.OUTPUT_PATH, help="Write the run.")
+@click.pass_context
+def judge(
+    ctx: click.Context,
+    folder: Path,
+    answers: tuple[Path, ...],
+    jobs: int | None,
+    json_file: Path | None,
+) -> None:
+    """Rank strategies by the closed halves of FOLDER, from files of `bench submit --answers`."""
+    from femubench.core.library.challenge import judge_closed
+    from femubench.core.library.report import render_report, report, reporter
+
+    run = judge_closed(folder, answers, jobs)
+    if json_file is not None:
+        report(run, json_file, style="json")
+    click.echo(render_report(reporter(plugins_for(ctx), "terminal"), run))
 
 
 def _lines(judgement: Judgement) -> list[str]:

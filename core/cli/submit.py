@@ -30,6 +30,10 @@ if TYPE_CHECKING:
     show_default=True, help="The result file, for bench publish.",
 )  # fmt: skip
 @click.option(
+    "--answers", type=options.OUTPUT, metavar="FILE",
+    help="Write the updated models too, for bench challenge judge.",
+)  # fmt: skip
+@click.option(
     "--baseline", type=options.PATH, metavar="FILE",
     help="The result file of an earlier run; exit with 1 if this one is worse.",
 )  # fmt: skip
@@ -52,6 +56,7 @@ def submit(
     cases: tuple[str, ...],
     strategies: tuple[str, ...],
     output: Path,
+    answers: Path | None,
     baseline: Path | None,
     thresholds: tuple[Threshold, ...],
     summary: Path | None,
@@ -71,8 +76,9 @@ def submit(
     given, where = options.read_given(ctx)
     with progress(quiet=quiet) as advance:
         found = prepared(
-            strategies, cases, {"twins": 2, **given}, where, output=output, baseline=baseline,
-            fail=thresholds, tell=(lambda line: None) if quiet else click.echo, on_advance=advance,
+            strategies, cases, {"twins": 2, **given}, where, output=output, answers=answers,
+            baseline=baseline, fail=thresholds, on_advance=advance,
+            tell=(lambda line: None) if quiet else click.echo,
         )  # fmt: skip
     if summary is not None:
         with summary.open("a", encoding="utf-8") as file:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -14,8 +14,10 @@ import numpy as np
 
 from femubench.core.case.reader import read_case
 from femubench.core.case.writing import write_case
+from femubench.core.challenge import closed_set
 from femubench.core.challenge.answer import Answer, read_answer
 from femubench.core.challenge.draw import Effects, draw_case, registered_effects
+from femubench.core.challenge.handed_in import judge_answers
 from femubench.core.challenge.outcome import judge_by_truth, same_place
 from femubench.core.challenge.posing import HEALTHY, pose
 from femubench.core.challenge.score import Judgement, judge_answer
@@ -26,6 +28,8 @@ from femubench.core.challenge.visibility import delta_chi2
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import InputError
 from femubench.core.library.cases import scenarios_of, usable_plugins
+from femubench.core.library.rank import Run, textbook_of
+from femubench.core.run.executor import count_workers
 
 _SHARES = (0.6, 0.15, 0.125, 0.125)  # of one, none, pair, outside where any may be hidden
 
@@ -227,3 +231,28 @@ def score_challenge(
         raise InputError(what, file=folder, expected="the plugins that the case was drawn with")
     falls = delta_chi2(case, hidden, known)
     return Scored(hidden, falls, judge_answer(hidden, given, falls), commitment)
+
+
+def close_cases(cases: Iterable[str | PathLike[str]], target: str | PathLike[str]) -> list[Path]:
+    """Write cases whose unseen data are encrypted; see `core.challenge.closed_set`."""
+    return closed_set.close_cases([Path(case) for case in cases], Path(target))
+
+
+def judge_closed(
+    folder: str | PathLike[str],
+    answers: Iterable[str | PathLike[str]],
+    jobs: int | None = None,
+) -> Run:
+    """Return the run of strategies that answered on the open halves of a closed set.
+
+    Arguments:
+        folder: of the set, whose key is in the environment.
+        answers: files that `submit` wrote.
+        jobs: judges at a time; one a processor by default.
+
+    Raises:
+        InputError: for a set that does not open, or a file without answers.
+    """
+    with closed_set.opened_cases(Path(folder)) as cases:
+        files = [Path(file) for file in answers]
+        return Run.of(judge_answers(cases, files, textbook_of(cases), count_workers(jobs)))

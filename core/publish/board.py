@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from femubench.core.errors import InputError
@@ -116,7 +117,7 @@ def _choose_scales(submissions: Iterable[Submission]) -> dict[tuple[str, str], S
     for item in submissions:
         own = Scale.of(item.run.meta)
         for name, case in _cases(item).items():
-            alone = Scale(own.rule, own.blocks, own.textbook, {})
+            alone = replace(own, starts={})
             found.setdefault((name, case["digest"]), []).append((item.verified, alone))
     chosen = {}
     for (name, digest), listed in found.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Any, Unpack
@@ -20,12 +20,12 @@ from femubench.core.roles import Strategy
 from femubench.core.run.executor import Executor, open_executor
 from femubench.core.run.provenance import home_of, plan_digest, run_meta
 from femubench.core.run.recording import Progress, Results, begin_run, record_end
-from femubench.core.run.schedule import Workload
+from femubench.core.run.schedule import Answers, Workload
 from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Starts
 from femubench.core.run.stopping import stopping
 from femubench.core.run.store import Store
-from femubench.core.schema.results import Run, origins_of
+from femubench.core.schema.results import JobName, Run, origins_of
 from femubench.core.schema.run_options import (
     RunKeywords,
     RunOptions,
@@ -45,11 +45,13 @@ class Receivers:
         store: keeps them.
         progress: called with (result, jobs done, jobs in all).
         advance: called with how far that is which is not in the store, and how long the rest takes.
+        keep_answer: takes the answer of every job that has a model, as the judge is given it.
     """
 
     store: Store | None = None
     progress: Progress | None = None
     advance: OnAdvance | None = None
+    keep_answer: Callable[[JobName, bytes], None] | None = None
 
 
 @dataclass(frozen=True)
@@ -80,8 +82,17 @@ class Plan:
         """Return the jobs."""
         return Slots(self.starts.of_all(self.cases), self.strategies, self.options.all_seeds)
 
-    def run(self, executor: Executor, receivers: Receivers = Receivers()) -> Run:
-        """Run the jobs, each in a process of its own; see `run_jobs`."""
+    def run(
+        self,
+        executor: Executor,
+        receivers: Receivers = Receivers(),
+        answers: Answers | None = None,
+    ) -> Run:
+        """Run the jobs, each in a process of its own; see `run_jobs`.
+
+        Arguments:
+            answers: of jobs that are not to be run, only judged.
+        """
         cases, strategies, options = self.cases, self.strategies, self.options
         starts, store = self.starts, receivers.store
         _check_names(case=[*cases, *starts.companions.twins], strategy=strategies)
@@ -109,7 +120,8 @@ class Plan:
             ending = stack.enter_context(record_end(store, meta["run"]))
             results = Results(slots, store, meta["run"], receivers.progress, receivers.advance)
             wanted = stack.enter_context(stopping()).until(results.keep(known, executor.workers))
-            workload = Workload(slots, references, limits, results.shelf)
+            keep = receivers.keep_answer
+            workload = Workload(slots, references, limits, results.shelf, answers or {}, keep)
             for one in executor.compute(workload, wanted):
                 results.add(*one)
             others, done = origins_of(meta), results.in_order()

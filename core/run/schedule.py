@@ -7,7 +7,7 @@ import json
 import pickle
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from itertools import islice
 from typing import Any
@@ -21,12 +21,13 @@ from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.judging import Dossier, JudgeAnswer, judge_outcome, run_strategy
 from femubench.core.run.slots import Slot, Start, first_seed
 from femubench.core.run.standing_judge import Judges
-from femubench.core.schema.results import JobResult, Status
+from femubench.core.schema.results import JobName, JobResult, Status
 from femubench.core.schema.validation import read_plain
 from femubench.core.score.scoring import Reference
 
 _Task = tuple[int, bytes]  # place of a job, and its answer once it is there to be judged
 Show = Callable[[Slot, Mapping[str, Any]], None]
+Answers = Mapping[JobName, bytes]
 _LEAST_JUDGING = 300.0  # s
 _MOST_CASES = 100  # that are kept as the judge reads them
 _ATTEMPTS = 3  # to start a process
@@ -41,12 +42,20 @@ class Workload:
         references: what the results of a case are measured against, by its name.
         limits: on a job, by strategy.
         show: takes the exhibit of a job of the first seed, before its result comes.
+        answers: that are there already; these jobs are not run, only judged.
+        keep: takes every answer that has a model.
     """
 
     slots: Sequence[Slot]
     references: Mapping[str, Reference]
     limits: Mapping[str, Limits]
     show: Show | None = None
+    answers: Answers = field(default_factory=dict)
+    keep: Callable[[JobName, bytes], None] | None = None
+
+    def task(self, index: int) -> _Task:
+        """Return a job with its answer, where that is there already."""
+        return index, self.answers.get(self.slots[index].job_name, b"")
 
     @cached_property
     def _first_seed(self) -> int:
@@ -113,7 +122,7 @@ class _Bench:
     def has_work(self, busy: int) -> bool:
         """Tell whether there is something to start while so many run."""
         if not (self.waiting or self.answers):
-            self.waiting.extend((index, b"") for index in islice(self._wanted, 1))
+            self.waiting.extend(map(self._load.task, islice(self._wanted, 1)))
         return bool(self.waiting or self.answers or (self.lonely and not busy))
 
     def start(
@@ -176,6 +185,8 @@ class _Bench:
                 except AnswerError as error:
                     outcome = JobOutcome("failed", str(error), seconds=ending.seconds)
             if outcome.status == "ok":
+                if self._load.keep is not None:
+                    self._load.keep(self._load.slots[index].job_name, ending.answer)
                 self.answers.append((index, ending.answer))
             else:
                 yield index, self._load.make_unjudged(index, outcome)

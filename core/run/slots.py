@@ -16,7 +16,7 @@ from femubench.core.case.case import Case
 from femubench.core.roles import Strategy
 from femubench.core.run.jobs import Job, JobOutcome, one_line, pickle_strategy, seed_words
 from femubench.core.run.provenance import comes_along, job_key, provenance, strategy_version
-from femubench.core.schema.results import Nominal
+from femubench.core.schema.results import JobName, Nominal
 
 _LASTING = 1.0  # s that a look at the source of a strategy is good for
 
@@ -67,6 +67,11 @@ class Slot:
     def nominal(self) -> Nominal:
         """Return which nominal model that is."""
         return self.start.nominal
+
+    @property
+    def job_name(self) -> JobName:
+        """Return what the job is called."""
+        return self.case.name, self.strategy, self.seed, self.nominal
 
     @property
     def job(self) -> Job | JobOutcome:

@@ -32,14 +32,12 @@ from femubench.core.schema.records import check_extent, compact, encode_result
 from femubench.core.schema.results import (
     DONE,
     NOMINALS,
+    JobName,
     JobResult,
-    Nominal,
     Run,
     origins_of,
 )
 from femubench.core.score.ranking import Scale, rate_results
-
-JobName = tuple[str, str, int, Nominal]
 
 _MOST_NOTES, _MOST_JOBS = 3, 5
 _SUFFIX = ".sqlite"

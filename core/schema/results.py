@@ -36,6 +36,7 @@ UNSEEN = ("higher", "modified")  # what no strategy is given
 # The model that a strategy starts from: as an engineer drew it, or with what handbooks give.
 Nominal = Literal["drawn", "textbook"]
 NOMINALS: tuple[Nominal, ...] = get_args(Nominal)
+JobName = tuple[str, str, int, Nominal]  # case, strategy, seed and start
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,137 @@
+"""Answers of strategies as a file, to be judged by who has the data that they were not given."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import numpy as np
+from msgspec import Meta, Struct
+
+from femubench.core.case.case import Case
+from femubench.core.errors import InputError, StrategyFailure
+from femubench.core.files import MIB, check_regular, write_atomically
+from femubench.core.run.executor import LocalProcesses
+from femubench.core.run.runner import Plan
+from femubench.core.run.schedule import Answers
+from femubench.core.run.starts import Starts
+from femubench.core.schema.bounds import Name, Text, Whole
+from femubench.core.schema.results import JobName, Nominal, Run
+from femubench.core.schema.run_options import RunOptions
+
+_LARGEST = 1024 * MIB  # bytes of all answers of a file
+_LIST = "answers.json"
+_MOST = 100_000  # answers
+
+
+@dataclass(frozen=True)
+class Absent:
+    """Stands for a strategy that is not here: what it has not answered has failed.
+
+    Arguments:
+        name, citation, yardstick: of the strategy.
+    """
+
+    name: Name
+    citation: Text
+    yardstick: Text = ""
+
+    def update(self, model: Any, measurement: Any, rng: np.random.Generator) -> Any:  # noqa: ANN401
+        """Raise StrategyFailure."""
+        raise StrategyFailure("no answer was handed in")
+
+
+class _Listed(Struct):
+    """What a file of answers holds: the jobs, each with a member of its number."""
+
+    strategies: Annotated[list[Absent], Meta(max_length=1_000)]
+    seeds: Annotated[list[Whole], Meta(max_length=1_000, min_length=1)]
+    jobs: Annotated[list[tuple[Name, Name, Whole, Nominal]], Meta(max_length=_MOST)]
+
+
+@dataclass
+class AnswerFile:
+    """Takes the answers of a run, and writes them at its end.
+
+    Arguments:
+        file: that is written.
+    """
+
+    file: Path
+    answers: dict[JobName, bytes] = field(default_factory=dict)
+
+    def write(self, run: Run) -> None:
+        """Write the answers of the cases of a run, without those of twins."""
+        jobs = [job for job in self.answers if job[0] in run.meta["cases"]]
+        about = [run.meta.get(key) or {} for key in ("citations", "yardsticks")]
+        strategies = [
+            Absent(name, *(str(known.get(name, "")) for known in about))
+            for name in run.meta["strategies"]
+        ]
+        head = msgspec.json.encode(_Listed(strategies, list(run.meta["seeds"]), jobs))
+        content = io.BytesIO()
+        with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr(_LIST, head)
+            for number, job in enumerate(jobs):
+                archive.writestr(str(number), self.answers[job])
+        write_atomically(self.file, content.getvalue())
+
+
+def read_answers(file: Path) -> tuple[_Listed, Answers]:
+    """Return which jobs a file has answers of, and the answers.
+
+    Raises:
+        InputError: when it is no file of answers, or they are too large.
+    """
+    check_regular(file, _LARGEST)
+    expected = "what `bench submit --answers` writes"
+    try:
+        with zipfile.ZipFile(file) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > _LARGEST:
+                raise InputError("too large", file=file, expected=f"{_LARGEST // MIB} MiB")
+            listed = msgspec.json.decode(archive.read(_LIST), type=_Listed)
+            numbered = enumerate(listed.jobs)
+            return listed, {job: archive.read(str(number)) for number, job in numbered}
+    except (zipfile.BadZipFile, KeyError, msgspec.DecodeError, UnicodeError, OSError) as error:
+        raise InputError(f"no answers: {error}", file=file, expected=expected) from None
+
+
+def judge_answers(
+    cases: Sequence[Case],
+    files: Sequence[Path],
+    textbooks: Mapping[str, Case],
+    jobs: int,
+) -> Run:
+    """Return the run of all strategies in files of answers, judged on cases with all their data.
+
+    Nothing of a strategy runs, and nothing that a file says of errors counts: an answer is a model.
+
+    Arguments:
+        cases: all of a closed set.
+        files: that `bench submit --answers` wrote.
+        textbooks: the cases with their textbook models, by name, which are the start.
+        jobs: judges at a time.
+
+    Raises:
+        InputError: for a file that has none, two files with one strategy, or other seeds.
+    """
+    strategies: dict[str, Absent] = {}
+    answers: dict[JobName, bytes] = {}
+    seeds: set[tuple[int, ...]] = set()
+    for file in files:
+        listed, own = read_answers(file)
+        for one in listed.strategies:
+            if strategies.setdefault(one.name, one) is not one:
+                raise InputError(f"{one.name} is there twice", file=file, expected="once")
+        answers |= own
+        seeds.add(tuple(listed.seeds))
+    if len(seeds) > 1:
+        raise InputError("the files have other seeds than each other", expected="the same seeds")
+    options = RunOptions(seeds=seeds.pop(), nominal="textbook")
+    plan = Plan(cases, list(strategies.values()), options, Starts(textbooks, options.nominal))
+    return plan.run(LocalProcesses(jobs, "off"), answers=answers)
