@@ -45,9 +45,8 @@ def closed(tmp_path_factory: pytest.TempPathFactory) -> Set:
     run("challenge", "close", folder / "set", SUITE / "portal", SUITE / "arch")
     halves = sorted((folder / "set").iterdir())
     words = ("-s", "global", "-s", "shifted", "--twins", "0", "--jobs", "1", "-q")
-    out = ("--answers", folder / "a.zip", "--output", folder / "submission.json")
-    run("submit", *words, *out, *halves, key=None)
-    return Set(folder / "set", folder / "a.zip", run)
+    run("submit", *words, "--output", folder / "mine.json", *halves, key=None)
+    return Set(folder / "set", folder / "mine.answers", run)
 
 
 def test_the_open_half_has_what_a_strategy_is_given_and_nothing_else(closed: Set) -> None:

@@ -79,7 +79,7 @@ def test_one_run_gives_its_leaderboard(data: Data, site: Site) -> None:
     assert "1 new run, 1 run and 3 strategies in all" in answer.output
     board = leaderboard(run_from_json(data)).to_dict("records")
     found = site.index()
-    assert found["schema"] == 3
+    assert found["schema"] == 4
     assert [item["name"] for item in found["strategies"]] == [row["strategy"] for row in board]
     for item, row in zip(found["strategies"], board, strict=True):
         version = item["versions"][0]

@@ -124,7 +124,7 @@ def close(folder: Path, cases: tuple[Path, ...]) -> None:
     written = close_cases(cases, folder)
     for path in written:
         click.echo(f"wrote {path}")
-    click.echo(f"Now: bench submit -s STRATEGY --answers FILE {folder}/*")
+    click.echo(f"Now: bench submit -s STRATEGY -o FILE.json {folder}/*")
 
 
 @challenge.command()
@@ -140,7 +140,7 @@ def judge(
     jobs: int | None,
     json_file: Path | None,
 ) -> None:
-    """Rank strategies by the closed halves of FOLDER, from files of `bench submit --answers`."""
+    """Rank strategies by the closed halves of FOLDER, from the ANSWERS of `bench submit`."""
     from femubench.core.library.challenge import judge_closed
     from femubench.core.library.report import render_report, report, reporter
 

@@ -27,11 +27,8 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @click.option(
     "-o", "--output", type=options.OUTPUT, metavar="FILE", default="submission.json",
-    show_default=True, help="The result file, for bench publish.",
-)  # fmt: skip
-@click.option(
-    "--answers", type=options.OUTPUT, metavar="FILE",
-    help="Write the updated models too, for bench challenge judge.",
+    show_default=True,
+    help="The result file, for bench publish; next to it come the updated models, in .answers.",
 )  # fmt: skip
 @click.option(
     "--baseline", type=options.PATH, metavar="FILE",
@@ -56,7 +53,6 @@ def submit(
     cases: tuple[str, ...],
     strategies: tuple[str, ...],
     output: Path,
-    answers: Path | None,
     baseline: Path | None,
     thresholds: tuple[Threshold, ...],
     summary: Path | None,
@@ -76,7 +72,7 @@ def submit(
     given, where = options.read_given(ctx)
     with progress(quiet=quiet) as advance:
         found = prepared(
-            strategies, cases, {"twins": 2, **given}, where, output=output, answers=answers,
+            strategies, cases, {"twins": 2, **given}, where, output=output,
             baseline=baseline, fail=thresholds, on_advance=advance,
             tell=(lambda line: None) if quiet else click.echo,
         )  # fmt: skip

@@ -17,7 +17,6 @@ from femubench.core.case.writing import write_case
 from femubench.core.challenge import closed_set
 from femubench.core.challenge.answer import Answer, read_answer
 from femubench.core.challenge.draw import Effects, draw_case, registered_effects
-from femubench.core.challenge.handed_in import judge_answers
 from femubench.core.challenge.outcome import judge_by_truth, same_place
 from femubench.core.challenge.posing import HEALTHY, pose
 from femubench.core.challenge.score import Judgement, judge_answer
@@ -30,6 +29,7 @@ from femubench.core.errors import InputError
 from femubench.core.library.cases import scenarios_of, usable_plugins
 from femubench.core.library.rank import Run, textbook_of
 from femubench.core.run.executor import count_workers
+from femubench.core.run.handed_in import judge_answers
 
 _SHARES = (0.6, 0.15, 0.125, 0.125)  # of one, none, pair, outside where any may be hidden
 

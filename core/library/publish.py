@@ -34,7 +34,8 @@ def publish(
 
     Arguments:
         folder: new, empty, or made by this function: then the runs are added to it.
-        runs: files that ``bench run --json`` wrote, here or on another machine, or runs.
+        runs: files that ``bench submit`` or ``bench run --json`` wrote, here or on another machine,
+            or runs; where the answers of a file are next to it, its errors are computed again.
         unverified: whether to take, marked as such, what cannot be verified: runs without sandbox
             or twins, of cases that are not installed here, or with figures that do not agree.
         address: where the site will be found, ``https://...``, for the links of its feeds; None for
@@ -65,7 +66,7 @@ def publish(
 
 
 def refusal_of(file: Path) -> str:
-    """Return why a site would not take a result file as verified; nothing where it would."""
+    """Return why a site would take a result file as unverified alone; nothing where not."""
     try:
         read_submission(file, _check())
     except InputError as fault:
@@ -77,8 +78,8 @@ def _check() -> Verify:
     """Return what checks a run against the cases that are installed here."""
     installed = InstalledCases(usable_plugins())
 
-    def check(run: Run, data: Mapping[str, Any], file: Path) -> None:
-        verify(run, data, installed, file)
+    def check(run: Run, data: Mapping[str, Any], file: Path) -> bool:
+        return verify(run, data, installed, file)
 
     return check
 

@@ -8,7 +8,6 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from femubench.core.challenge.handed_in import AnswerFile
 from femubench.core.display import count_noun
 from femubench.core.errors import InputError
 from femubench.core.files import check_writable
@@ -20,7 +19,9 @@ from femubench.core.library.rank import Run, plan_run, read_run
 from femubench.core.library.report import render_report, rendering, report, reporter
 from femubench.core.pace import OnAdvance
 from femubench.core.run.executor import open_executor
+from femubench.core.run.handed_in import name_answers, write_answers
 from femubench.core.run.runner import Receivers
+from femubench.core.schema.results import JobName
 from femubench.core.schema.run_options import Where
 
 if TYPE_CHECKING:
@@ -54,7 +55,6 @@ def submit(
     where: Where,
     *,
     output: str | PathLike[str],
-    answers: str | PathLike[str] | None = None,
     baseline: str | PathLike[str] | None = None,
     fail: Iterable[str | Threshold] = (),
     tell: Callable[[str], None] = lambda line: None,
@@ -66,8 +66,8 @@ def submit(
         strategies: names.
         cases: names or folders; the default set where there is none.
         given, where: options of the run, and where it is computed, from `split_keywords`.
-        output: the file that `publish` takes.
-        answers: the file that `judge_closed` takes, of cases with a closed half.
+        output: the file that `publish` takes. Next to it comes one with the updated models, of the
+            same name but for ``.answers``.
         baseline: the result file of an earlier run; without one nothing is compared.
         fail: what counts as worse, as in `compare`.
         tell: is given a line at the start of every step.
@@ -79,9 +79,6 @@ def submit(
     names = [str(name) for name in as_list(strategies)]
     file = Path(output)
     check_writable(file)
-    handed = None if answers is None else AnswerFile(Path(answers))
-    if handed is not None:
-        check_writable(handed.file)
     if baseline is not None and not Path(baseline).is_file():
         what = "there is no such file"
         raise InputError(what, file=Path(baseline), expected="a result file")
@@ -94,10 +91,10 @@ def submit(
     tell(f"run {', '.join(names)}")
     plan = plan_run(list(cases), names, usable_plugins(), given)
     with open_executor(where) as executor:
-        keep = None if handed is None else handed.answers.__setitem__
-        run = Run.of(plan.run(executor, Receivers(advance=on_advance, keep_answer=keep)))
-    if handed is not None:
-        handed.write(run)
+        answers: dict[JobName, bytes] = {}
+        receivers = Receivers(advance=on_advance, keep_answer=answers.__setitem__)
+        run = Run.of(plan.run(executor, receivers))
+    write_answers(name_answers(file), run, answers)
     report(run, file, style="json")
     faults += _unanswered(run, names)
     found = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 from femubench.core.errors import InputError
 from femubench.core.publish.agreement import Outcome, findings_of, machine_of
@@ -17,13 +17,14 @@ from femubench.core.publish.places import (
     gain_on,
     on_case,
 )
-from femubench.core.publish.submissions import Submission, slug
+from femubench.core.publish.submissions import Proof, Submission, slug
 from femubench.core.score.ranking import Scale
 from femubench.core.score.repeatability import unsteady
 from femubench.core.score.statistics import structures_of
 from femubench.core.score.twin_gain import twin_gains
 
-INDEX_SCHEMA = 3  # since gains are bounded
+INDEX_SCHEMA = 4  # since runs have a proof
+_PROOFS = get_args(Proof)  # less first
 
 
 class _Version(NamedTuple):
@@ -78,7 +79,7 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
             "versions": dict(item.run.meta["versions"]),
             "results": len(item.run.results),
             "strategies": len({result.strategy for result in item.run.results}),
-            "verified": item.verified,
+            "proof": item.proof,
         }
         for item in submissions
     ]
@@ -110,7 +111,7 @@ def _cases(item: Submission) -> dict[str, dict[str, Any]]:
 def _choose_scales(submissions: Iterable[Submission]) -> dict[tuple[str, str], Scale]:
     """Return what results are measured by, by case and digest of its files.
 
-    Of the runs, verified ones where there are any, the one whose textbook error is the median: no
+    Of the runs, checked ones where there are any, the one whose textbook error is the median: no
     run alone can shift what all are measured by.
     """
     found: dict[tuple[str, str], list[tuple[bool, Scale]]] = {}
@@ -118,10 +119,10 @@ def _choose_scales(submissions: Iterable[Submission]) -> dict[tuple[str, str], S
         own = Scale.of(item.run.meta)
         for name, case in _cases(item).items():
             alone = replace(own, starts={})
-            found.setdefault((name, case["digest"]), []).append((item.verified, alone))
+            found.setdefault((name, case["digest"]), []).append((item.is_checked, alone))
     chosen = {}
     for (name, digest), listed in found.items():
-        sure = [scale for verified, scale in listed if verified] or [scale for _, scale in listed]
+        sure = [scale for checked, scale in listed if checked] or [scale for _, scale in listed]
         order = sorted(sure, key=lambda scale: scale.textbook[name].error)
         chosen[name, digest] = order[(len(order) - 1) // 2]
     return chosen
@@ -182,9 +183,10 @@ def _marks(strategy: str, findings: Iterable[Outcome]) -> list[str]:
     """Return what a reader has to know of a version: who vouches for it, and what is odd."""
     listed = list(findings)
     runs = {run.name: run for item in listed for run in item.runs}.values()
-    marks = []
-    if not all(any(run.verified for run in item.runs) for item in listed):
-        marks.append("unverified")
+    # The best that each result has, and the worst of these.
+    best = (max((run.proof for run in item.runs), key=_PROOFS.index) for item in listed)
+    proof = min(best, key=_PROOFS.index, default="recomputed")
+    marks: list[str] = [] if proof == "recomputed" else [proof]
     twins = [twin_gains(run.run).get(strategy) for run in runs]
     if any(found is not None and found.suspicious for found in twins):
         marks.append("knows the cases?")

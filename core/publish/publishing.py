@@ -10,12 +10,12 @@ import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from femubench.core.errors import InputError, OutputError, harmless
 from femubench.core.files import MIB, read_text, resolve_path
 from femubench.core.publish.board import index_of
-from femubench.core.publish.submissions import SCHEMA, Submission, Verify, read_submission
+from femubench.core.publish.submissions import SCHEMA, Proof, Submission, Verify, read_submission
 from femubench.core.schema.records import parse_json
 
 MARKER = "femubench-site.json"
@@ -98,7 +98,7 @@ def publish(
 
 
 def _submission(file: Path, verify: Verify | None, unverified: bool) -> Submission:
-    """Return a new file, verified or, where that may be, marked as not verified."""
+    """Return a new file, checked or, where that may be, marked as unverified."""
     try:
         return read_submission(file, verify)
     except InputError:
@@ -137,7 +137,7 @@ def _merge_runs(submissions: Iterable[Submission]) -> list[Submission]:
     """Return every run once, whatever order they came in.
 
     A run that another file of the same run holds whole, as one made before it was resumed or was
-    verified, or by a version that kept less of it, is left out.
+    checked, or by a version that kept less of it, is left out.
     """
     unique = {item.name: item for item in submissions}
     listed = sorted(unique.values(), key=lambda item: item.order)
@@ -148,12 +148,14 @@ def _merge_runs(submissions: Iterable[Submission]) -> list[Submission]:
         for item in listed
     }
 
+    order = get_args(Proof).index
+
     def within(item: Submission, other: Submission) -> bool:
         if item.run.meta["run"] != other.run.meta["run"]:
             return False
-        if (parts[item.name], item.verified) == (parts[other.name], other.verified):
+        if (parts[item.name], item.proof) == (parts[other.name], other.proof):
             return (len(item.text), item.name) < (len(other.text), other.name)
-        return parts[item.name] <= parts[other.name] and item.verified <= other.verified
+        return parts[item.name] <= parts[other.name] and order(item.proof) <= order(other.proof)
 
     kept = [item for item in listed if not any(within(item, other) for other in listed)]
     results = sum(len(item.run.results) for item in kept)

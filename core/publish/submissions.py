@@ -39,9 +39,11 @@ _Moment = Annotated[str, Meta(pattern=_MOMENT)]
 _BlockName = Literal["used", "higher", "modified"]
 _Digest = Annotated[str, Meta(min_length=1, max_length=200)]
 _Line = Annotated[str, Meta(max_length=LONGEST_LINE)]
-# Raises InputError for a run, given with the content of its file, that cannot be verified.
-Verify = Callable[[Run, Mapping[str, Any], Path], None]
-_OF_VERIFIED = ("plan", "sandbox", "twins")  # meta data of those alone
+# Raises InputError for a run, given with the content of its file, that does not stand the checks;
+# tells whether its errors were computed again from its answers.
+Verify = Callable[[Run, Mapping[str, Any], Path], bool]
+Proof = Literal["unverified", "stated", "recomputed"]
+_OF_CHECKED = ("plan", "sandbox", "twins")  # meta data of checked runs alone
 
 
 class _Machine(Struct):
@@ -113,13 +115,19 @@ class Submission:
         run: with gains and ranks computed anew.
         text: the normalised file.
         name: of that file, from the run's id and a hash of the text.
-        verified: whether all that can be checked of it was.
+        proof: ``stated`` where all that can be checked without the answers of its strategies was,
+            ``recomputed`` where their errors were computed again from these.
     """
 
     run: Run
     text: str
     name: str
-    verified: bool = False
+    proof: Proof = "unverified"
+
+    @property
+    def is_checked(self) -> bool:
+        """Tell whether all but the answers was checked."""
+        return self.proof != "unverified"
 
     @property
     def started(self) -> str:
@@ -139,7 +147,7 @@ def read_submission(
 
     Arguments:
         verify: checks what can be checked; None checks the form alone.
-        published: whether the file is one of a site, which says whether it was verified.
+        published: whether the file is one of a site, which says how far it was checked.
 
     Raises:
         InputError: naming file and key of the first thing that is wrong.
@@ -158,22 +166,26 @@ def read_submission(
     for number, result in enumerate(run.results):
         _check(result, meta, file, f"results[{number}]")
         results[result.key] = result
-    verified = published and data.get("verified") is True
+    proof: Proof = "unverified"
+    if published and data.get("proof") == "recomputed":
+        proof = "recomputed"
+    # A site of an earlier version called verified what is stated.
+    elif published and (data.get("proof") == "stated" or data.get("verified") is True):
+        proof = "stated"
     if verify is not None:
-        verify(run, data, file)
-        verified = True
-    if not verified:
-        meta = {name: value for name, value in meta.items() if name not in _OF_VERIFIED}
-    companions = run.companions if verified else ()
+        proof = "recomputed" if verify(run, data, file) else "stated"
+    if proof == "unverified":
+        meta = {name: value for name, value in meta.items() if name not in _OF_CHECKED}
+    companions = run.companions if proof != "unverified" else ()
     # A run as its file says it, so that it is the same when that is read again.
     data = {"schema": SCHEMA, "meta": meta, "results": _records(results.values())}
-    if verified:
-        data |= {"companions": _records(companions), "verified": True}
+    if proof != "unverified":
+        data |= {"companions": _records(companions), "proof": proof}
     text = json.dumps(data, sort_keys=True, allow_nan=False, separators=(",", ":")) + "\n"
     digest = hashlib.sha256(text.encode()).hexdigest()[:12]
     run = run_from_json(json.loads(text), file=file)
     ranked = replace(run, results=rank_results(run.results, run.meta))
-    return Submission(ranked, text, f"{slug(str(meta['run']))}-{digest}.json", verified)
+    return Submission(ranked, text, f"{slug(str(meta['run']))}-{digest}.json", proof)
 
 
 def slug(text: str, longest: int = 40) -> str:

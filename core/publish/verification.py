@@ -1,11 +1,13 @@
 """What of a run can be checked here: cases, twins, measured figures, errors, scores, all jobs.
 
-What a strategy answered cannot be: that takes to run it again. But nothing else in a file is
-believed.
+Where the answers of the strategies come along, their errors are computed again too; else they are
+what the file states. That an answer came out of the strategy it is said to be of, nobody can tell
+without running it.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from itertools import chain
@@ -14,13 +16,15 @@ from typing import Any, NoReturn, Protocol
 
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
+from femubench.core.run.executor import count_workers
+from femubench.core.run.handed_in import judge_answers, name_answers
 from femubench.core.run.provenance import plan_digest
-from femubench.core.schema.results import JobResult, Run
+from femubench.core.schema.results import BLOCKS, JobResult, Run
 from femubench.core.score.bounded_gain import Rule
 from femubench.core.score.leaderboard import list_rows
 from femubench.core.score.ranking import Models, Scale
 from femubench.core.score.scoring import reference_of
-from femubench.core.twin.twins import Twin
+from femubench.core.twin.twins import Twin, again
 
 SANDBOX = "namespaces"  # what a run calls the one that it can have
 _AGAIN = "run it again with this version of femubench"
@@ -71,8 +75,10 @@ class _Known:
         return cls(measured, found.rms_percent, Scale.of_models(models, Rule(), "textbook"))
 
 
-def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) -> None:
-    """Check everything that a run says but the answers of its strategies.
+def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) -> bool:
+    """Check everything that a run says; tell whether its errors were computed again.
+
+    They are where a file with its answers stands next to its own.
 
     Arguments:
         run: as its file says it.
@@ -117,6 +123,42 @@ def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) 
             own = known[origins.get(result.case, result.case)]
             _check_result(result, own, file, f"{key}[{number}]")
     _check_board(run, data.get("leaderboard"), file)
+    answers = name_answers(file)
+    if not answers.exists():
+        return False
+    _recompute(run, (cases | twins), installed, file)
+    return True
+
+
+def _recompute(run: Run, cases: Mapping[str, Case], installed: Installed, file: Path) -> None:
+    """Judge the answers of a run anew, and compare what it says of them."""
+    repeated = [again(cases[name]) for name in run.meta["twins"]["again"].values()]
+    listed = [*cases.values(), *repeated]
+    drawn = {case.name: (case, installed.yardstick(case)) for case in listed}
+    textbooks = {name: own for name, (case, own) in drawn.items() if own is not case}
+    judged = judge_answers(listed, [name_answers(file)], textbooks, count_workers(None), "both")
+    found = {(r.case, r.strategy, r.seed, r.nominal): r for r in judged.results}
+    for key, results in (("results", run.results), ("companions", run.companions)):
+        for number, one in enumerate(results):
+            own = found.get((one.case, one.strategy, one.seed, one.nominal))
+            if one.status == "ok" and (own is None or not _are_alike(one, own)):
+                what = "not the errors of its answer"
+                _refuse(file, what, f"{key}[{number}]", f"those that {name_answers(file)} gives")
+
+
+def _are_alike(one: JobResult, other: JobResult) -> bool:
+    stated, found = _judged_figures(one), _judged_figures(other)
+    return len(stated) == len(found) and all(map(_near, stated, found))
+
+
+def _judged_figures(result: JobResult) -> list[float]:
+    """Return all that a judge finds of an answer and that counts."""
+    modes = [mode for name in BLOCKS if name in result.blocks for mode in result.blocks[name].modes]
+    found: list[float | None] = [result.rigid_modes_lost, result.negative_eigenvalues]
+    for mode in modes:
+        found += [mode.predicted_hz, mode.mac, mode.predicted_std_hz, len(mode.candidates)]
+        found += [x for one in mode.candidates for x in (one.hz, one.weight, one.mac)]
+    return [math.nan if figure is None else float(figure) for figure in found]
 
 
 def _refuse(file: Path, what: str, key: str, expected: str) -> NoReturn:

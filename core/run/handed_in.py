@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,7 +23,7 @@ from femubench.core.run.schedule import Answers
 from femubench.core.run.starts import Starts
 from femubench.core.schema.bounds import Name, Text, Whole
 from femubench.core.schema.results import JobName, Nominal, Run
-from femubench.core.schema.run_options import RunOptions
+from femubench.core.schema.run_options import RunOptions, StartModels
 
 _LARGEST = 1024 * MIB  # bytes of all answers of a file
 _LIST = "answers.json"
@@ -54,32 +55,25 @@ class _Listed(Struct):
     jobs: Annotated[list[tuple[Name, Name, Whole, Nominal]], Meta(max_length=_MOST)]
 
 
-@dataclass
-class AnswerFile:
-    """Takes the answers of a run, and writes them at its end.
+def name_answers(file: Path) -> Path:
+    """Return where the answers of a result file are."""
+    return file.with_suffix(".answers")
 
-    Arguments:
-        file: that is written.
-    """
 
-    file: Path
-    answers: dict[JobName, bytes] = field(default_factory=dict)
-
-    def write(self, run: Run) -> None:
-        """Write the answers of the cases of a run, without those of twins."""
-        jobs = [job for job in self.answers if job[0] in run.meta["cases"]]
-        about = [run.meta.get(key) or {} for key in ("citations", "yardsticks")]
-        strategies = [
-            Absent(name, *(str(known.get(name, "")) for known in about))
-            for name in run.meta["strategies"]
-        ]
-        head = msgspec.json.encode(_Listed(strategies, list(run.meta["seeds"]), jobs))
-        content = io.BytesIO()
-        with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
-            archive.writestr(_LIST, head)
-            for number, job in enumerate(jobs):
-                archive.writestr(str(number), self.answers[job])
-        write_atomically(self.file, content.getvalue())
+def write_answers(file: Path, run: Run, answers: Answers) -> None:
+    """Write the answers of a run."""
+    about = [run.meta.get(key) or {} for key in ("citations", "yardsticks")]
+    strategies = [
+        Absent(name, *(str(known.get(name, "")) for known in about))
+        for name in run.meta["strategies"]
+    ]
+    listed = _Listed(strategies, list(run.meta["seeds"]), list(answers))
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(_LIST, msgspec.json.encode(listed))
+        for number, answer in enumerate(answers.values()):
+            archive.writestr(str(number), answer)
+    write_atomically(file, content.getvalue())
 
 
 def read_answers(file: Path) -> tuple[_Listed, Answers]:
@@ -89,7 +83,7 @@ def read_answers(file: Path) -> tuple[_Listed, Answers]:
         InputError: when it is no file of answers, or they are too large.
     """
     check_regular(file, _LARGEST)
-    expected = "what `bench submit --answers` writes"
+    expected = "the file .answers that `bench submit` writes"
     try:
         with zipfile.ZipFile(file) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > _LARGEST:
@@ -97,7 +91,7 @@ def read_answers(file: Path) -> tuple[_Listed, Answers]:
             listed = msgspec.json.decode(archive.read(_LIST), type=_Listed)
             numbered = enumerate(listed.jobs)
             return listed, {job: archive.read(str(number)) for number, job in numbered}
-    except (zipfile.BadZipFile, KeyError, msgspec.DecodeError, UnicodeError, OSError) as error:
+    except (zipfile.BadZipFile, zlib.error, KeyError, ValueError, OSError) as error:
         raise InputError(f"no answers: {error}", file=file, expected=expected) from None
 
 
@@ -106,16 +100,18 @@ def judge_answers(
     files: Sequence[Path],
     textbooks: Mapping[str, Case],
     jobs: int,
+    nominal: StartModels = "textbook",
 ) -> Run:
     """Return the run of all strategies in files of answers, judged on cases with all their data.
 
     Nothing of a strategy runs, and nothing that a file says of errors counts: an answer is a model.
 
     Arguments:
-        cases: all of a closed set.
-        files: that `bench submit --answers` wrote.
-        textbooks: the cases with their textbook models, by name, which are the start.
+        cases: that count.
+        files: that `bench submit` wrote next to its results.
+        textbooks: the cases with their textbook models, by name.
         jobs: judges at a time.
+        nominal: the models that were started from.
 
     Raises:
         InputError: for a file that has none, two files with one strategy, or other seeds.
@@ -132,6 +128,6 @@ def judge_answers(
         seeds.add(tuple(listed.seeds))
     if len(seeds) > 1:
         raise InputError("the files have other seeds than each other", expected="the same seeds")
-    options = RunOptions(seeds=seeds.pop(), nominal="textbook")
+    options = RunOptions(seeds=seeds.pop(), nominal=nominal)
     plan = Plan(cases, list(strategies.values()), options, Starts(textbooks, options.nominal))
     return plan.run(LocalProcesses(jobs, "off"), answers=answers)
