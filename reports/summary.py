@@ -142,6 +142,8 @@ def lead(run: Run) -> str:
         )
     elif not (run.meta.get("twins") or {}).get("of"):
         stated.append("No twins ran, so that memory of the cases is not excluded.")
+    if run.meta.get("sandbox") == "none":
+        stated.append("Strategies ran without a sandbox and could read what they were not given.")
     rule = Rule.of(run.meta).to_json()["version"]
     return " ".join(stated) + f" Rule {rule}."
 
@@ -180,7 +182,9 @@ def headline(
     # Who never gave a model may share the first rank with who gave back the one that was given.
     best = [row for row in board if row["rank"] == 1 and row["answered"]]
     if not best:
-        return ["No strategy gave a possible model."] if board else []
+        only = all(row["yardstick"] for row in board)
+        said = "Only yardsticks ran." if only else "No strategy gave a possible model."
+        return [said] if board else []
     lines = [row for row in board if row["yardstick"]]
     first, percent = best[0], [f"{models} are {_percent(best[0]['textbook_percent'])} off"]
     line = max(lines, key=lambda row: float(row["gain"]), default=None)
