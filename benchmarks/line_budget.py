@@ -47,7 +47,7 @@ BUDGETS = {
     "core/twin": 1_040,
     "core/update": 4_292,
     "plugins": 9_119,
-    "reports": 3_888,
+    "reports": 3_900,
     "papers": 3_370,
     "scenarios": 760,
     "femubench": 570,
