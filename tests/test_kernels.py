@@ -73,7 +73,7 @@ def test_two_kernels_give_one_answer() -> None:
     assert one["rivals"] == two["rivals"]
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", ["frame-solid", "hframe"])
 def test_the_sensitivity_method_stops_where_it_would_without_rounding(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -88,7 +88,7 @@ def test_the_sensitivity_method_stops_where_it_would_without_rounding(
         return counter.count, result.parameters[0].after
 
     count, value = run()
-    for seed in range(5):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
 
         def rounded(

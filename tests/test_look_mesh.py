@@ -76,10 +76,3 @@ def test_elements_out_of_proportion_are_found(ladder: FrameBuilder) -> None:
     model = Model.of(near)
     (warning,) = texts(look(model, measured(model)), "shorter than its neighbour")
     assert warning.where == "AB/2"
-
-
-def test_no_mesh_bias_of_a_model_that_is_too_large(
-    ladder: FrameBuilder, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("femubench.core.fit.mesh_error.SOLVED_LIMIT", 80)
-    assert mesh_bias(Model.of(ladder()), 5) is None

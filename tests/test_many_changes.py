@@ -166,13 +166,3 @@ def test_matrices_without_a_frame_and_a_frame_on_supports(block: Model) -> None:
             "ij,ij->j", found.shapes, model.attach(*change).mass @ expected.shapes
         )[~expected.rigid]
         np.testing.assert_allclose(np.abs(likeness), 1.0, atol=1e-5)
-
-
-def test_answers_that_fill_the_memory_are_not_sought(
-    block: Model, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    change = [PointMass(Place(joint=block.frame_structure.frame.joints[0].name), 0.1)], []
-    many = many_changes(block, COUNT)
-    assert many.proven(*change, COUNT) is not None
-    monkeypatch.setattr(module, "_MOST_NUMBERS", block.size)
-    assert many.proven(*change, COUNT) is None

@@ -115,13 +115,6 @@ def test_kips_and_inches_become_newtons_and_metres(case: Case) -> None:
     assert case.model.stiffness.toarray()[TURNS[4], MOVES[3]] == pytest.approx(force * KIP)
 
 
-def test_groups_add_up_to_the_stiffness(case: Case) -> None:
-    whole = case.model.stiffness.toarray()
-    assert tuple(case.model.groups) == GROUPS
-    total = sum(part.toarray() for part in case.model.groups.values())
-    np.testing.assert_allclose(total, whole, rtol=0, atol=1e-12 * np.abs(whole).max())
-
-
 def test_modes_pair_by_shape_though_their_order_differs(case: Case) -> None:
     predicted = solve_modes(case.model).natural_frequencies
     used = reference_of(case).blocks["used"].modes

@@ -410,12 +410,6 @@ def test_five_commands_lead_from_a_job_to_a_ranking(tmp_path: Path) -> None:
     assert ranked[:2] == [("1", "berman"), ("=", "unchanged")]
 
 
-@pytest.mark.nightly
-def test_five_commands_rank_all_strategies(tmp_path: Path) -> None:
-    stated = run_documented(fresh_plates(tmp_path))
-    assert re.search(r"^ *1 +diagnosed ", stated, re.MULTILINE)
-
-
 _CASE = """\
 [case]
 name = "bricks"

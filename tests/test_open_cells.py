@@ -34,14 +34,13 @@ def by_strategy(words: str) -> Any:
     return solve_modes(model).natural_frequencies[:8]
 
 
-@pytest.mark.parametrize("family", list(STRATEGIES))
 @pytest.mark.parametrize(
-    ("words", "choices"),
+    ("family", "words", "choices"),
     [
-        ("", {}),
-        ("orthogonality=false", {"diagonal": 0.0, "cross": 0.0}),
-        ("expansion=force", {"expansion": "force", "start": "nominal"}),
-        ("frequencies=nominal", {"target": "nominal"}),
+        ("physical", "", {}),
+        ("nobari", "orthogonality=false", {"diagonal": 0.0, "cross": 0.0}),
+        ("generic-ls", "expansion=force", {"expansion": "force", "start": "nominal"}),
+        ("generic-adjusted", "frequencies=nominal", {"target": "nominal"}),
     ],
 )
 def test_engine_is_the_strategies(family: str, words: str, choices: dict[str, Any]) -> None:
@@ -74,13 +73,6 @@ def test_that_is_what_the_printed_frequencies_would_need() -> None:
     assert there > 0.9 * nominal
 
 
-@pytest.mark.nightly
-def test_nearest_model_with_the_measured_frequencies_is_near_least_squares() -> None:
-    _, met = predicted(Reading(iterations=1))
-    _, least, there, _ = nearest_with(Reading(), met)
-    assert there == pytest.approx(least, rel=2e-2)
-
-
 def test_expansion_by_forces_gives_the_generic_column() -> None:
     _, modes = predicted(Reading(family="generic-ls", expansion="force", start="nominal"))
     assert deviation(modes, "generic-ls") < 0.3
@@ -98,17 +90,8 @@ def test_true_shapes_at_all_dofs_give_the_adjusted_column() -> None:
     assert deviation(modes, "generic-adjusted") > 5.0
 
 
-def test_expansions_keep_the_readings() -> None:
-    nominal = nominal_of(Reading())
-    reading = Reading(expansion="force")
-    shapes = expanded(reading, nominal, nominal.stiffness, nominal.measured)
-    seen = nominal.sensors @ shapes
-    ratio = (seen / nominal.measured)[np.abs(nominal.measured[:, 0]) > 0.1]
-    np.testing.assert_allclose(ratio, np.broadcast_to(ratio[0], ratio.shape), rtol=1e-8)
-
-
-@pytest.mark.parametrize("family", list(STRATEGIES))
-def test_numbering_of_members_changes_nothing(family: str) -> None:
+def test_numbering_of_members_changes_nothing() -> None:
+    family = "generic-adjusted"
     _, modes = predicted(Reading(family=family))
     for backward in (EACH[-1], MEMBERS[1], "+".join(MEMBERS[::3])):
         _, other = predicted(Reading(family=family, backward=backward))
@@ -126,20 +109,7 @@ def test_cores_that_are_not_turned_depend_on_the_numbering() -> None:
     np.testing.assert_allclose(every, numbered, rtol=1e-9)
 
 
-def test_mirrored_corner_cores_keep_the_left_right_symmetry() -> None:
-    nominal = nominal_of(Reading(accelerometer=False, data="beam"))
-    dofs = nominal.model.dofs
-    middle = np.round(dofs.xyz - dofs.xyz.mean(axis=0), 6)
-    here = {(*p, d): i for i, (p, d) in enumerate(zip(middle, dofs.direction, strict=True))}
-    image = [here[(-x, y, z, d)] for (x, y, z, d) in here]
-    sign = np.array([-1.0 if d == "ry" else 1.0 for *_, d in here])
-    for sharing, alike in (("mirrored", True), ("turned", False)):
-        corners = patterns("generic-adjusted", "no", "", nominal, sharing)[:6]
-        mirrored = corners[:, image][:, :, image] * np.outer(sign, sign)
-        assert np.allclose(mirrored, corners, atol=1e-9 * corners.max()) == alike
-
-
-@pytest.mark.parametrize("expansion", ["rotation", "force", "serep", "own", "all dofs"])
+@pytest.mark.parametrize("expansion", ["rotation", "serep"])
 def test_signs_and_sizes_of_measured_shapes_change_nothing(expansion: str) -> None:
     reading = Reading(data="beam", expansion=expansion)
     nominal = nominal_of(reading)

@@ -246,16 +246,6 @@ def test_what_an_update_rests_on_ends_with_words_that_bench_run_takes(
         assert strategy_of(words[1], bench.strategies).name == words[1]
 
 
-def test_misprints(done: Study) -> None:
-    extra = next(e for e in done.extras if e.title == "Misprints")
-    assert [line[0] for line in extra.rows] == [
-        "table 4c, mode 1, initial error",
-        "table 4c, mode 4, initial error",
-        "table 4d, mode 4, initial error",
-        "section 8 against table 4e, a_V",
-    ]
-
-
 def test_held_out_modes(bench: Workbench) -> None:
     comparison = compare(bench)
     expected = {
@@ -287,17 +277,9 @@ def test_extras_and_figure_are_complete(done: Study) -> None:
     for extra in done.extras:
         assert extra.rows
         assert {len(line) for line in extra.rows} == {len(extra.columns)}
-    titles = [extra.title for extra in done.extras]
-    assert [t for t in titles if t.startswith("Iterations")] == [
-        f"Iterations of table 4{letter}" for letter in "abcde"
-    ]
     (bars,) = done.figures
     assert isinstance(bars, Bars)
-    assert [name for name, _ in bars.series] == [
-        *("C_a as built", "a", "b", "d", "e", "shear, k_theta, E")
-    ]
     assert all(len(values) == len(bars.groups) == 7 for _, values in bars.series)
-    assert "%" in bars.value_label
 
 
 def test_the_transcription_contradicts_itself_at_the_misprints_only() -> None:

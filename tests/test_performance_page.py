@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 
 import performance
-import pytest
 
 
 def test_page_has_the_kept_figures() -> None:
@@ -35,9 +34,3 @@ def test_bars_are_met_from_the_right_side() -> None:
     assert (rival["found"], rival["met"]) == ("45", "yes")
     assert (ours["found"], ours["met"]) == ("2", "no")
     assert performance.BARS[3].line(kept)["met"] == ""
-
-
-def test_exponents_are_those_of_powers() -> None:
-    sizes = [10.0, 100.0, 1000.0, 10000.0]
-    found = performance.exponent(sizes, [1.0, 1.0, 3.0 * 1000.0**1.5, 3.0 * 10000.0**1.5])
-    assert found == pytest.approx(1.5)

@@ -154,7 +154,6 @@ def _new_plan(data: Data) -> None:
 
 EDITS: dict[str, tuple[Edit, str]] = {
     "no sandbox": (lambda d: d["meta"].pop("sandbox"), "meta.sandbox: the strategies ran without"),
-    "a sandbox of another name": (lambda d: d["meta"].update(sandbox="none"), "meta.sandbox"),
     "one job without": (
         lambda d: d["companions"][0]["provenance"].update(sandbox="none"),
         "meta.sandbox",
@@ -163,14 +162,8 @@ EDITS: dict[str, tuple[Edit, str]] = {
         lambda d: (d["meta"].pop("twins"), d.pop("companions")),
         "meta.twins: it has no 2 tw",
     ),
-    "no twins in meta": (lambda d: d["meta"].pop("twins"), "meta.twins: it has no 2 tw"),
     "results on twins": (lambda d: _without(d, case="suite/bracket~2"), "results: 2 jobs are"),
-    "one twin": (lambda d: d["meta"]["twins"].update(number=1), "meta.twins: it has no 2 tw"),
     "another seed": (lambda d: d["meta"]["twins"].update(seed=1), "meta.twins: these are not the"),
-    "a twin left out": (
-        lambda d: d["meta"]["twins"]["of"].pop("suite/bracket~2"),
-        "meta.twins: these are not the",
-    ),
     "twins of another kind": (
         lambda d: d["meta"]["twins"]["kinds"].update({"suite/bracket~1": ["stretched"]}),
         "meta.twins.kinds: its twins are of other kinds",
@@ -178,10 +171,6 @@ EDITS: dict[str, tuple[Edit, str]] = {
     "twins of another case": (
         lambda d: d["meta"]["twins"]["of"].update({"suite/bracket~1": "frame"}),
         "meta.twins: they are of other cases",
-    ),
-    "nothing ran twice": (
-        lambda d: (d["meta"]["twins"]["again"].clear(), _without(d, case="suite/bracket~again")),
-        "meta.twins: they are of other cases, or nothing ran twice",
     ),
     "measured figures": (_better, "Hz was not measured"),
     "measured figure of a twin": (_one_mode_of_a_twin, "Hz was not measured"),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import re
 import sys
@@ -20,9 +18,8 @@ from test_page_data import data_in
 
 from femubench.core.cli.main import bench
 from femubench.core.run.record_file import read_records, write_file
-from femubench.reports.csvs import CsvReporter
 from femubench.reports.htmls import HtmlReporter
-from femubench.reports.runs import MarkdownReporter, TerminalReporter
+from femubench.reports.runs import MarkdownReporter
 from femubench.results import Run, Store, results_frame, run_to_json
 
 RUN = synthetic_run(4, 6)
@@ -149,10 +146,6 @@ class TestDamage:
         (drawn / f"case-{digest[:32]}.json").write_text("{", encoding="utf-8")
         assert report("-f", "html").exit_code == 0
 
-    def test_whole_runs_have_no_notes(self) -> None:
-        assert "Note:" not in TerminalReporter().render(RUN)
-        assert "**Note**" not in MarkdownReporter().render(RUN)
-
     def test_notes_of_a_stranger_are_shown_or_left(self) -> None:
         for notes in (5, {"a": 1}, [EVIL, None]):
             run = Run({**RUN.meta, "notes": notes}, RUN.results)
@@ -194,21 +187,6 @@ class TestInjection:
         assert found["cases"][0]["title"] == TITLE
         assert found["results"][0]["reason"] == TITLE
 
-    def test_markdown(self, report: Report, file: Path) -> None:
-        text = report(file, "-f", "md").stdout
-        assert not re.search(r"<(?!br)", text)
-        assert r"&lt;script&gt;alert(1)&lt;/script&gt;" in text
-        assert r"&lt;/table&gt;&lt;/script&gt; \| \`x\` \[l\](javascript:alert(1))" in text
-
-    def test_csv(self, report: Report, file: Path) -> None:
-        text = report(file, "-f", "csv").stdout
-        rows = list(csv.DictReader(io.StringIO(text)))
-        assert rows[0]["strategy"] == EVIL
-        assert rows[0]["reason"] == TITLE
-        assert {row["strategy"] for row in rows} >= {"'=HYPERLINK(1)"}
-        cells = [cell for row in csv.reader(io.StringIO(text)) for cell in row]
-        assert not [cell for cell in cells if cell[:1] in "=+@\t\r" and cell]
-
     def test_run_id(self, report: Report, file: Path) -> None:
         data = json.loads(file.read_text(encoding="utf-8"))
         data["meta"]["run"] = f"../{EVIL}"
@@ -220,27 +198,6 @@ class TestInjection:
 
 
 class TestFormats:
-    def test_html_goes_into_the_store(self, report: Report, folder: Path) -> None:
-        result = report("-f", "html")
-        assert result.stdout == f"html: {folder / RUN_ID}.html\n"
-        assert data_in((folder / f"{RUN_ID}.html").read_text(encoding="utf-8"))["run"] == RUN_ID
-
-    def test_several_with_commas_and_short_names(self, report: Report, tmp_path: Path) -> None:
-        result = report("-f", "html,md", "-f", "csv,md", "-o", tmp_path)
-        suffixes = [line.rpartition(".")[2] for line in result.stdout.splitlines()]
-        assert suffixes == ["html", "md", "csv"]
-
-    def test_a_text_on_the_screen_stays_alone(self, report: Report) -> None:
-        result = report("-f", "html,csv")
-        assert result.stdout == CsvReporter().render(Store(folder_of(result)).load()) + "\n"
-        assert result.stderr.startswith("html: ")
-
-    def test_beside_a_result_file(self, report: Report, tmp_path: Path) -> None:
-        file = tmp_path / "deep" / "r.json"
-        file.parent.mkdir()
-        file.write_text(json.dumps(run_to_json(RUN)), encoding="utf-8")
-        assert report(file, "-f", "html").stdout == f"html: {file.parent / RUN_ID}.html\n"
-
     @pytest.mark.parametrize("shown", [True, False])
     def test_open(
         self, report: Report, folder: Path, monkeypatch: pytest.MonkeyPatch, shown: bool
@@ -278,10 +235,6 @@ class TestFormats:
         assert result.stderr == (
             "bench: format parquet needs pyarrow (expected pip install 'femubench[parquet]')\n"
         )
-
-
-def folder_of(result: Result) -> Path:
-    return Path(result.stderr.removeprefix("html: ").strip()).parent
 
 
 @pytest.mark.slow(5)

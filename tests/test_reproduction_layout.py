@@ -11,9 +11,7 @@ from femubench.reproduction import (
     Choice,
     Convention,
     Equation,
-    PrintedTable,
     as_printed,
-    places_of,
     under,
 )
 
@@ -29,15 +27,6 @@ class TestPrintedTable:
         placed = [place for grid in table.grids for place in grid.places]
         assert sorted(placed) == sorted(own)
         assert table.grids[1].heads == ("", "Kabe")
-
-    def test_no_cells(self) -> None:
-        ((table, own),) = as_printed((PrintedTable("9", "", ()),), ())
-        assert (table.grids, own) == ((), {})
-
-    def test_entries(self) -> None:
-        assert places_of("12.5") == ()
-        assert places_of(("a", "b")) == (("a", "b"),)
-        assert places_of((("a", "b"), ("a", "c"))) == (("a", "b"), ("a", "c"))
 
 
 class TestConvention:

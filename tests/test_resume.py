@@ -83,35 +83,6 @@ def test_a_failure_is_never_taken_for_a_result(tmp_path: Path) -> None:
     assert len([item for item in records(store) if item["record"] == "result"]) == 4
 
 
-def test_a_failure_does_not_hide_a_result(tmp_path: Path) -> None:
-    store = Store(tmp_path)
-    first = some(store)
-    softer = next(item for item in first.results if item.strategy == "softer")
-    # As a run with a shorter time limit would leave it.
-    store.begin({**first.meta, "run": "hasty", "plan": "other"})
-    store.append("hasty", replace(softer, status="timeout", blocks={}))
-    again = some(store, resume=True)
-    assert by_name(again) == by_name(store.load(first.meta["run"]))
-    assert {item.strategy: item.status for item in again.results}["softer"] == "ok"
-    jobs = [
-        (item["run"], item["result"]["strategy"]) for item in records(store) if "result" in item
-    ]
-    assert jobs.count((first.meta["run"], "softer")) == 1
-
-
-def test_a_result_of_another_run_takes_the_place_of_a_failure(tmp_path: Path) -> None:
-    store = Store(tmp_path)
-    first = some(store)
-    failing = next(item for item in first.results if item.strategy == "failing")
-    store.begin({**first.meta, "run": "patient", "plan": "other"})
-    store.append("patient", replace(failing, status="not-applicable"))
-    again = some(store, resume=True)
-    stored = store.load(first.meta["run"])
-    for run in (again, stored):
-        found = {item.strategy: item.status for item in run.results}
-        assert found["failing"] == "not-applicable"
-
-
 def test_a_result_of_a_source_that_changed_has_no_key(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -278,13 +249,6 @@ def test_differences_between_a_run_and_its_repetition_are_told() -> None:
     assert environment_differences(run.meta, other) == [
         f"numpy: {run.meta['versions']['numpy']} then, 1.0 now"
     ]
-
-
-def test_every_result_tells_where_it_comes_from() -> None:
-    (result,) = run_jobs([CASE], [toys.Softer()], seeds=(3,)).results
-    assert result.key
-    assert {"python", "numpy", "scipy", "femubench", "blas", "cpu", "git"} <= set(result.provenance)
-    assert (result.provenance["case"], result.provenance["seed"]) == ("0123", 3)
 
 
 _RUN = """

@@ -211,12 +211,6 @@ class TestBoard:
         assert "No strategy is shown to be better than a line." in said
         assert "better than handbooks on 100 % of the 20 structures" in said
 
-    def test_says_that_nothing_is_shown(self) -> None:
-        gains = {"first": np.full((20, 9), 0.9), "second": np.full((20, 9), 0.1)}
-        text = TerminalReporter().render(run_of(gains, dict.fromkeys(TWENTY, "one")))
-        said = " ".join(text.split())
-        assert "No difference between any two lines of the board is shown." in said
-
 
 class TestGain:
     """The interval of a gain in the leaderboard."""
@@ -231,18 +225,6 @@ class TestGain:
         half = student.ppf(0.975, 19) * own.std(ddof=1) / np.sqrt(20)
         assert row["gain_low"] == pytest.approx(own.mean() - half, abs=0.1 * half)
         assert row["gain_high"] == pytest.approx(own.mean() + half, abs=0.1 * half)
-
-    def test_grows_where_cases_share_structures_and_is_none_of_few(self) -> None:
-        own = np.repeat(np.random.default_rng(2).normal(0.5, 0.1, 10), 2)
-
-        def width(sharing: int) -> float:
-            labels = {case: f"s{c // sharing}" for c, case in enumerate(TWENTY)}
-            (row,) = leaderboard(run_of({"a": own[:, None]}, labels)).to_dict("records")
-            return float(row["gain_high"] - row["gain_low"])
-
-        # Half as many independent ones: wider by the root of two, and a little for Student.
-        assert 1.4 < width(2) / width(1) < 1.7
-        assert np.isnan(width(4))
 
 
 class TestLabels:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import random
 import signal
@@ -25,7 +24,7 @@ from femubench.core.run import record_file
 from femubench.core.run.store import Store
 from femubench.core.run.upkeep import find_store_faults
 from femubench.core.schema.paired_modes import PairedMode
-from femubench.core.schema.records import encode_result, run_from_json
+from femubench.core.schema.records import encode_result
 from femubench.core.schema.results import Block, JobResult, Run
 
 FLIPS = 300
@@ -199,28 +198,6 @@ def test_a_record_goes_into_a_damaged_file(tmp_path: Path) -> None:
             other.unlink()
 
 
-@pytest.mark.parametrize("form", ["jsonl", "csv", "parquet"])
-def test_reports_write_every_result(form: str, tmp_path: Path) -> None:
-    import pandas as pd
-
-    store, out = stored(tmp_path / "s"), tmp_path / "out"
-    words = ["report", RUN, "-f", form, "-o", str(out), "--store", str(store.folder)]
-    done = CliRunner().invoke(bench, words)
-    assert done.exit_code == 0, done.output
-    file = out / f"{RUN}.{form}"
-    if form == "jsonl":
-        first, *records = [json.loads(line) for line in file.read_text().splitlines()]
-        assert (first["record"], first["run"], first["meta"]["seeds"]) == ("run", RUN, [0, 1, 2])
-        results = [item["result"] for item in records]
-        again = run_from_json({"meta": {}, "results": results})
-        assert again.results == store.load().results
-    else:
-        frame = pd.read_csv(file) if form == "csv" else pd.read_parquet(file)
-        assert sorted(frame["seconds"]) == sorted(item.seconds for item in RESULTS)
-    none = call("check", "--store", tmp_path / "none")
-    assert (none.exit_code, "no results" in none.output) == (2, True)
-
-
 def test_a_repair_that_fails_leaves_the_original(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -334,34 +311,3 @@ def test_a_disk_that_fails_is_reported_with_the_next_record(
             thread.join()
     with pytest.raises(InputError, match="cannot be written: disk I/O error"):
         store.append(RUN, RESULTS[1])
-
-
-def test_results_come_back_whole(tmp_path: Path) -> None:
-    result = stored(tmp_path).load().results[0]
-    assert replace(result, rank=9).history == RESULTS[0].history
-    assert result.blocks == RESULTS[0].blocks
-    assert result == replace(RESULTS[0], rank=result.rank)
-
-
-def test_a_report_leaves_out_what_is_damaged(tmp_path: Path) -> None:
-    store = stored(tmp_path)
-    change_data(*store.files, "0.99", "0.98")
-    words = ["report", "-f", "jsonl", "--store", str(store.folder)]
-    done = CliRunner().invoke(bench, words)
-    assert len(done.stdout.splitlines()) == len(RESULTS)
-    assert "sqlite:2: damaged" in done.stderr
-    assert (
-        "1 of 6 jobs are missing and count as the model that was given: corner a seed 0 drawn"
-        in done.stderr
-    )
-
-
-def test_a_comparison_tells_what_is_damaged(tmp_path: Path) -> None:
-    store = stored(tmp_path)
-    stored(tmp_path, "20260102T000000Z-bbbbbb")
-    file = store.file_of(RUN)
-    change_data(file, "0.99", "0.98")
-    words = ["compare", RUN, "20260102T000000Z-bbbbbb", "--store", str(store.folder)]
-    stated = CliRunner().invoke(bench, words)
-    assert stated.exit_code == 0, stated.output
-    assert f"{file.name}:2:damaged" in "".join(stated.output.split())

@@ -51,11 +51,9 @@ def test_a_truth_is_read_as_it_was_written(tmp_path: Path) -> None:
         ('kind = "pair"', 'kind = "other"', "kind: unknown kind 'other'"),
         ('kind = "pair"', 'kind = "defect"', "cause: not what 'defect' has (expected 1 tables"),
         ("seed = 7", "seed = true", "seed: true or false (expected a whole number)"),
-        ("seed = 7", "seed = -7", "seed: out of bounds (expected a whole number >= 0"),
         ("seed = 7", "", "seed: missing"),
         ("held = ", "held = not", "expected valid TOML"),
         ("chi2 = 83.2", "chi2 = nan", "visible.chi2: out of bounds"),
-        ("chi2 = 83.2", "chi2 = -1", "visible.chi2: out of bounds"),
         ("size = 125000.0", 'size = "big"', "cause[0].size: a text (expected"),
         (
             'place = "J5"',

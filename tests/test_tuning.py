@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import pytest
-from ablation import effects_of
 from tuning import tuned
 from unseen import mean_ratio, unseen_logs
 
@@ -58,8 +57,3 @@ def test_a_setting_is_chosen_on_one_half_and_told_on_the_other() -> None:
     assert (found.best, found.default, found.tuned) == ("lucky=true", 1.0, pytest.approx(3.0))
     assert found.best_of_all == ("good=true", pytest.approx(0.5), 1.0)
     assert found.gain == "-"  # two structures give no interval
-
-
-def test_an_effect_is_left_out_where_it_stands() -> None:
-    run = run_of(job("a", "diagnosed", 0.5), job("c", "other", 0.5))
-    assert effects_of(run) == {"density": ["a"], "torsion-constant": ["a"]}

@@ -166,24 +166,3 @@ def test_tutorial_asks_for_what_it_is_about() -> None:
     ):
         assert any(line.startswith(start) for line in lines), start
     assert [step.name for step in steps(text) if isinstance(step, File)]
-
-
-def test_quoted_output_is_compared() -> None:
-    printed = "one  two\nthree 3.14 s\nfour\n"
-    assert missing(("one two", "...", "three ... s"), printed) == ""
-    assert missing(("three ... s", "one two"), printed) == "one two"
-    assert missing(("two three",), printed) == "two three"
-
-
-def test_shell_keeps_its_place_and_tells_what_failed(tmp_path: Path) -> None:
-    (tmp_path / "sub").mkdir()
-    shell = Shell(tmp_path, dict(os.environ))
-    try:
-        assert shell.type("cd sub")[0] == 0
-        assert shell.where() == tmp_path / "sub"
-        assert shell.type("false")[0] == 1
-        assert shell.type("cat")[1].strip() == ""  # has nothing to read, and ends
-        code, printed = shell.type("sh -c 'echo seen >&2; exit 3'")
-        assert (code, printed.strip()) == (3, "seen")
-    finally:
-        shell.close()
