@@ -99,6 +99,7 @@ def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def built(kind: str, source: Path, output: Path, python: Path) -> Path:
     """Build a "wheel" or an "sdist" from a source folder."""
     code = f"import sys; from setuptools import build_meta as b; b.build_{kind}(sys.argv[1])"
+    output.mkdir()
     succeeded(python, "-c", code, output, cwd=source)
     (file,) = output.iterdir()
     return file
@@ -106,19 +107,11 @@ def built(kind: str, source: Path, output: Path, python: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def archives(clone: Path, python: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Return a wheel of the clone, an sdist of it, and a wheel of the sdist."""
+    """Return a wheel of the clone, and the source that it was built of."""
     folder = tmp_path_factory.mktemp("built")
     source = Path(shutil.copytree(clone, folder / "source", symlinks=True))
     (source / "femubench-results").mkdir(exist_ok=True)  # of a run; no package
-    for name in ("wheel", "sdist", "again"):
-        (folder / name).mkdir()
-    wheel = built("wheel", source, folder / "wheel", python)
-    sdist = built("sdist", source, folder / "sdist", python)
-    with tarfile.open(sdist) as archive:
-        assert not [member.name for member in archive if member.issym() or member.islnk()]
-    succeeded(python, "-m", "tarfile", "-e", sdist, folder / "extracted", cwd=folder)
-    (extracted,) = (folder / "extracted").iterdir()
-    return [wheel, sdist, built("wheel", extracted, folder / "again", python)]
+    return [built("wheel", source, folder / "wheel", python), source]
 
 
 def contents(wheel: Path) -> dict[str, bytes]:
@@ -155,8 +148,15 @@ def test_wheel_holds_every_file_once(clone: Path, archives: list[Path]) -> None:
     assert {name: wheel[name] for name in wheel if ".dist-info/" not in name} == expected
 
 
-def test_sdist_builds_the_same_wheel(archives: list[Path]) -> None:
-    wheel, _, again = archives
+@pytest.mark.nightly
+def test_sdist_builds_the_same_wheel(archives: list[Path], python: Path, tmp_path: Path) -> None:
+    wheel, source = archives
+    sdist = built("sdist", source, tmp_path / "sdist", python)
+    with tarfile.open(sdist) as archive:
+        assert not [member.name for member in archive if member.issym() or member.islnk()]
+    succeeded(python, "-m", "tarfile", "-e", sdist, tmp_path / "extracted", cwd=tmp_path)
+    (extracted,) = (tmp_path / "extracted").iterdir()
+    again = built("wheel", extracted, tmp_path / "again", python)
     assert contents(again) == contents(wheel)
 
 
@@ -173,6 +173,7 @@ def test_wheel_works_where_it_is_installed(archives: list[Path], tmp_path: Path)
     assert "frame" in shown
 
 
+@pytest.mark.nightly
 def test_install_by_link_leads_to_the_clone(clone: Path, tmp_path: Path) -> None:
     python = environment(tmp_path / "venv")
     pip = (python, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps")
@@ -205,22 +206,3 @@ def test_without_links_make_says_so(without_links: Path) -> None:
     assert (result.returncode, result.stdout) == (2, "")
     (line,) = result.stderr.splitlines()
     assert NO_LINKS in line
-
-
-def test_make_installs_anew_only_with_other_dependencies(clone: Path, tmp_path: Path) -> None:
-    def steps(target: str) -> str:
-        return succeeded("make", "--dry-run", target, f"VENV={tmp_path}", cwd=clone)
-
-    (tmp_path / "bin").mkdir()
-    (tmp_path / "bin" / "python").touch()
-    assert "install --quiet -e ." in steps("run")
-    for mark in (".installed", ".installed-test"):
-        (tmp_path / mark).touch()
-    now = (tmp_path / ".installed").stat().st_mtime
-    os.utime(clone / "pyproject.toml", (now - 10, now - 10))
-    os.utime(clone / "core" / "errors.py", (now + 10, now + 10))
-    assert "bench run" in steps("run")
-    assert "bin/pytest" in steps("test")
-    assert "-m pip" not in steps("run") + steps("test")
-    os.utime(clone / "pyproject.toml", (now + 10, now + 10))
-    assert "install --quiet -e '.[test]'" in steps("test")

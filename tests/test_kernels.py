@@ -62,17 +62,6 @@ def under(**kernel: str) -> Any:
     return json.loads(answer.stdout)
 
 
-@pytest.mark.nightly
-def test_two_kernels_give_one_answer() -> None:
-    """The processor's own and one that every x86-64 has; where there is no other, the same."""
-    one, two = under(), under(OPENBLAS_CORETYPE="Nehalem")
-    for name in CASES:
-        assert one[name][0] == two[name][0], name
-        np.testing.assert_allclose(one[name][1], two[name][1], rtol=1e-8)
-    assert one["said"] == two["said"]
-    assert one["rivals"] == two["rivals"]
-
-
 @pytest.mark.parametrize("name", ["frame-solid", "hframe"])
 def test_the_sensitivity_method_stops_where_it_would_without_rounding(
     name: str, monkeypatch: pytest.MonkeyPatch
@@ -133,7 +122,7 @@ def test_a_drawn_shape_has_one_sign() -> None:
     np.testing.assert_allclose(*found, atol=1e-9)
 
 
-@pytest.mark.slow(5)
+@pytest.mark.nightly
 def test_mirrored_places_are_said_to_tie() -> None:
     """Frequencies alone cannot tell the front of a table from its back."""
     said = diagnose(draw_case(4005, "C", structure="table", effect="member-mass").case)

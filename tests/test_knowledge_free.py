@@ -53,7 +53,7 @@ def test_pickets_lose_against_their_centre_and_nothing_beats_shifted_by_much() -
     assert max(shares) == shares[1]
 
 
-@pytest.mark.slow(60)
+@pytest.mark.nightly
 def test_what_an_optimiser_finds_on_some_structures_is_no_better_on_others() -> None:
     found = mean_gain(problems(*SOME), search(problems(*OTHERS)))["gain"]
     assert found <= mean_gain(problems(*SOME), MAKERS["shifted"])["gain"] + 0.02

@@ -206,19 +206,6 @@ def test_nothing_hangs_on_a_motion_that_no_link_makes_use_of(what: str) -> None:
     assert not [p for p in BraceSpring().places(Model.of(frame)) if "M" in p]
 
 
-def test_sensors_at_followers_read_the_motion_of_the_body() -> None:
-    model = Model.of(tee("3d"))
-    rigid = rigid_modes_of(model)
-    places = np.array([model.frame_structure.frame.joint(n).xyz for n in "BDE"])
-    sensors = [Sensors(tuple("BDE"), places, (d,) * 3) for d in CLAMP]
-    moved = np.stack([model.observe(s) @ rigid for s in sensors], axis=1)  # place, direction, mode
-    turn = moved[0, 3:]
-    for i in (1, 2):
-        shift = moved[0, :3] + np.cross(turn.T, places[i] - places[0]).T
-        assert moved[i, :3] == pytest.approx(shift, abs=1e-9)
-        assert moved[i, 3:] == pytest.approx(turn, abs=1e-9)
-
-
 def test_sensitivities_are_those_of_differences() -> None:
     frame = tee("3d", masses=(PointMass(Place(joint="D"), 0.5),))
     structure = Structure.build(frame)

@@ -36,7 +36,6 @@ from femubench.core.update.entries import (
     null_space,
     smallest_change,
 )
-from femubench.core.update.low_rank import total_change
 from femubench.core.update.promise import check_used_modes, measure_residuals
 from femubench.core.update.quasi import QuasiModes, quasi_measured_modes
 from femubench.fem import Frame, JointSpring, Place, Support
@@ -380,12 +379,10 @@ def test_kabe_states_by_how_much_a_used_frequency_is_off_where_no_matrix_has_the
     assert "used_frequency_error" not in update(strategy, cases["frame"]).diagnostics
 
 
-HFRAMES = ("hframe", "hframe-solid", "design-change/hframe-solid")
-
-
-@pytest.mark.parametrize("name", HFRAMES)
-def test_kabe_rigid_gives_a_physical_model_of_every_hframe(name: str) -> None:
-    case = read_case(SCENARIOS / name)
+def test_kabe_rigid_gives_a_physical_model_of_the_hframe() -> None:
+    with pytest.raises(InputError, match="cutoff -1 is not positive"):
+        KabeRigid(least_squares_cutoff=-1.0)
+    case = read_case(SCENARIOS / "hframe-solid")
     result = KabeRigid().update(case.model, case.used_measurement(0), np.random.default_rng(0))
     rigid = rigid_modes_of(case.model)
     force = np.abs(result.model.stiffness_times(rigid)).max()
@@ -432,18 +429,6 @@ def test_least_squares_is_the_least_among_what_keeps_the_rigid_modes(
     assert hidden.shape[1] == rank - shown > 0
     assert np.abs(hidden.T @ cut).max() <= 1e-9 * np.linalg.norm(cut)
     assert misfit(cut) > least
-
-
-def test_kabe_leaves_alone_what_a_larger_least_squares_cutoff_hides(
-    cases: dict[str, Case],
-) -> None:
-    case, rng = cases["hframe"], np.random.default_rng(0)
-    results = [KabeRigid(least_squares_cutoff=c).update(*case, rng) for c in (0.1, 0.3, 1.0)]
-    ranks = [result.diagnostics["rank"] for result in results]
-    assert ranks == sorted(ranks, reverse=True)
-    assert len(set(ranks)) == 3
-    with pytest.raises(InputError, match="cutoff -1 is not positive"):
-        KabeRigid(least_squares_cutoff=-1.0)
 
 
 def test_kabe_turns_to_least_squares_where_singular_values_do_not_converge(
@@ -528,17 +513,6 @@ def test_a_shape_that_is_nowhere_in_the_model_is_a_failure(frame_case: Case) -> 
     for strategy in (Baruch, Kabe, KabeRigid):
         with pytest.raises(StrategyFailure, match="no mode of the model matches"):
             update(strategy, (model, odd))
-
-
-def test_low_rank_sums_stay_as_small_as_they_can(frame_case: Case) -> None:
-    change = update(Baruch, frame_case).model.stiffness_change
-    assert change is not None
-    twice = total_change([change, None, change])
-    assert twice is not None
-    assert twice.basis.shape == change.basis.shape
-    scale = np.abs(change.toarray()).max()
-    np.testing.assert_allclose(twice.toarray(), 2 * change.toarray(), atol=1e-12 * scale)
-    assert total_change([None, None]) is None
 
 
 @pytest.mark.parametrize(("strategy", "rank"), [(Baruch, 3), (Berman, 6)])

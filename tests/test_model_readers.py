@@ -399,7 +399,7 @@ def fresh_plates(folder: Path) -> Path:
     return Path(shutil.copytree(PLATES, folder / "plates"))
 
 
-@pytest.mark.slow(20)
+@pytest.mark.nightly
 def test_five_commands_lead_from_a_job_to_a_ranking(tmp_path: Path) -> None:
     stated = run_documented(fresh_plates(tmp_path), last=" -s unchanged -s berman --nominal drawn")
     case = femubench.read_case(tmp_path / "plates" / "case", readers=READERS)

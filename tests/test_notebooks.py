@@ -90,22 +90,3 @@ def test_they_are_kept_as_they_were_typed_and_teach_facts_by_public_names() -> N
         assert text.count("\nassert ") + text.count("\n    assert ") >= 4
         for private in ("femubench.core", "femubench.plugins", "femubench.papers", "seconds"):
             assert private not in text
-
-
-@pytest.mark.nightly
-def test_pyright_finds_nothing(tmp_path: Path) -> None:
-    """It reads no notebooks: their cells are given to it as modules."""
-    for path in NOTEBOOKS:
-        module = tmp_path / f"{path.stem.replace('-', '_')}.py"
-        module.write_text("\n\n".join(code(path)), encoding="utf-8")
-    settings = {
-        "include": ["."],
-        "extraPaths": [str(ROOT)],
-        "typeCheckingMode": "basic",
-        # A last expression is what a cell shows.
-        "reportUnusedExpression": False,
-    }
-    (tmp_path / "pyrightconfig.json").write_text(json.dumps(settings))
-    command = ("-m", "pyright", "--pythonpath", sys.executable, "--project", str(tmp_path))
-    done = subprocess.run([sys.executable, *command], capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout

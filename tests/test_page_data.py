@@ -13,7 +13,6 @@ import pytest
 import scored
 from synthetic_run import synthetic_run
 
-from femubench.core.score.statistics import Differences
 from femubench.papers.printed import read_printed
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.page import data as page
@@ -28,7 +27,6 @@ from femubench.results import (
     PairedMode,
     Rule,
     Run,
-    Standings,
     leaderboard,
     rank_results,
     run_to_json,
@@ -42,10 +40,6 @@ def data_in(html: str) -> dict[str, Any]:
     (text,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', html, re.S)
     found: dict[str, Any] = json.loads(text)
     return found
-
-
-def outcome_of(run: Run) -> Differences:
-    return Standings.of(run).apart
 
 
 class TestNumbers:
@@ -87,21 +81,6 @@ class TestNumbers:
             ]
             assert np.mean(gains) == pytest.approx(row["gain"], abs=1e-12)
 
-    def test_modes_of_the_first_seed(self) -> None:
-        found = data_in(HtmlReporter().render(SMALL))
-        first = {(r.case, r.strategy): r for r in SMALL.results if r.seed == 1}
-        assert found["details"]
-        for key, detail in found["details"].items():
-            c, s = map(int, key.split(":"))
-            result = first[found["cases"][c]["name"], found["strategies"][s]["name"]]
-            modes = [mode for block in result.blocks.values() for mode in block.modes]
-            assert [mode["mode"] for mode in detail["modes"]] == [mode.number for mode in modes]
-            assert [mode["predicted_hz"] for mode in detail["modes"]] == pytest.approx(
-                [mode.predicted_hz for mode in modes], rel=1e-6
-            )
-            assert len(detail["parameters"]) == len(result.parameters)
-            assert len(detail["history"]) == len(result.history)
-
     def test_a_page_keeps_to_its_size(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(page, "MOST_DETAILS", 20_000)
         found = page_data(SMALL)
@@ -135,20 +114,6 @@ class TestNumbers:
         run = Run(SMALL.meta, (replace(result, key="other"),))
         found = data_in(HtmlReporter().render_with(run, Shelf()))
         assert found["details"]["0:0"]["exhibit"] is None
-
-
-class TestStatistics:
-    def test_the_board_names_between_whom_a_difference_is_shown(self) -> None:
-        run = synthetic_run(12, 40)
-        found, rows = outcome_of(run), leaderboard(run).set_index("strategy")
-        assert len(found.pairs) == 12 * 11 / 2
-        for better, worse, p in found.pairs:
-            assert (worse in rows.loc[better, "better_than"]) == (p < 0.05)
-            assert (better in rows.loc[worse, "worse_than"]) == (p < 0.05)
-            assert rows.loc[better, "gain"] >= rows.loc[worse, "gain"] - 1e-12
-        shown = page_data(run)["statistics"]
-        assert len(shown["pairs"]) == len(found.pairs)
-        assert shown["note"] == found.note
 
 
 class TestPapers:

@@ -16,16 +16,12 @@ from femubench.papers.frame.changes import (
     SOLUTIONS,
     recover_change,
 )
-from femubench.papers.frame.finding import finding
 from femubench.papers.frame.receptances import (
     bundles,
 )
-from femubench.papers.printed import read_printed
-from femubench.reproduction import Bars, Workbench
+from femubench.reproduction import Workbench
 from femubench.results import stiffness_difference
 from femubench.scenarios import HERE
-
-TABLE = read_printed("frame")["table1"]
 
 
 @pytest.fixture(scope="module")
@@ -78,20 +74,6 @@ def test_torsion_is_the_largest_cause_of_mode_1_in_both_orders(ladder: Ladder) -
         assert order[TORSION][0] > 2.0 * max(order[c][0] for c in CAUSES if c != TORSION)
     # Flexible joints take over part of what torsion does, so a cause weighs less as the last.
     assert shares.last[JOINTS][0] < shares.mean[JOINTS][0] < shares.first[JOINTS][0]
-
-
-def test_finding_gives_tables_figures_and_sentences(bench: Workbench) -> None:
-    extras, figures, sentences = finding(bench)
-    for extra in extras:
-        assert all(len(row) == len(extra.columns) for row in extra.rows)
-    chain, causes = figures
-    assert isinstance(chain, Bars)
-    assert isinstance(causes, Bars)
-    (first, *_, last) = [np.array(values) for _, values in chain.series]
-    assert first[0] == pytest.approx(TABLE["error_percent"][0], abs=0.05)
-    assert np.abs(last).max() < 2.0
-    assert len(causes.series) == 3
-    assert all(sentence.endswith(".") for sentence in sentences)
 
 
 def test_difference_matrix_is_symmetric_and_in_one_unit(bench: Workbench) -> None:

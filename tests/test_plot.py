@@ -16,7 +16,6 @@ import scored
 from diagnosis_toys import STRUCTURE, data_of
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.quiver import Quiver
 
 from femubench import (
     Case,
@@ -30,7 +29,6 @@ from femubench import (
 )
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import InputError
-from femubench.core.plot.style import place_names
 from femubench.core.schema.diagnosis import LocationRow, ResidualRow
 from femubench.core.schema.results import JobResult
 from femubench.modal import mac
@@ -110,20 +108,6 @@ class TestModeShape:
         ends = np.array(wireframe_of(hframe).elements)
         away = np.linalg.norm(np.array(first) - still[ends], axis=-1).max()
         assert away == pytest.approx(0.12 * np.ptp(still, axis=0).max(), rel=0.05)
-
-    def test_arrows_are_the_measured_shape_on_the_scale_of_the_mode(self, hframe: Case) -> None:
-        """Where the test agrees (MAC 1.00), the tips of the arrows lie on the deformed line."""
-        ax = plot.mode_shape(hframe, 1)
-        (arrows,) = (item for item in ax.collections if isinstance(item, Quiver))
-        data = hframe.measurement
-        modes = solve_modes(hframe.model).elastic
-        predicted = np.asarray(hframe.model.observe(data.sensors) @ modes.shapes[:, 0])
-        along = np.hypot(arrows.U, arrows.V)
-        assert len(along) == np.isfinite(data.shapes[:, 0]).sum()
-        ratio = along / np.abs(predicted)
-        strong = np.abs(predicted) > 0.3 * np.abs(predicted).max()
-        assert np.ptp(ratio[strong]) < 0.1 * ratio[strong].mean()
-        assert "measured mode 1 at 77.13 Hz, MAC 1.000" in ax.get_title()
 
     def test_axes_are_those_given_and_no_figure_is_left_behind(self, hframe: Case) -> None:
         mine = Figure().subplots()
@@ -225,7 +209,7 @@ class TestResiduals:
 class TestEvidence:
     WORDS = ("all", "type:T", "beam@J1", "beam/2", "beam", "J1", "p2", "nowhere", "beam/9")
 
-    @pytest.mark.parametrize("plane", ["in-plane", "out-of-plane", "3d", "matrices"])
+    @pytest.mark.parametrize("plane", ["in-plane", "matrices"])
     def test_places_are_found(self, plane: str) -> None:
         rows = tuple(LocationRow("evidence", word, 0.5) for word in self.WORDS)
         data = {**data_of(locations=rows, causes=()), "structure": {**STRUCTURE, "plane": plane}}
@@ -261,23 +245,18 @@ class TestChanges:
 
 WRONG: list[Callable[[Case], object]] = [
     lambda case: plot.mode_shape(case, 0),
-    lambda case: plot.mode_shape(case, 10_000),
     lambda case: plot.mode_shape(case.measurement),  # type: ignore[arg-type]
     lambda case: plot.mac(case.measurement.shapes, case.model),
     lambda case: plot.mac(np.eye(3), np.eye(4)),
-    lambda case: plot.mac("shapes"),  # type: ignore[arg-type]
     lambda case: plot.receptance(case.model),  # type: ignore[arg-type]
     lambda case: plot.receptance(case, sensor="nowhere"),
-    lambda case: plot.receptance(case, modification="none such"),
     lambda case: plot.convergence(update(history=())),
-    lambda case: plot.convergence(run(), case="other"),
     lambda case: plot.convergence(run(), quantity="other one"),
     lambda case: plot.parameters(update(parameters=())),
     lambda case: plot.parameters(
         update(parameters=(ParameterEstimate("a", 0.0, 1.0, "m"), ParameterEstimate("b", 1.0, 1.0)))
     ),
     lambda case: plot.error_against_cost(run(), error="beauty"),
-    lambda case: plot.error_against_cost(run(results=())),
     lambda case: plot.residuals(case),  # type: ignore[arg-type]
     lambda case: plot.residuals(diagnosis_toys.made(residuals=())),
     lambda case: plot.changes(case, update()),
@@ -290,17 +269,6 @@ def test_what_cannot_be_drawn_says_so_in_a_line(draw: Callable[[Case], object]) 
     with pytest.raises(InputError) as caught:
         draw(harness_toys.tiny_case())
     assert "\n" not in str(caught.value)
-
-
-def test_names_stand_apart_and_hold_nothing_that_cannot_be_shown() -> None:
-    ax = Figure(figsize=(4, 3)).subplots()
-    points = np.array([[0.5, 0.5], [0.505, 0.5], [0.5, 0.505]])
-    place_names(ax, points, ["first", "second", diagnosis_toys.NASTY])
-    ax.get_figure().draw_without_rendering()  # type: ignore[union-attr]
-    boxes = [text.get_window_extent() for text in ax.texts]
-    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[k + 1 :])
-    assert ax.texts[2].get_text().isprintable()
-    assert len(ax.texts[2].get_text()) <= 22
 
 
 class TestWireframe:

@@ -12,10 +12,8 @@ from rich.progress import Progress
 
 from femubench.core.cli.progress import show_progress
 from femubench.core.inference.effort import Effort, Kind
-from femubench.core.library.reproduce import _Updates
 from femubench.core.pace import Advance
 from femubench.core.run.jobs_left import JobsLeft
-from femubench.papers import DONE, PAPERS
 from femubench.results import JobResult
 
 
@@ -122,20 +120,6 @@ class TestEffort:
             assert said[-1].left == 0.0
         assert (said[-1].done, said[-1].total) == (3, 3)
 
-    def test_what_a_stage_does_without_is_not_expected_after_it(self, clock: Clock) -> None:
-        effort, said = self.said(clock)
-        effort.note_adequacy(True)
-        with effort.scope({"advice": 1}):
-            with effort.scope({"single": 10}):
-                self.work(effort, clock, "single", 5.0)
-                assert said[-1].total == 11
-                effort.expect("single", 3)
-                self.work(effort, clock, "single", 5.0)
-                assert said[-1].total == 5
-                assert said[-1].left == pytest.approx(2 * 5.0 + 0.3 * 5.0)
-            self.work(effort, clock, "advice", 1.0)
-        assert (said[-1].done, said[-1].total, said[-1].left) == (3, 3, 0.0)
-
     def test_a_piece_that_is_overdue_takes_no_time_from_others(self, clock: Clock) -> None:
         effort, said = self.said(clock)
         effort.note_adequacy(True)
@@ -158,23 +142,6 @@ class TestEffort:
         clock.now += 1.0
         assert effort.stops()
         assert effort.cut
-
-
-def test_updates_of_the_papers_are_as_long_as_they_were(clock: Clock) -> None:
-    """Every update at a speed that is not known, with what comes between them."""
-    papers, said, speed = tuple(PAPERS), list[Advance](), 7.0
-    updates = _Updates([DONE[paper] for paper in papers], said.append, clock)
-    begin = clock.now
-    starts = {"frame": 0.0, "hframe": DONE["frame"][-1]}
-    whole = sum(row[-1] for row in DONE.values())
-    for paper in papers:
-        for end in DONE[paper][:-1]:
-            clock.now = begin + speed * (starts[paper] + end)
-            updates.step()
-            assert said[-1].left == pytest.approx(speed * (whole - starts[paper] - end))
-    assert (said[-1].done, said[-1].total) == (71, 71)
-    updates.step()  # one that nobody has counted
-    assert (said[-1].done, said[-1].total) == (72, 72)
 
 
 def screen(text: str) -> list[str]:

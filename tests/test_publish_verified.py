@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +12,38 @@ import pytest
 from click.testing import CliRunner, Result
 
 from femubench.core.cli.main import bench
+from femubench.core.library.publish import InstalledCases
 from femubench.core.library.rank import rank
 from femubench.core.library.report import report
+from femubench.core.publish.verification import _Known
 from femubench.core.run.provenance import plan_digest
 
 pytestmark = pytest.mark.slow(10)
 
 Data = dict[str, Any]
 Edit = Callable[[Data], object]
+
+
+def kept(function: Callable[..., Any], key: Callable[..., object]) -> Callable[..., Any]:
+    """Return a function that keeps what it has computed."""
+    found: dict[object, Any] = {}
+
+    def call(*given: Any) -> Any:
+        if key(*given) not in found:
+            found[key(*given)] = function(*given)
+        return found[key(*given)]
+
+    return call
+
+
+@pytest.fixture(scope="module", autouse=True)
+def once() -> Iterator[None]:
+    """Compute but once what this installation says of its cases, the same for every file."""
+    with pytest.MonkeyPatch.context() as patch:
+        digests = lambda _, cases, *rest: (*(case.digest for case in cases), *rest)  # noqa: E731
+        patch.setattr(InstalledCases, "twins", kept(InstalledCases.twins, digests))
+        patch.setattr(_Known, "of", kept(_Known.of, lambda case, _: case.digest))
+        yield
 
 
 @pytest.fixture(scope="module")

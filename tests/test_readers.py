@@ -302,15 +302,6 @@ def test_one_file_for_sensors_and_modes(tmp_path: Path, sensors: str) -> None:
     assert read_case(folder, readers=(UniversalReader(),)).digest != digest
 
 
-def test_nodes_in_another_file(tmp_path: Path) -> None:
-    folder = case_with(tmp_path, 'sensors = "nodes.unv"', "test.uff")
-    write(folder / "nodes.unv", nodes_2411())
-    write(folder / "test.uff", *modes(*SHAPES))
-    measurement = read_case(folder, readers=(UniversalReader(),)).measurement
-    assert measurement.sensors.labels == ("11:x", "12:x", "20:x")
-    np.testing.assert_allclose(measurement.shapes, SHAPES.T)
-
-
 def test_table_of_sensors_picks_from_the_file(tmp_path: Path) -> None:
     folder = case_with(tmp_path, 'sensors = "sensors.csv"', "test.uff")
     (folder / "sensors.csv").write_text("label,at,direction\n20:x,girder@0.5,x\n12:x,left@0.5,x\n")

@@ -155,7 +155,7 @@ def test_the_end_is_sure_where_loss_and_loose_joint_compete() -> None:
     assert "is stiffness lost at the end of floor at C" in found.sentence
 
 
-@pytest.mark.slow(5)
+@pytest.mark.nightly
 def test_a_mass_is_stated_though_its_mirror_place_fits_as_well() -> None:
     region = changed("portal", "added-mass", "E", 0.3).causes[0].region
     assert region is not None

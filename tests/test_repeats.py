@@ -67,7 +67,7 @@ def test_weights_of_strategies_are_those_of_the_covariance_of_what_is_paired() -
 
 def test_noise_draws_have_the_covariance() -> None:
     rng = np.random.default_rng(3)
-    draws = np.array([measured().with_noise(rng).frequencies for _ in range(20_000)])
+    draws = np.array([measured().with_noise(rng).frequencies for _ in range(10_000)])
     np.testing.assert_allclose(np.corrcoef(draws.T), CORRELATION, atol=0.02)
     np.testing.assert_allclose(draws.std(axis=0), STD, rtol=0.02)
 

@@ -17,7 +17,7 @@ from femubench.core.library.report import render_report
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import check_reporter
 from femubench.reports import femubench_reporters
-from femubench.reports.csvs import CsvReporter, ModesCsvReporter
+from femubench.reports.csvs import CsvReporter
 from femubench.reports.jsons import JsonReporter
 from femubench.reports.markdown import escape
 from femubench.reports.runs import MarkdownReporter, TerminalReporter
@@ -198,25 +198,6 @@ class TestTerminal:
 class TestMarkdown:
     TEXT = MarkdownReporter().render(RUN)
 
-    def test_imaginary_and_missing_modes(self) -> None:
-        lost = result("lost", blocks={"used": block(mode(1, 100.0, None), mode(2, 200.0, -102.46))})
-        rows = with_header(MarkdownReporter().render(run_of(lost)), "strategy", "used 1")
-        assert rows[1][1:3] == ["– (no partner)", "102.5 i"]
-
-    def test_blocks_that_differ_between_strategies_keep_the_columns(self) -> None:
-        """`imaginary` has no higher block: its row must not shift."""
-        rows = {r[0]: r for r in with_header(self.TEXT, "strategy", "used 1")}
-        assert rows["imaginary (unphysical)"][3] == "–"
-        assert len(rows["imaginary (unphysical)"]) == len(rows["good"])
-
-    def test_design_changes(self) -> None:
-        rows = with_header(self.TEXT, "strategy", "1", "2")
-        assert "- **1**: beam: mass at 6\n- **2**: beam: spring at 6" in self.TEXT
-        found = {row[0]: [float(cell) for cell in row[1:]] for row in rows}
-        expected = 100.0 * math.sqrt((0.15**2 + 1.0) / 2.0)
-        assert found["worse"] == pytest.approx([expected, 15.0], abs=0.01)
-        assert list(found) == ["worse", "good"]
-
     def test_names_cannot_break_it(self) -> None:
         evil = "a|b <script>*x*</script> [l](u) `c`\n| new"
         failed = replace(FAILED, case=evil, strategy=evil, reason=evil)
@@ -236,22 +217,12 @@ class TestCsv:
         assert float(rows[1]["used_percent"]) == pytest.approx(1.0)
         assert rows[3]["reason"] == FAILED.reason
 
-    def test_modes(self) -> None:
-        rows = list(csv.DictReader(io.StringIO(ModesCsvReporter().render(RUN))))
-        assert len(rows) == 6 + 6 + 2
-        assert float(rows[0]["error_percent"]) == pytest.approx(15.0)
-        assert float(rows[12]["predicted_hz"]) == pytest.approx(-102.46)
-
     @pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r"])
     def test_no_cell_is_a_formula(self, start: str) -> None:
         reason = f'{start}HYPERLINK(1),"x"'
         text = CsvReporter().render(run_of(replace(FAILED, reason=reason, case=reason)))
         (row,) = csv.DictReader(io.StringIO(text, newline=""))
         assert row["reason"] == row["case"] == f"'{reason}"
-
-    def test_negative_numbers_stay_numbers(self) -> None:
-        """A minus sign makes a formula of a text, not of a frequency."""
-        assert ",-102.46," in ModesCsvReporter().render(RUN)
 
 
 class TestJson:
@@ -272,7 +243,7 @@ class TestFinding:
         return finding(run, list_rows(run))
 
     def test_how_far_off_in_percent_and_how_sure_that_is(self) -> None:
-        run = synthetic_run(60, 12, failing=0.0)
+        run = synthetic_run(20, 12, failing=0.0)
         best = leaderboard(run).to_dict("records")[0]
         said = [sentence.replace("\u2212", "-") for sentence in self.stated(run)]
         assert said[0] == (
@@ -289,9 +260,9 @@ class TestFinding:
         assert said[2] == (
             f"Its gain is {best['gain']:.3f} (95 % interval {ends} over {count} structures)."
         )
-        assert 5 < len(best["better_than"]) < 60
+        assert 5 < len(best["better_than"]) < 20
         below = [name for name in best["better_than"] if name != "unchanged"]
-        assert said[3] == f"It is shown to be better than {len(below)} of 58 other strategies."
+        assert said[3] == f"It is shown to be better than {len(below)} of 18 other strategies."
         assert said[4].startswith("Shown to be better than the models that were given: ")
 
     def test_a_yardstick_never_leads_and_stands_between_handbooks_and_the_best(self) -> None:

@@ -16,7 +16,6 @@ from femubench.reports.reproduction import (
 )
 from femubench.reports.reproduction_page import reproduction_html
 from femubench.reports.svg import embed_svg
-from femubench.reproduction import Ground, Page, Study
 
 STUDIES = (toys.study("frame"), toys.study("hframe"))
 DRAWINGS = {figure.name: toys.drawn(figure) for study in STUDIES for figure in study.figures}
@@ -73,20 +72,6 @@ class TestDigits:
         assert digits == Digits(1, 1)
         assert (digits.format(500.0), digits.ours(500.0)) == ("500.0", "500.00")
 
-    def test_powers_of_ten_do_not_lengthen_the_others(self) -> None:
-        digits = Digits.of([0.02, -0.0283, 3.12e-6])
-        assert digits.format(3.12e-6) == "3.12e-6"
-        assert digits.ours(3.1204e-6, printed=3.12e-6) == "3.120e-6"
-        assert digits.format(0.02) == "0.0200"
-        assert digits.ours(-0.02849, printed=-0.0283) == "-0.02849"
-        assert digits.ours(1.5e-7, printed=0.02) == "0.00000"
-        assert digits.ours(4.128e9, printed=0.02) == "4.128e9"
-
-    def test_imaginary_frequency(self) -> None:
-        digits = Digits.of([-1197.6])
-        assert digits.format(-1197.6, "Hz") == "1197.6 i"
-        assert digits.format(-1197.6, "N") == "-1197.6"
-
     @pytest.mark.parametrize("value", [None, float("nan"), float("inf")])
     def test_nothing(self, value: float | None) -> None:
         assert Digits(1, 1).ours(value) == "–"
@@ -104,13 +89,6 @@ class TestScreen:
     def test_a_note_stands_once_a_table(self) -> None:
         text = " ".join(reproduction_text(STUDIES[:1]).split())
         assert text.count(toys.CONVENTION) == text.count(toys.REASON) == 1
-
-    def test_commands_stay_whole(self) -> None:
-        words = "spring:" + ",".join(f"option_{k}={k}" for k in range(20))
-        ground = Ground("under-convention", f"bench run hframe -s '{words}'")
-        page = Page("frame", "1", (ground,), tolerance=1.0)
-        study = Study("frame", "Title", "", (), (page.cell("a", "b", 1.0, 1.001),))
-        assert words in reproduction_text([study])
 
 
 class TestMarkdown:
@@ -144,18 +122,6 @@ class TestHtml:
         assert {a["href"][1:] for a in document.all("a")} <= {
             attributes["id"] for _, attributes in document.elements if "id" in attributes
         }
-
-    def test_conventions_change_cells(self, source: str, document: Document) -> None:
-        radios = [i for i in document.all("input") if i["type"] == "radio"]
-        assert len(radios) == 4
-        assert ["checked" in i for i in radios] == [True, False] * 2
-        assert document.texts("legend") == ["Shear <b>"] * 2
-        assert "(1 of 2 cells agree; judged so)" in document.texts("span")
-        key = radios[1]["id"]
-        others = [b for b in document.all("button") if b.get("interestfor", "").endswith(f"w{key}")]
-        assert [b["data-value"] for b in others] == ["560.0", "911.35"]
-        assert [b["class"] for b in others] == ["cell does-not-follow", "cell under-convention"]
-        assert f"body:has(#{key}:checked) .other.{key} {{" in source
 
     def test_nothing_runs_and_nothing_is_fetched(self, source: str, document: Document) -> None:
         assert not {tag for tag, _ in document.elements} & {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -166,52 +165,3 @@ class TestWrongInput:
         assert (result.exit_code, result.stdout) == (1, "")
         assert result.stderr == "bench: no partner for mode 3\n"
         assert not list(Path().iterdir())
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return what the verb writes on the ladder frame, and what it prints."""
-    folder = tmp_path_factory.mktemp("real") / "out"
-    result = CliRunner().invoke(bench, ["reproduce", "frame", "-o", str(folder)])
-    assert (result.exit_code, result.stderr) == (0, "")
-    (folder / "screen.txt").write_text(result.stdout, encoding="utf-8")
-    return folder
-
-
-# As the first line names them.
-ORDER = (
-    *("independent", "under-convention", "searched", "fitted"),
-    *("input", "cannot-be-checked", "misprint", "does-not-follow"),
-)
-
-
-@pytest.mark.slow(10)
-class TestRealPaper:
-    """The ladder frame in earnest: everything that the study holds comes through."""
-
-    def test_first_line_counts_the_cells(self, folder: Path) -> None:
-        cells = json.loads((folder / "reproduce.json").read_text(encoding="utf-8"))
-        verdicts = [cell["verdict"] for cell in cells]
-        first = (folder / "screen.txt").read_text(encoding="utf-8").splitlines()[0]
-        independent, whole, *others = map(int, re.findall(r"\d+", first))
-        assert (independent, *others) == tuple(verdicts.count(verdict) for verdict in ORDER)
-        assert whole == len(cells)
-        assert first.startswith(f"{verdicts.count('independent')} of {len(cells)} printed cells")
-        assert all(cell["note"] for cell in cells)
-
-    def test_screen_is_80_wide_but_for_commands(self, folder: Path) -> None:
-        _, *lines = (folder / "screen.txt").read_text(encoding="utf-8").splitlines()
-        wide = [line for line in lines if len(line) > 80]
-        assert all(":" in line and " " not in line.strip() for line in wide)
-
-    def test_document_holds_every_figure(self, folder: Path) -> None:
-        source = (folder / "reproduce.html").read_text(encoding="utf-8")
-        drawings = list((folder / "figures").iterdir())
-        assert len(drawings) >= 9
-        assert source.count("<svg") == source.count("</svg>") == len(drawings)
-        ids = re.findall(r'\sid="([^"]+)"', source)
-        assert len(ids) == len(set(ids))
-        assert set(re.findall(r"(?:url\(#|href=\"#)([^)\"]+)", source)) <= set(ids)
-        assert not re.search(r"<script|<link|<img|@import|url\((?!#)|src=", source)
-        for words in re.findall(r'aria-labelledby="([^"]+)"', source):
-            assert set(words.split()) <= set(ids)

@@ -28,7 +28,6 @@ import harness_toys as toys
 from store_edits import change_data, records
 
 TOYS = Path(__file__).parent / "toys"
-FEW_KILLS, MANY_KILLS, JOBS = 4, 50, 104
 CASE = toys.tiny_case()
 
 
@@ -272,13 +271,15 @@ def timed(script: Path) -> float:
 
 
 @pytest.mark.slow(40)
-@pytest.mark.parametrize("kills", [FEW_KILLS, pytest.param(MANY_KILLS, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize(
+    ("kills", "jobs"), [(4, 32), pytest.param(50, 104, marks=pytest.mark.nightly)]
+)
 def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(
-    kills: int, tmp_path: Path
+    kills: int, jobs: int, tmp_path: Path
 ) -> None:
     """SIGKILL of the parent at random moments; the last one is left to finish."""
     draw = random.Random(20)
-    seeds = JOBS // 4
+    seeds = jobs // 4
     stores = {name: Store(tmp_path / name) for name in ("calm", "killed")}
     scripts = {}
     for name, store in stores.items():
@@ -301,7 +302,7 @@ def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(
     assert ended_early < kills
     subprocess.run([sys.executable, str(scripts["killed"])], check=True)
     calm, killed = (stores[name].load() for name in ("calm", "killed"))
-    assert len(calm.results) == JOBS
+    assert len(calm.results) == jobs
     assert stable(killed) == stable(calm)
     assert len(stores["killed"].runs()) == 1
     for name in ("plan", "cases", "reference"):
@@ -311,7 +312,7 @@ def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(
         for item in records(stores["killed"])
         if item["record"] == "result" and item["result"]["status"] == "ok"
     ]
-    assert len(good) == len(set(good)) == JOBS  # no result was computed twice
+    assert len(good) == len(set(good)) == jobs  # no result was computed twice
     names = {path.name for path in stores["killed"].folder.iterdir()}
     assert names == {"exhibits", f"{killed.meta['run']}.sqlite"}
     kept = {key for key in good if stores["killed"].exhibits.of(key) is not None}

@@ -65,18 +65,23 @@ def test_a_strategy_that_inherits_nothing_is_one() -> None:
 
 
 @pytest.mark.slow(5)
-def test_it_is_ranked_and_passes_the_checks(here: Path) -> None:
+def test_it_is_ranked_and_shown(here: Path) -> None:
     words = ["run", "rod", "-s", "duck", "-s", "unchanged", "-q", "--json", "run.json", "-j", "1"]
     assert CliRunner().invoke(bench, words).exit_code == 0
     results = {r["strategy"]: r for r in json.loads((here / "run.json").read_text())["results"]}
     assert results["duck"]["status"] == "ok"
     errors = {name: item["used"]["rms_percent"] for name, item in results.items()}
     assert errors["duck"] < errors["unchanged"]
+    shown = CliRunner().invoke(bench, ["plugins", "show", "duck"]).output
+    assert "nothing but frequencies" in shown
+
+
+@pytest.mark.nightly
+@pytest.mark.usefixtures("here")
+def test_it_passes_the_checks() -> None:
     done = CliRunner().invoke(bench, ["plugins", "check", "duck"])
     assert done.exit_code == 0, done.output
     assert ", 0 failed, 0 warnings" in done.output
-    shown = CliRunner().invoke(bench, ["plugins", "show", "duck"]).output
-    assert "nothing but frequencies" in shown
 
 
 def test_what_is_no_strategy_is_told_what_it_lacks() -> None:
@@ -103,7 +108,7 @@ def test_an_effect_that_inherits_nothing_is_tabulated(tmp_path: Path) -> None:
     assert found.parameters[0].name == "softer"
 
 
-@pytest.mark.slow(20)
+@pytest.mark.nightly
 def test_type_checkers_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     report, errors, code = api.run(["--strict", str(DUCK)])

@@ -54,23 +54,18 @@ def supported(ladder: Any) -> Frame:
     return replace(ladder("timoshenko", polar=False, elements=2), supports=(support,))
 
 
-@pytest.fixture(
-    params=["spring", "rigid", "timoshenko", "supported", "asymmetric", "cubic-mass", "3d"]
-)
+@pytest.fixture(params=["spring", "rigid", "supported", "cubic-mass", "3d"])
 def structure(
     request: pytest.FixtureRequest,
     hframe: Any,
     ladder: Any,
-    asymmetric_ladder: Any,
     portal: Any,
 ) -> Structure:
     timoshenko = ladder("timoshenko", polar=False, elements=2)
     frames = {
         "spring": lambda: spring_frame(hframe),
         "rigid": lambda: rigid_frame(hframe),
-        "timoshenko": lambda: timoshenko,
         "supported": lambda: supported(ladder),
-        "asymmetric": lambda: asymmetric_ladder(elements=2),
         "cubic-mass": lambda: replace(timoshenko, bending_mass="cubic"),
         "3d": lambda: portal(3, elements=1),
     }

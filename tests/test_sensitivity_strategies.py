@@ -483,7 +483,7 @@ def test_the_stated_deviations_are_right(ladder: Any) -> None:
     std = np.array([change.parameters[0].std for change in changes])
     parameters = [change.property for change in changes]
     scores = []
-    for _ in range(60):
+    for _ in range(30):
         truth = std * rng.standard_normal(len(std))
         real = Model.of(structure.with_values(parameters, np.exp(truth)))
         data = measured(real, 6, std=0.003).with_noise(rng)

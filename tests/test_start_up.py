@@ -81,31 +81,19 @@ def test_every_builtin_loads_under_the_name_it_is_offered_by() -> None:
 
 def third_party(path: Path) -> Iterator[tuple[str, bool]]:
     """Return the packages of others that a file imports, and whether as soon as it is loaded."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    skipped = {
-        inner
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
-        for inner in ast.walk(node)
-    }
-    inside = {
-        inner
-        for node in ast.walk(tree)
-        if isinstance(node, ast.FunctionDef)
-        for inner in ast.walk(node)
-    }
-    for node in ast.walk(tree):
-        if node in skipped or not isinstance(node, ast.Import | ast.ImportFrom):
+    open_: list[tuple[ast.AST, bool]] = [(ast.parse(path.read_text(encoding="utf-8")), True)]
+    while open_:
+        node, at_once = open_.pop()
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
             continue
-        modules = (
-            [alias.name for alias in node.names]
-            if isinstance(node, ast.Import)
-            else [node.module or ""]
-        )
-        for module in modules:
-            name = module.partition(".")[0]
+        modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        modules += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+        for name in (module.partition(".")[0] for module in modules):
             if name not in sys.stdlib_module_names and name != "femubench":
-                yield PART_OF.get(name, name), node not in inside
+                yield PART_OF.get(name, name), at_once
+        at_once = at_once and not isinstance(node, ast.FunctionDef)
+        if not isinstance(node, ast.expr):
+            open_ += [(inner, at_once) for inner in ast.iter_child_nodes(node)]
 
 
 def names(requirements: list[str]) -> set[str]:

@@ -27,7 +27,7 @@ from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.records import encode_result
 from femubench.core.schema.results import Block, JobResult, Run
 
-FLIPS = 300
+FLIPS = 100
 RUN = "20260101T000000Z-000000"
 META: dict[str, Any] = {
     **{"run": RUN, "seeds": [*range(3)], "cases": {"corner": {}}, "strategies": ["a", "b"]},
@@ -182,7 +182,7 @@ def test_a_record_goes_into_a_damaged_file(tmp_path: Path) -> None:
     store, draw = stored(tmp_path), random.Random(3)
     (file,) = store.files
     whole = file.read_bytes()
-    for turn in range(40):
+    for turn in range(18):
         content = bytearray(whole)
         # Where the trees begin, and the last page, which takes the next record.
         start = (0, 1024, len(whole) - 1024)[turn % 3]

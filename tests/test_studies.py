@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from study_toys import BROKEN, Spy
 
 import femubench
-from femubench import InputError, plot
+from femubench import InputError
 from femubench.core.cli.main import bench
 from femubench.core.library.rank import Run
 from femubench.core.library.report import render_report, reporter
@@ -183,17 +183,6 @@ class TestRun:
         cells = json.loads(str(texts["json"]))["cells"]
         assert [cell["gain"] for cell in cells] == gain_by(spied)["gain"].tolist()
 
-    def test_heat_map_has_a_number_and_a_hatch_a_cell(self, spied: Run) -> None:
-        ax = plot.heat_map(spied, "noise", "spy.factor")
-        assert len(ax.texts) == 6
-        hatched = [patch.get_xy() for patch in ax.patches if patch.get_hatch()]
-        assert hatched == [(-0.5, 1.5), (0.5, 1.5)]
-        low, high = ax.get_images()[0].get_clim()
-        assert low == -high
-        assert ax.get_xlabel() == "noise, times the stated standard deviations"
-        assert ax.get_ylabel() == "factor of spy"
-        assert plot.heat_map(spied).get_ylabel() == "sensors left out, number of them"
-
 
 class TestResume:
     def test_an_interrupted_study_ends_like_an_undisturbed_one(self) -> None:
@@ -222,19 +211,6 @@ class TestResume:
         )
         again = run_plan(plan, 2, store)
         assert [r.seconds for r in again.results] == [r.seconds for r in resumed.results]
-
-    def test_a_level_that_is_added_takes_the_others_from_the_store(self) -> None:
-        store = Store("results")
-        text = STUDY.replace(", loud = [false, true]", "").replace("[0, 3]", "[0]")
-        run_plan(plan_of(text.replace("[0.5, 1.0, 2.0]", "[1.0]")), 1, store)
-        plan = plan_of(text.replace("[0.5, 1.0, 2.0]", "[1.0, 4.0]"))
-        found = plan.forecast(store)
-        assert (found.jobs, found.done) == (8, 4)
-        assert not found.unknown
-        assert found.seconds > 0.0
-        before = {r.key: r.seconds for r in store.load().results}
-        after = {r.key: r.seconds for r in run_plan(plan, 1, store).results}
-        assert before.items() < after.items()
 
 
 class TestDryRun:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import re
 import tomllib
-from itertools import combinations
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 from printed_boards import as_printed, assert_board_is_that_of, assert_same_errors, stored, text_of
@@ -59,21 +57,6 @@ def test_garteur_has_the_published_frequencies(tmp_path: Path) -> None:
     write_garteur(tmp_path / "garteur")
     stored = (ROOT / "scenarios" / "garteur" / "modes.csv").read_text(encoding="utf-8")
     assert (tmp_path / "garteur" / "modes.csv").read_text(encoding="utf-8") == stored
-
-
-def test_no_two_structures_share_their_geometry() -> None:
-    """Compare the distances between joints in parts of the largest, whatever the size."""
-
-    def proportions(name: str) -> np.ndarray:
-        spec = tomllib.loads((SUITE / name / "case.toml").read_text(encoding="utf-8"))
-        xyz = np.array([joint["xyz"] for joint in spec["model"]["joints"]])
-        apart = np.sort(np.linalg.norm(xyz[:, None] - xyz[None], axis=2).ravel())
-        return apart / apart[-1]
-
-    shapes = {name: proportions(name) for name in NAMES}
-    for one, two in combinations(NAMES, 2):
-        alike = shapes[one].shape == shapes[two].shape and len(shapes[one]) > 4
-        assert not alike or np.abs(shapes[one] - shapes[two]).max() > 0.01, (one, two)
 
 
 def test_the_board_of_all_structures_is_that_of_the_run_kept() -> None:

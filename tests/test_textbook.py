@@ -158,16 +158,6 @@ def test_who_is_not_applicable_counts_as_who_leaves_the_model_as_it_is(tmp_path:
     assert run_from_json(run_to_json(run)).results == run.results
 
 
-def test_a_result_that_is_reused_starts_from_where_it_is_asked_to(tmp_path: Path) -> None:
-    case = femubench.cases["frame"]
-    plain = replace(case, name="plain", model=as_matrices(case.model))
-    femubench.rank(plain, "unchanged", jobs=1, store=tmp_path, nominal="drawn")
-    both = femubench.rank(plain, "unchanged", jobs=1, store=tmp_path, overwrite="missing")
-    assert [item.nominal for item in both.results] == ["textbook"]
-    (row,) = both.leaderboard.to_dict("records")
-    assert (row["ok"], row["total"]) == (1, 1)
-
-
 def test_a_locked_run_takes_no_start_of_its_own() -> None:
     locked = CliRunner().invoke(bench, ["run", "--locked", "x", "--nominal", "textbook"])
     assert locked.exit_code == 2

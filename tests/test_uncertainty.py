@@ -306,10 +306,8 @@ def test_a_lost_mode_is_covered_by_nothing_and_counts_a_hundred_percent() -> Non
     assert predictive.scores([result], {})["crps_percent"] == pytest.approx((own + 200.0) / 3)
 
 
-@pytest.mark.parametrize("name", ["bayesian", "diagnosed"])
-def test_built_in_strategies_say_how_sure_they_are(name: str) -> None:
-    run = femubench.rank(CASE, [name], nominal="drawn")
-    (result,) = run.results
+def test_a_built_in_strategy_says_how_sure_it_is() -> None:
+    (result,) = femubench.rank(CASE, ["bayesian"], nominal="drawn").results
     assert result.status == "ok"
     stds = [m.predicted_std_hz for b in result.blocks.values() for m in b.modes]
     assert all(std is not None and std > 0.0 for std in stds)
