@@ -193,14 +193,6 @@ def test_without_links_the_import_says_so(without_links: Path, python: Path) -> 
         assert f"ImportError: {NO_LINKS}" in result.stderr.splitlines()[-1]
 
 
-def test_without_links_nothing_is_built(without_links: Path, python: Path, tmp_path: Path) -> None:
-    words = ("-m", "pip", "wheel", "--no-index", "--no-deps", "--no-build-isolation")
-    result = done(python, *words, "--wheel-dir", tmp_path, without_links, cwd=tmp_path)
-    assert result.returncode == 1
-    assert (result.stdout + result.stderr).count(NO_LINKS) == 1
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_without_links_make_says_so(without_links: Path) -> None:
     result = done("make", "run", cwd=without_links)
     assert (result.returncode, result.stdout) == (2, "")

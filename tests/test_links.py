@@ -29,14 +29,12 @@ from femubench.core.fem.frame import (
     Support,
 )
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Property
 from femubench.core.fem.preload import preload_stiffness, redundant_members
 from femubench.core.fem.sections import Section, solid_rectangle
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.rigid import rigid_modes_of
-from femubench.core.modal.sensitivity import eigenvalue_sensitivities
 from femubench.plugins.effects.brace_spring import BraceSpring
 
 ALUMINIUM = Material(72e9, 0.3, 2700.0)
@@ -204,21 +202,6 @@ def test_nothing_hangs_on_a_motion_that_no_link_makes_use_of(what: str) -> None:
     with pytest.raises(ModelError, match=r"no member ends at joint '\w+' and no link moves it"):
         Model.of(replace(frame, **{what: (items[what]("-z"),)}))
     assert not [p for p in BraceSpring().places(Model.of(frame)) if "M" in p]
-
-
-def test_sensitivities_are_those_of_differences() -> None:
-    frame = tee("3d", masses=(PointMass(Place(joint="D"), 0.5),))
-    structure = Structure.build(frame)
-    factors = [Property("DE", "E", ("DE/1", "DE/2")), Property("AB", "density", ("AB/1",))]
-    modes = solve_modes(Model.of(structure), 12)
-    found = eigenvalue_sensitivities(Model.of(structure), modes, factors)[6:]
-    for k, parameter in enumerate(factors):
-        low, high = (
-            solve_modes(Model.of(structure.with_values([parameter], [1.0 + h])), 12).eigenvalues
-            for h in (-1e-5, 1e-5)
-        )
-        scale = modes.eigenvalues[6:]
-        assert found[:, k] / scale == pytest.approx((high - low)[6:] / 2e-5 / scale, abs=1e-6)
 
 
 def ring(plane: Plane, linked: bool, elements: int = 2) -> Frame:

@@ -244,23 +244,5 @@ def test_a_pair_of_matrices_has_nodes_and_groups(ladder: FrameBuilder) -> None:
     assert len(structure.properties) == n
 
 
-def test_a_frame_in_space(portal: FrameBuilder) -> None:
-    frame = portal(1, elements=3)
-    points = np.array([joint.xyz for joint in frame.joints])
-    xyz = np.repeat(points, 3, axis=0)
-    sensors = Sensors(tuple(f"q{k}" for k in range(len(xyz))), xyz, ("x", "y", "z") * len(points))
-    truth = Model.of(replace(frame, factors=(Factor("E", ("m6",), 0.7),)))
-    modes = solve_modes(truth).elastic
-    shapes = np.asarray(truth.observe(sensors) @ modes.shapes[:, :6])
-    shapes = shapes / np.abs(shapes).max(axis=0)
-    f = modes.natural_frequencies[:6]
-    noise = np.full(shapes.shape, 1e-3)
-    numbers = tuple(range(6))
-    data = Measurement(sensors, numbers, f, 1e-4 * f, np.full(6, np.nan), shapes, noise)
-    # The mesh of the truth is the model's, so the model is not refined either.
-    rows = locate(Model.of(frame), data)
-    assert ranking(rows, "energy-error", members_of(frame))[0] == "m6"
-
-
 def _softer(labels: tuple[str, ...]) -> Property:
     return Property("E", "E", labels)

@@ -363,12 +363,11 @@ def test_kabe_needs_a_pattern(frame_case: Case) -> None:
         update(Kabe, (changed, frame_case[1]))
 
 
-@pytest.mark.parametrize("strategy", [Kabe, KabeRigid])
 def test_kabe_states_by_how_much_a_used_frequency_is_off_where_no_matrix_has_them(
-    cases: dict[str, Case], strategy: Any
+    cases: dict[str, Case],
 ) -> None:
     model, data = cases["hframe"]
-    result = update(strategy, (model, data))
+    result = update(KabeRigid, (model, data))
     partners = quasi_measured_modes(result.model, data)
     own = partners.modes.natural_frequencies[partners.partners]
     worst = np.abs(own / data.frequencies - 1.0).max()
@@ -376,7 +375,7 @@ def test_kabe_states_by_how_much_a_used_frequency_is_off_where_no_matrix_has_the
     assert worst > 1e-3
     assert result.diagnostics["residual"] > worst
     same_pattern(model, result.model)
-    assert "used_frequency_error" not in update(strategy, cases["frame"]).diagnostics
+    assert "used_frequency_error" not in update(KabeRigid, cases["frame"]).diagnostics
 
 
 def test_kabe_rigid_gives_a_physical_model_of_the_hframe() -> None:

@@ -64,18 +64,6 @@ def test_it_runs(path: Path, tmp_path: Path) -> None:
     assert any("image/png" in output.get("data", {}) for output in outputs)
 
 
-def test_the_footbridge_is_kept_with_small_outputs() -> None:
-    """What is kept of GPL data are tables of a few rows and two drawings."""
-    cells = [cell for cell in read(BRIDGE).cells if cell.cell_type == "code"]
-    outputs = [output for cell in cells for output in cell.outputs]
-    assert len(outputs) == len(cells) - 1  # of all but the imports
-    drawings = [d for output in outputs if (d := output["data"].get("image/png"))]
-    assert len(drawings) == 2
-    assert max(map(len, drawings)) < 100_000
-    texts = [output["data"]["text/plain"] for output in outputs]
-    assert max(text.count("\n") for text in texts) < 8
-
-
 def test_they_are_kept_as_they_were_typed_and_teach_facts_by_public_names() -> None:
     """So that a difference in git is one that somebody typed."""
     assert [path.name[0] for path in NOTEBOOKS] == list("12345678")

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from equation_readings import Reading, predicted
 from ladder_settings import FRAME
-from open_cells import COLUMNS, PAGE, column, deviation, grid
-from open_cells_numbering import EACH, MEMBERS
+from open_cells import COLUMNS, PAGE, deviation, grid
 
 from femubench import InputError, Strategy, read_case, solve_modes
 from femubench.core.plugin.variants import strategy_of
@@ -50,56 +48,11 @@ def test_engine_is_the_strategies(family: str, words: str, choices: dict[str, An
     np.testing.assert_allclose(ours[elastic], theirs[elastic], rtol=1e-6)
 
 
-def test_own_frequencies_give_the_hardly_moved_column() -> None:
-    _, modes = predicted(Reading(target="nominal"))
-    assert deviation(modes, "physical") < 0.3
-    assert modes[3] > column("physical")[3] > 911.3  # up, as printed
-    assert modes[4] < 1047.0  # and down
-
-
-def test_raw_expansion_by_forces_hides_most_of_the_frequency_error() -> None:
-    raw: dict[str, Any] = {"metric": "raw", "rows": "raw", "diagonal": 0.0, "cross": 0.0}
-    _, modes = predicted(Reading(expansion="force", start="nominal", **raw))
-    assert 2.5 < deviation(modes, "physical") < 3.5
-    scaled = {**raw, "metric": "diagonal", "rows": "paper"}
-    _, modes = predicted(Reading(expansion="force", start="nominal", **scaled))
-    assert deviation(modes, "physical") > 5.0
-
-
 def test_expansion_by_forces_gives_the_generic_column() -> None:
     _, modes = predicted(Reading(family="generic-ls", expansion="force", start="nominal"))
     assert deviation(modes, "generic-ls") < 0.3
     _, modes = predicted(Reading(family="generic-ls"))
     assert deviation(modes, "generic-ls") > 2.0
-
-
-def test_true_shapes_at_all_dofs_give_the_adjusted_column() -> None:
-    true = Reading(family="generic-adjusted", data="beam", expansion="all dofs")
-    _, modes = predicted(Reading(**{**vars(true), "diagonal": 3.0, "cross": 0.0}))
-    assert deviation(modes, "generic-adjusted") < 0.5
-    _, modes = predicted(true)
-    assert deviation(modes, "generic-adjusted") < 1.2
-    _, modes = predicted(Reading(family="generic-adjusted"))
-    assert deviation(modes, "generic-adjusted") > 5.0
-
-
-def test_numbering_of_members_changes_nothing() -> None:
-    family = "generic-adjusted"
-    _, modes = predicted(Reading(family=family))
-    for backward in (EACH[-1], MEMBERS[1], "+".join(MEMBERS[::3])):
-        _, other = predicted(Reading(family=family, backward=backward))
-        np.testing.assert_allclose(other, modes, rtol=1e-9)
-
-
-def test_cores_that_are_not_turned_depend_on_the_numbering() -> None:
-    tied = Reading(family="generic-adjusted", data="beam", expansion="all dofs")
-    _, turned = predicted(tied)
-    _, numbered = predicted(replace(tied, sharing="numbered"))
-    assert np.abs(numbered / turned - 1.0).max() > 2e-3
-    _, other = predicted(replace(tied, sharing="numbered", backward=MEMBERS[1]))
-    assert np.abs(other / numbered - 1.0).max() > 2e-4
-    _, every = predicted(replace(tied, sharing="numbered", backward=EACH[-1]))
-    np.testing.assert_allclose(every, numbered, rtol=1e-9)
 
 
 def test_unknown_choices_are_refused() -> None:

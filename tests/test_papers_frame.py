@@ -16,7 +16,6 @@ from femubench.core.cli.main import bench as command
 from femubench.core.plugin.loader import load_plugins
 from femubench.papers import PAPERS, study
 from femubench.papers.frame import (
-    mass_matrix,
     misprints,
     predictions,
     readings,
@@ -178,18 +177,6 @@ def test_sets_of_matrices_are_counted_by_rank_and_coincide(bench: Workbench) -> 
     assert found.same_as_physical < 1e-9
     assert found.gap > 1e6
     assert bench.update(CASE, "kabe-rigid").parameter_count == found.kept_by_rigid
-
-
-def test_mass_matrix_of_the_twin_is_below_the_printed_one(
-    bench: Workbench, cells: Mapping[Key, Cell]
-) -> None:
-    found = [cell for cell in cells.values() if cell.table == "generalised mass"]
-    assert len(found) == 10
-    assert {cell.verdict for cell in found} == {"cannot-be-checked"}
-    case = bench.cases[CASE]
-    low, high = (mass_matrix.scatter(case.model, case.measurement, s) for s in (0.01, 0.03))
-    size = np.sqrt(np.mean([cell.printed**2 for cell in found]))
-    assert low < size < high
 
 
 def test_cutoff_decides_on_the_non_zeros(rerun: Study, bench: Workbench) -> None:

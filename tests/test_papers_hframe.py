@@ -15,7 +15,6 @@ from femubench.core.library.report import rendering
 from femubench.core.library.reproduce import studies_of
 from femubench.core.pace import Advance
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.plugin.variants import strategy_of
 from femubench.papers import DONE, study
 from femubench.papers.hframe.beyond import compare
 from femubench.papers.hframe.meshes import frequencies, mesh_cells
@@ -99,23 +98,6 @@ def test_verdicts_are_what_is_known_and_say_why(cells: Cells) -> None:
     for cell in cells.values():
         assert len(cell.note) > 30
         assert "no reading of the text" not in cell.note
-
-
-def test_what_was_fitted_or_taken_over_is_never_independent(cells: Cells) -> None:
-    """Row C_a and its copies are what the dimensions come from; 4b and 4c what was stopped for."""
-    for (table, row, name), cell in cells.items():
-        if row in ("C_a", "analytical frequency") or (
-            table in ("4a", "4b") and name == "initial" and cell.unit == "Hz"
-        ):
-            assert cell.verdict == ("does-not-follow" if (table, row, name) in OPEN else "fitted")
-        if table in ("4b", "4c") and name == "updated":
-            assert cell.verdict == "fitted"
-        if name == "ratio" or name.endswith("error"):
-            assert cell.verdict in ("input", "misprint")
-    assert [cells["4d", mode, "initial"].printed for mode in MODES] == [
-        cells["4c", mode, "initial"].printed for mode in MODES
-    ]
-    assert {cells["4d", mode, "initial"].verdict for mode in MODES} == {"input"}
 
 
 def test_what_was_chosen_for_a_fitted_cell_matters(bench: Workbench, cells: Cells) -> None:
@@ -221,21 +203,6 @@ def test_row_c_determines_a_ratio_only(bench: Workbench) -> None:
     flexible = frequencies(run(bench, f"{row.initial.words},options.damping=1.0").model, 5)
     printed_hertz = read_printed("hframe")["table4"][row.key]["updated"]
     assert np.abs(flexible / np.array(printed_hertz) - 1.0).max() > 5e-3
-
-
-def test_what_an_update_rests_on_ends_with_words_that_bench_run_takes(
-    bench: Workbench, cells: Cells
-) -> None:
-    notes = {
-        c.note
-        for (table, _, name), c in cells.items()
-        if table > "3" and name == "updated" and c.verdict != "does-not-follow"
-    }
-    assert len(notes) == 8
-    for note in notes:
-        words = re.search(r"bench run hframe -s '([^']+)'$", note)
-        assert words is not None
-        assert strategy_of(words[1], bench.strategies).name == words[1]
 
 
 def test_held_out_modes(bench: Workbench) -> None:

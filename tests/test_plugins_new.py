@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import json
 import os
 import re
 import shutil
@@ -132,23 +131,6 @@ def test_strategy_is_timed_beside_others(packages: Path) -> None:
     own = float(listed[0][1])
     for _, time, multiple in listed:
         assert float(multiple) == pytest.approx(float(time) / own, rel=0.02)
-
-
-@pytest.mark.nightly
-def test_pyright_finds_nothing(packages: Path) -> None:
-    """An editor follows every name of femubench, and the types of a package fit its roles."""
-    roots = [
-        {"root": str(root), "extraPaths": [str(SITE), str(root / "src"), str(root / "tests")]}
-        for root in sorted(packages.iterdir())
-    ]
-    settings = packages / "pyrightconfig.json"
-    text = json.dumps({"typeCheckingMode": "basic", "executionEnvironments": roots})
-    settings.write_text(text, encoding="utf-8")
-    command = ("-m", "pyright", "--pythonpath", sys.executable, "--project", settings)
-    result = python(*command, packages=[], cwd=packages)
-    settings.unlink()
-    assert result.returncode == 0, result.stdout + result.stderr
-    assert "0 errors, 0 warnings" in result.stdout
 
 
 def test_any_name_gives_tidy_code(tmp_path: Path) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 from diagnosis_problems import case_of, measured
-from effect_checks import check_neutral, compare
 
 from femubench import diagnose
 from femubench.core.errors import ModelError
@@ -43,7 +42,6 @@ from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
-from femubench.plugins.effects.gravity_stiffness import GravityStiffness
 
 STEEL = Material(210e9, 0.3, 7850.0)
 SECTION = Section(A=4e-4, Iy=3e-9, Iz=5e-8, J=2e-9, Jp=5.3e-8)
@@ -230,17 +228,6 @@ def test_a_clamp_out_of_plane_holds_the_frame_in_its_plane_and_a_ground_spring_i
     assert redundant_members(Structure.build(replace(sprung, springs=()))) == ()
 
 
-def test_a_dangling_member_is_told_from_the_ring(ladder: Any) -> None:
-    plain = ladder("timoshenko", polar=False)
-    tails = tuple(replace(plain.members[0], name=n, ends=(n[0], n[1])) for n in ("FX", "XY"))
-    corners = (Joint("X", (0.9, 0.5, 0.0)), Joint("Y", (1.2, 0.4, 0.0)))
-    frame = replace(plain, joints=(*plain.joints, *corners), members=(*tails, *plain.members))
-    structure = Structure.build(frame)
-    assert redundant_members(structure) == tuple(member.name for member in plain.members)
-    with pytest.raises(ModelError, match="'XY'"):
-        preload_stiffness(structure, "XY", 1.0)
-
-
 def test_what_cannot_be_stressed_is_refused(hframe: Any, ladder: Any) -> None:
     structure = Structure.build(hframe())
     with pytest.raises(ModelError, match=r"'lower1'.* not redundant"):
@@ -329,21 +316,6 @@ class TestWeight:
             gravity_stiffness(Structure.build(tipping))
         with pytest.raises(ModelError, match="out of plane"):
             Structure.build(replace(ladder(), gravity=1.0)).matrices()
-
-    def test_the_effect_is_the_key(self) -> None:
-        effect = GravityStiffness()
-        for plane in ("in-plane", "3d"):
-            model = Model.of(upright(plane, 4, -1.0))
-            assert tuple(effect.places(model)) == ("all",)
-            assert 1e-3 < compare(effect, model, "all", [0.7]).effect < 0.1
-            assert compare(effect, model, "all", [0.7]).frequency < 1e-9
-            check_neutral(effect, model, "all")
-            already = effect.extend(model, "all", [1.0])
-            assert compare(effect, already, "all", [2.5]).frequency < 1e-9
-            (now,) = effect.parameters(already, "all")
-            assert (now.neutral, now.one_sided) == (1.0, False)
-        assert effect.places(Model.of(beam("in-plane", ((), ())))) == ()
-        assert effect.places(Model.of(beam("out-of-plane", CLAMPED_OUT))) == ()
 
     def test_the_weight_of_what_slender_legs_carry_is_named(self) -> None:
         """Two lumps on a portal of thin tubes, which lower its sway by 1.6 %."""

@@ -144,23 +144,9 @@ class TestEffort:
         assert effort.cut
 
 
-def screen(text: str) -> list[str]:
-    """Return the lines that a terminal shows after a text."""
-    lines, row, column = [""], 0, 0
-    for code, step, letter in re.findall(r"(\x1b\[\??(\d*)[;\d]*[a-zA-Z])|([^\x1b])", text):
-        if code.endswith("A"):
-            row -= int(step or 1)
-        elif code.endswith("K"):
-            lines[row] = ""
-        elif letter == "\r":
-            column = 0
-        elif letter == "\n":
-            row, column = row + 1, 0
-            lines += [""] * (row + 1 - len(lines))
-        elif not code:
-            lines[row] = lines[row][:column].ljust(column) + letter + lines[row][column + 1 :]
-            column += 1
-    return lines
+def shown(file: io.StringIO) -> str:
+    """Return the last line of a terminal."""
+    return re.sub(r"\x1b\[\??[\d;]*[a-zA-Z]", "", file.getvalue()).split("\r")[-1]
 
 
 def test_one_line_that_takes_itself_away(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -173,14 +159,12 @@ def test_one_line_that_takes_itself_away(clock: Clock, monkeypatch: pytest.Monke
     with show_progress("[red]frame", console, clock) as stated:
         clock.now += 65.0
         stated(Advance(3, 12, "single causes", 130.0, 5.0))
-        (line,) = (line for line in screen(file.getvalue()) if line.strip())
+        line = shown(file)
         assert line.startswith("[red]frame: single causes ")
         assert re.search(r" 3/12 +0:01:05 0:02:10 left *$", line)
         assert len(line) <= 80
         stated(Advance(4, 12, "a name that is so long that it would never go into a line of these"))
-        (line,) = (line for line in screen(file.getvalue()) if line.strip())
-        assert re.search(r" 4/12 +0:01:05 -:--:-- left *$", line)
+        assert re.search(r" 4/12 +0:01:05 -:--:-- left *$", shown(file))
         stated(Advance(12, 12, "end", 0.0))
-    assert not "".join(screen(file.getvalue())).strip()
-    console.print("after")
-    assert [line for line in screen(file.getvalue()) if line.strip()] == ["after"]
+    assert file.getvalue().endswith("\x1b[1A\x1b[2K")
+    assert not shown(file).strip()

@@ -153,12 +153,7 @@ def test_history_has_every_version_and_the_board_the_latest(data: Data, site: Si
     assert softer["versions"][0]["gain"] > softer["versions"][1]["gain"]
     assert softer["versions"][1]["machines"][0]["cpu"] == "Old <cpu>"
     page = (site.folder / softer["page"]).read_text()
-    drawn = Links(page).text.partition("Versions")[0]
-    assert "Gain of every version" in drawn
-    assert all(
-        f"{number}" in drawn and row["last"][:10] in drawn
-        for number, row in zip((2, 1), softer["versions"], strict=True)
-    )
+    assert "Gain of every version" in Links(page).text.partition("Versions")[0]
     assert "Old &lt;cpu&gt;" in page
     # The strategy that did not change has one version, which two machines agree on.
     same = site.strategy("unchanged")
@@ -402,13 +397,10 @@ def test_extremes_do_not_break_the_site_that_took_them(data: Data, site: Site) -
     assert half.exit_code == 2
     assert "run1.json: " in half.stderr
     made = json.loads(json.dumps(data))
-    for result in made["results"]:
-        if result["strategy"] == "unchanged":
-            mode = result["used"]["modes"][0]
-            mode["predicted_hz"], mode["measured_hz"] = 1e100, 1e-40
-            others = len(result["used"]["modes"])
-            result["used"]["rms_percent"] = 100.0 * 1e140 / others**0.5
-        result["gain"] = 1.0
+    for result in (r for r in made["results"] if r["strategy"] == "unchanged"):
+        modes = result["used"]["modes"]
+        modes[0]["predicted_hz"], modes[0]["measured_hz"] = 1e100, 1e-40
+        result["used"]["rms_percent"] = 100.0 * 1e140 / len(modes) ** 0.5
     made["meta"]["reference"]["corner"]["used"] = 0.0
     assert site.add(made).exit_code == 0
     before = site.content()

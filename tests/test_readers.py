@@ -33,58 +33,26 @@ def nodes_2411(scale: float = 1.0, **changes: object) -> Dataset:
 
 
 def units(length: float) -> Dataset:
-    return dict(
-        pyuff.prepare_164(
-            units_code=5,
-            units_description="mm",
-            temp_mode=1,
-            length=length,
-            force=1.0,
-            temp=1.0,
-            temp_offset=273.15,
-        )
-    )
+    factors = {"length": length, "force": 1.0, "temp": 1.0, "temp_offset": 273.15}
+    return dict(pyuff.prepare_164(units_code=5, units_description="mm", temp_mode=1, **factors))
 
 
 def mode_55(number: int, shape: Sequence[complex], **changes: object) -> Dataset:
     zero = np.zeros(len(NODES)) * np.asarray(shape)
-    dataset = {
-        "type": 55,
-        "analysis_type": 2,
-        "data_ch": 2,
-        "spec_data_type": 8,
-        "load_case": 1,
-        "mode_n": number,
-        "freq": 10.0 * number,
-        "modal_damp_vis": 0.01 * number,
-        "node_nums": np.array(NODES),
-        "r1": np.asarray(shape),
-        "r2": zero,
-        "r3": zero,
-    }
-    return dataset | changes
+    dataset = {"type": 55, "analysis_type": 2, "data_ch": 2, "spec_data_type": 8, "load_case": 1}
+    dataset |= {"mode_n": number, "freq": 10.0 * number, "modal_damp_vis": 0.01 * number}
+    readings = {"node_nums": np.array(NODES), "r1": np.asarray(shape), "r2": zero, "r3": zero}
+    return dataset | readings | changes
 
 
 def mode_2414(number: int, shape: Sequence[float]) -> Dataset:
     return {
-        "type": 2414,
-        "analysis_dataset_label": number,
-        "analysis_dataset_name": "mode",
-        "dataset_location": 1,
-        **{f"id{i}": "NONE" for i in range(1, 6)},
-        "model_type": 1,
-        "analysis_type": 2,
-        "data_characteristic": 2,
-        "result_type": 8,
-        "data_type": 2,
-        "number_of_data_values_for_the_data_component": 3,
-        "record10_field6": number,
-        "record12_field2": 10.0 * number,
-        "record12_field6": 0.02,
-        "node_nums": np.array(NODES),
-        "x": np.array(shape),
-        "y": np.zeros(3),
-        "z": np.zeros(3),
+        **{"type": 2414, "analysis_dataset_label": number, "analysis_dataset_name": "mode"},
+        **{"dataset_location": 1, "model_type": 1, "analysis_type": 2, "data_characteristic": 2},
+        **{"result_type": 8, "data_type": 2, **{f"id{i}": "NONE" for i in range(1, 6)}},
+        **{"number_of_data_values_for_the_data_component": 3, "record10_field6": number},
+        **{"record12_field2": 10.0 * number, "record12_field6": 0.02, "node_nums": np.array(NODES)},
+        **{"x": np.array(shape), "y": np.zeros(3), "z": np.zeros(3)},
         "data_at_node": [np.array([value, 0.0, 0.0]) for value in shape],
     }
 
@@ -157,16 +125,9 @@ def test_rigid_modes_and_other_results_are_left_out(tmp_path: Path) -> None:
 
 
 def system(matrix: np.ndarray, kind: int = 0) -> Dataset:
-    return {
-        "type": 2420,
-        "Part_UID": 1,
-        "Part_Name": "part",
-        "CS_sys_labels": [5],
-        "CS_types": [kind],
-        "CS_colors": [8],
-        "CS_names": ["cs"],
-        "CS_matrices": [matrix],
-    }
+    named = {"type": 2420, "Part_UID": 1, "Part_Name": "part", "CS_names": ["cs"]}
+    own = {"CS_sys_labels": [5], "CS_types": [kind], "CS_colors": [8], "CS_matrices": [matrix]}
+    return named | own
 
 
 TURNED = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]])  # rows: local axes

@@ -35,11 +35,9 @@ MODEL = Model.of(FRAME)
     ("place", "atoms"),
     [
         ("rung-middle/1", {"rung-middle@J5"}),
-        ("rung-middle/4", {"rung-middle@J11"}),
         ("rung-middle/2", {"rung-middle/2"}),
         ("rung-middle@J5", {"rung-middle@J5"}),
         ("rung-middle@0.25", {"rung-middle@J5", "rung-middle/2"}),
-        ("rung-middle@0.4", {"rung-middle/2"}),
         ("J5", {"J5"}),
         ("J1-J7", {"J1-J7"}),
     ],

@@ -158,25 +158,6 @@ class TestTerminal:
         assert [row[6:9] for row in rows[1:4]] == [["0", "of", "1"]] * 3
         assert "some models lost rigid-body modes or have negative eigenvalues" in text
 
-    def test_fits_80_columns_whatever_the_names_and_figures(self) -> None:
-        name = "a-strategy-with-a-very-long-name-that-nobody-would-type"
-        wild = result(
-            name,
-            3e4,
-            seconds=12345.678,
-            parameter_count=123456,
-            evaluations=1234567,
-            rigid_body_modes=0,
-            negative_eigenvalues=1234,
-        )
-        reason = "no convergence " * 20 + "x" * 200
-        failed = replace(FAILED, case="scenario-name/part-of-it-with-a-long-name", reason=reason)
-        many = [replace(result(f"s{i}"), seed=seed) for i in range(12) for seed in range(3)]
-        text = TerminalReporter().render(run_of(wild, failed, *many))
-        assert max(len(line) for line in text.splitlines()) <= 80
-        assert "a-strategy-with…" in text
-        assert "no convergence" in text
-
     def test_several_seeds_show_an_interval_and_gather_failures(self) -> None:
         results = [result("good", 0.1 + 0.1 * seed, seed=seed) for seed in range(5)]
         failed = [replace(FAILED, seed=seed) for seed in range(5)]

@@ -21,7 +21,6 @@ from femubench.core.run.record_file import read_records, write_file
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult, Run
-from femubench.core.score.repeatability import environment_differences, result_differences
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
@@ -218,36 +217,6 @@ def test_the_lock_of_a_file_that_was_removed_keeps_nobody_out(
     descriptor = locks.hold_lock(path)
     assert os.path.samestat(os.fstat(descriptor), path.stat())
     os.close(descriptor)
-
-
-def test_results_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
-    one, four = (
-        run_jobs([CASE], [toys.Unchanged(), toys.Softer()], seeds=(0, 1, 2), jobs=jobs)
-        for jobs in (1, 4)
-    )
-    assert stable(one) == stable(four)
-    assert result_differences(one, four) == []
-
-
-def test_differences_between_a_run_and_its_repetition_are_told() -> None:
-    run = run_jobs([CASE], [toys.Unchanged(), toys.Softer()])
-    first, second = run.results
-    block = replace(first.blocks["used"], rms_percent=7.0)
-    changed = replace(first, blocks={**first.blocks, "used": block})
-    failed = replace(second, status="failed")
-    stated = result_differences(run, replace(run, results=(changed, failed)))
-    assert len(stated) == 2
-    assert stated[0].startswith(
-        "corner, softer" if second.strategy < first.strategy else "corner, un"
-    )
-    assert any("then, 7.0 % now" in line for line in stated)
-    assert any("ok then, failed now" in line for line in stated)
-    assert "not run now" in result_differences(run, replace(run, results=(first,)))[0]
-    assert environment_differences(run.meta, run.meta) == []
-    other = {**run.meta, "versions": {**run.meta["versions"], "numpy": "1.0"}}
-    assert environment_differences(run.meta, other) == [
-        f"numpy: {run.meta['versions']['numpy']} then, 1.0 now"
-    ]
 
 
 _RUN = """

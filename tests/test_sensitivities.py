@@ -152,16 +152,6 @@ def test_eigenvalues_and_shapes_agree_with_central_differences(structure: Struct
                 assert gap < 1e-6 * max(1.0, np.abs(shape_change[:, j]).max() / size[j])
 
 
-def test_modal_sum_is_complete_only_without_massless_dofs(
-    hframe: Any, ladder: Any, portal: Any
-) -> None:
-    massless = Model.of(spring_frame(hframe))
-    assert len(solve_modes(massless)) < massless.size
-    for frame in (ladder(), portal(3)):
-        model = Model.of(frame)
-        assert len(solve_modes(model)) == model.size
-
-
 def test_element_derivatives_are_those_of_the_assembled_matrices(structure: Structure) -> None:
     structure, parameters = prepared(structure)
     change = derivatives(structure, parameters)

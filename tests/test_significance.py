@@ -25,7 +25,6 @@ from femubench.core.score.statistics import (
     weigh_evidence,
 )
 from femubench.core.typing import FloatArray
-from femubench.reports.runs import TerminalReporter
 from femubench.results import interval_kind, leaderboard, run_from_json, run_to_json
 
 TRIALS = 400
@@ -181,21 +180,6 @@ class TestBoard:
             {"behind", "as-far", "last"}, {"behind", "as-far", "last"}, {"last"}, {"last"}, set(),
         ]  # fmt: skip
         assert set(rows.loc["last", "worse_than"]) == {*means} - {"last"}
-
-    def test_the_screen_says_what_is_shown_and_what_is_not(self) -> None:
-        random = np.random.default_rng(5)
-        gains = {
-            name: mean + 0.02 * random.standard_normal((20, 1))
-            for name, mean in {"first": 0.6, "second": 0.6, "line": 0.6, "third": 0.1}.items()
-        }
-        run = run_of(gains, TWENTY)
-        run = Run({**run.meta, "yardsticks": {"line": "a line"}}, run.results)
-        text = TerminalReporter().render(run)
-        assert max(map(len, text.splitlines())) <= 80
-        said = " ".join(text.split())
-        assert "It is shown to be better than 1 of 2 other strategies." in said
-        assert "No strategy is shown to be better than a line." in said
-        assert "better than handbooks on 100 % of the 20 structures" in said
 
 
 class TestGain:

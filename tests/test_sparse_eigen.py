@@ -12,14 +12,12 @@ import scipy.sparse as sp
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import (
     Frame,
-    GroundSpring,
     Joint,
     JointSpring,
     Material,
     Member,
     Place,
     PointMass,
-    Support,
 )
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.sections import round_tube
@@ -59,14 +57,6 @@ def agree(model: Model, count: int, tolerance: float = 1e-8) -> FloatArray:
 def test_spatial_frames_with_massless_joints(portal: FrameBuilder, seed: int) -> None:
     masses = (PointMass(Place(member="m2", s=0.37), 0.5, (0.1, 0.2, -0.1)),)
     agree(Model.of(portal(seed, joint_springs=SPRINGS, masses=masses)), 16)
-
-
-def test_supported_and_suspended_frames(ladder: FrameBuilder) -> None:
-    frame = ladder(elements=8)
-    held = replace(frame, supports=(Support(Place(joint="A"), ("z", "rx", "ry")),))
-    agree(Model.of(held), 10)
-    soft = tuple(GroundSpring(Place(joint=j), "z", 100.0) for j in "AC")
-    agree(Model.of(replace(frame, springs=soft)), 10, 1e-6)
 
 
 def test_low_rank_changes_with_negative_eigenvalues(ladder: FrameBuilder) -> None:

@@ -24,7 +24,6 @@ from femubench.core.run import record_file
 from femubench.core.run.store import Store
 from femubench.core.run.upkeep import find_store_faults
 from femubench.core.schema.paired_modes import PairedMode
-from femubench.core.schema.records import encode_result
 from femubench.core.schema.results import Block, JobResult, Run
 
 FLIPS = 100
@@ -266,29 +265,6 @@ def test_processes_write_and_some_are_killed(tmp_path: Path) -> None:
             store.append(run, JobResult("c", "s", 10**7, "failed", "after"))
         assert len(store.load(run).results) == len(seeds) + 1
     assert find_store_faults(store) == []
-
-
-def test_records_are_in_the_file_within_a_second(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What is in the file itself was synced before; see also the power cuts."""
-    waits: list[float] = []
-    start = threading.Timer.__init__
-
-    def timed(self: threading.Timer, seconds: float, *rest: object) -> None:
-        waits.append(seconds)
-        start(self, 0.0, *rest)  # type: ignore[arg-type]
-
-    store = Store(tmp_path)
-    store.begin(META)
-    monkeypatch.setattr(threading.Timer, "__init__", timed)
-    store.append(RUN, RESULTS[0])
-    for thread in threading.enumerate():
-        if isinstance(thread, threading.Timer):
-            thread.join()
-    assert waits == [1.0]
-    (file,) = store.files
-    assert encode_result(RESULTS[0]) in file.read_bytes()
 
 
 def test_a_disk_that_fails_is_reported_with_the_next_record(

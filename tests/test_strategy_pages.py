@@ -1,23 +1,10 @@
-"""The page on the strategies: whose choices each one makes, and settings that it can take."""
+"""The other settings that a strategy names: each is one, and not the usual one."""
 
 from __future__ import annotations
-
-import re
-from pathlib import Path
 
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.variants import strategy_of
 from femubench.plugins.strategies import CLASSES
-
-PAGE = Path(__file__).parents[1] / "docs" / "strategies.md"
-ITEM = re.compile(r"^- `([a-z-]+)`\. (Authors':.+?)(?=^- |^$|\Z)", re.M | re.S)
-
-
-def test_every_strategy_says_whose_its_choices_are() -> None:
-    items = ITEM.findall(PAGE.read_text("utf-8"))
-    assert sorted(name for name, _ in items) == sorted(CLASSES)
-    for name, text in items:
-        assert re.fullmatch(r"Authors': .+; ours: .+\.", " ".join(text.split())), name
 
 
 def test_other_settings_are_settings_and_not_the_usual_ones() -> None:

@@ -14,7 +14,6 @@ from effect_checks import as_matrices
 import femubench
 from femubench import NotApplicable
 from femubench.core.cli.main import bench
-from femubench.core.library.rank import request_of
 from femubench.core.plugin.loader import list_effects, load_plugins
 from femubench.core.run.store import Store
 from femubench.effect import textbook_model
@@ -66,25 +65,6 @@ def test_as_a_strategy_it_looks_at_no_data() -> None:
     assert abs(one.stiffness - other.stiffness).max() == 0.0
     errors = {name: block.rms_percent for name, block in score_model(case, one).items()}
     assert errors["used"] < 0.5 * score_model(case, case.model)["used"].rms_percent
-
-
-def test_a_run_from_the_textbook_model_measures_against_it(tmp_path: Path) -> None:
-    wanted = ("frame", ["unchanged", "textbook"])
-    drawn = femubench.rank(*wanted, jobs=1, store=tmp_path, nominal="drawn")
-    repaired = femubench.rank(*wanted, jobs=1, store=tmp_path, nominal="textbook")
-    jobs = {
-        run.meta["request"]["nominal"]: run.table.set_index("strategy") for run in (drawn, repaired)
-    }
-    # Both runs measure against the textbook model, from wherever they start.
-    assert jobs["drawn"].loc["unchanged", "gain"] < -0.5
-    assert jobs["drawn"].loc["textbook", "gain"] == pytest.approx(0.0, abs=1e-9)
-    assert jobs["textbook"].loc["textbook", "gain"] == pytest.approx(0.0, abs=1e-9)
-    unchanged = jobs["textbook"].loc["unchanged"]
-    assert unchanged["used_percent"] == jobs["drawn"].loc["textbook", "used_percent"]
-    assert request_of(repaired).nominal == "textbook"
-    assert len({result.key for run in (drawn, repaired) for result in run.results}) == 4
-    again = femubench.rank(jobs=1, store=tmp_path, resume=True, overwrite="missing")
-    assert again.meta["request"]["nominal"] == "textbook"
 
 
 def test_a_run_starts_from_both_models_and_ranks_from_the_textbook_one(tmp_path: Path) -> None:

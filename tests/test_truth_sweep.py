@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import truth_sweep as sweep
-from ceiling import ceiling
 
 from femubench import read_case
 from femubench.core.challenge.truth_file import KnownCase, TrueCause, is_held
-from femubench.core.diagnosis import diagnose as diagnosing
-from femubench.core.plugin.loader import load_plugins
-from truths.truth_text import truth_text
 
 ROOT = Path(__file__).parents[1]
 LOOSE = TrueCause("a loose joint", "joint-rotation", "J1", ("joint-rotation@J9", "joint-offset@J1"))
@@ -87,17 +80,6 @@ def test_outcome_of_a_pair(same: sweep.Same) -> None:
     assert sweep.outcome(twice, said("named", "joint-rotation@J1"), same) == "one of two"
 
 
-def test_one_cause_may_show_as_two_findings(same: sweep.Same) -> None:
-    """A thinner wall is less stiffness and less mass of one member."""
-    also = ("member-stiffness@rung-middle", "member-mass@rung-middle")
-    thin = truth("defect", TrueCause("thin", "wall-thickness", "rung-middle", also))
-    both = ("member-stiffness@rung-middle", "member-mass@rung-middle")
-    assert sweep.outcome(thin, said("named", *both), same) == "right"
-    assert sweep.outcome(thin, said("ambiguous", " + ".join(both)), same) == "in the group"
-    elsewhere = ("member-stiffness@rung-middle", "member-mass@rung-left")
-    assert sweep.outcome(thin, said("named", *elsewhere), same) != "right"
-
-
 def test_textbook_values_are_no_finding(same: sweep.Same) -> None:
     defect, clean = truth("defect", LOOSE), truth("clean")
     record = said("named", "joint-rotation@J1", "shear-deformation@all")
@@ -152,31 +134,6 @@ def test_tables_count_both_halves_apart() -> None:
     assert "| 1 | 0.0 % | 0.0 to 79.3 % |" in text
 
 
-@pytest.fixture
-def task(tmp_path: Path) -> sweep.Task:
-    room = tmp_path / "x"
-    room.mkdir()
-    (room / "truth.toml").write_text(truth_text(truth("defect", LOOSE)), encoding="utf-8")
-    shutil.copyfile(ROOT / "scenarios" / "frame-solid" / "modes.csv", room / "modes.csv")
-    return sweep.Task(room, ROOT / "scenarios", False, 0.1)
-
-
-def test_failures_are_outcomes(task: sweep.Task, monkeypatch: pytest.MonkeyPatch) -> None:
-    def forever(case: object) -> None:
-        while True:
-            with suppress(Exception):  # as a search that goes on after every error
-                sum(range(1000))
-
-    def fails(case: object) -> None:
-        raise ZeroDivisionError("as it were")
-
-    monkeypatch.setattr(diagnosing, "diagnose", forever)
-    assert sweep.diagnosed(task, task.key)["verdict"] == "too-long"
-    monkeypatch.setattr(diagnosing, "diagnose", fails)
-    record = sweep.diagnosed(task, task.key)
-    assert (record["verdict"], record["error"]) == ("error", "ZeroDivisionError: as it were")
-
-
 def test_stated_probabilities_and_sizes(same: sweep.Same) -> None:
     heavy = replace(CLAMP, size=0.3, unit="kg")
     record = said("ambiguous", "added-mass@rung-middle@0.5", "density@all", p=0.6)
@@ -223,25 +180,3 @@ def test_a_fault_is_judged_by_the_faults_that_are_named(same: sweep.Same) -> Non
             outcome,
             companions,
         )
-
-
-def test_what_data_could_name() -> None:
-    """Frequencies alone tell a mass in the middle, and no corner from the one opposite."""
-    case = read_case(ROOT / "scenarios" / "frame-solid")
-    seen = case.measurement
-    seen = replace(seen, shapes=seen.shapes * np.nan, frequency_std=1e-3 * seen.frequencies)
-    before = replace(seen, frequencies=1.03 * seen.frequencies)
-    case = replace(case, measurement=seen, reference=before, tolerance=0.0, model_error=0.0)
-    effects = {"added-mass": load_plugins().effects["added-mass"]}
-
-    def found(place: str, size: float) -> list[str]:
-        mass = TrueCause("a mass", "added-mass", place, size=size, unit="kg")
-        cells = list(ceiling(case, truth("defect", mass), effects))
-        return [cells[0]["class"], cells[-1]["twice"]]
-
-    assert found("rung-middle@0.5", 0.2) == ["nameable", "nameable"]
-    assert found("J1", 0.2) == ["in a group", "in a group"]
-    assert found("J1", 1e-4) == ["invisible", "invisible"]
-    assert found("nowhere", 0.2) == ["outside", "outside"]
-    case = replace(case, reference=seen)
-    assert found("rung-middle@0.5", 0.2) == ["invisible", "nameable"]

@@ -101,16 +101,6 @@ def test_a_case_is_the_files_of_the_truth_over_those_of_the_structure(
     assert "# of the largest component" in (tmp_path / "case" / "case.toml").read_text()
 
 
-def test_a_reference_is_written_where_it_is_asked_for(tmp_path: Path, suite: Path) -> None:
-    modes = (suite / "frame-solid" / "modes.csv").read_text(encoding="utf-8")
-    room = written(tmp_path, healthy_csv=modes)
-    pose(room, tmp_path / "case", True, suite=suite)
-    assert (tmp_path / "case" / "healthy.csv").read_text(encoding="utf-8") == modes
-    text = (tmp_path / "case" / "case.toml").read_text(encoding="utf-8")
-    assert '[reference]\nmodes = "healthy.csv"\n' in text
-    assert "modification" not in text
-
-
 def test_what_cannot_be_posed_is_one_line(tmp_path: Path, suite: Path) -> None:
     room = written(tmp_path)
     with pytest.raises(InputError, match=r"there is no reference \(expected a file healthy.csv\)"):
