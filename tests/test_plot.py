@@ -33,6 +33,7 @@ from femubench.core.schema.diagnosis import LocationRow, ResidualRow
 from femubench.core.schema.results import JobResult
 from femubench.modal import mac
 from femubench.plot import wireframe_of
+from femubench.results import Block, PairedMode
 from femubench.scenarios import HERE
 
 
@@ -135,6 +136,18 @@ class TestMac:
         assert ax.get_ylabel() == "measured mode: frequency, Hz"
 
 
+def test_receptance_of_the_case_and_of_models(frame: Case) -> None:
+    softer = UpdateResult(replace(frame.model, stiffness=0.81 * frame.model.stiffness))
+    ax = plot.receptance(frame, {"softer": softer})
+    assert labels(ax) == ["measured modes", "nominal model", "softer"]
+    _, nominal, soft = (line.get_xydata() for line in ax.get_lines())
+    first = solve_modes(frame.model).elastic.natural_frequencies[0]
+    for curve, top in ((nominal, first), (soft, 0.9 * first)):
+        near = np.abs(curve[:, 0] - top) < 0.05 * top
+        peak = curve[near][np.argmax(curve[near, 1]), 0]
+        assert abs(peak - top) <= np.diff(curve[:2, 0])[0]
+
+
 class TestUpdating:
     def test_convergence_of_a_result(self) -> None:
         ax = plot.convergence(update())
@@ -156,6 +169,24 @@ class TestUpdating:
         (segment,) = bars.get_segments()  # type: ignore[attr-defined]
         np.testing.assert_allclose(segment, [[-11.0, 0.0], [-9.0, 0.0]])
         assert ax.get_xlabel() == "change, %"
+
+
+def test_calibration_is_the_share_of_modes_in_each_interval() -> None:
+    """One mode 0.5 and one 2 deviations off: in intervals from 0.383 and 0.954 on."""
+    modes = tuple(PairedMode(k, 100.0, 100.0 + d, 1.0, None, 1.0) for k, d in ((1, 0.5), (2, 2.0)))
+    blocks = {"higher": Block(1.0, 1.0, modes)}
+    ax = plot.calibration(run(results=(JobResult("a", "sure", 0, "ok", blocks=blocks),)))
+    (line,) = (line for line in ax.get_lines() if line.get_label() == "sure")
+    levels, observed = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+    assert observed == pytest.approx(0.5 * (levels > 0.383) + 0.5 * (levels > 0.954))
+    with pytest.raises(InputError, match="no strategy of the run says how sure it is"):
+        plot.calibration(run())
+
+
+def test_error_against_cost() -> None:
+    physical, unphysical = plot.error_against_cost(run(), error="used_percent").get_lines()
+    assert physical.get_xydata() == pytest.approx(np.array([[0.1, 1.0], [1.0, 2.0]]))
+    assert unphysical.get_xydata() == pytest.approx(np.array([[10.0, 3.0]]))
 
 
 class TestResiduals:

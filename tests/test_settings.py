@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from diagnosis_problems import effects_named
 
 from femubench.core.challenge.draw import draw_case
 from femubench.core.cli.main import bench
@@ -89,11 +90,12 @@ def test_what_cannot_be_set_gives_one_line(word: str, what: str, expected: str) 
 
 def test_a_verdict_moves_with_its_decision_and_a_note_says_so() -> None:
     case = draw_case(1001, "A", structure="ladder", hidden="none").case
-    plain = diagnose(case, pairs=False, faults=())
+    sought = effects_named("added-mass", "joint-rotation")
+    plain = diagnose(case, sought, pairs=False, faults=())
     assert plain.verdict == "none"
     assert not any("Settings" in note for note in plain.notes)
     with overridden({"nothing_missing": 0.999}):
-        moved = diagnose(case, pairs=False, faults=())
+        moved = diagnose(case, sought, pairs=False, faults=())
     assert moved.verdict != "none"
     assert moved.nothing == plain.nothing < 0.999
     assert moved.notes[-1] == "Settings other than the standard ones: nothing_missing = 0.999."

@@ -168,6 +168,8 @@ class TestRun:
         assert broken["gain"] == 0.0  # as the model that was given
         part = Run(spied.meta, spied.results[1:])
         assert gain_by(part, "spy.factor")["missing"].tolist() == [1, 0, 0]
+        with pytest.raises(InputError, match="no axis 'nois'; did you mean 'noise'"):
+            gain_by(spied, "nois")
 
     def test_report_in_every_format(self, spied: Run) -> None:
         plugins = load_plugins()
