@@ -62,6 +62,17 @@ def under(**kernel: str) -> Any:
     return json.loads(answer.stdout)
 
 
+@pytest.mark.nightly
+def test_two_kernels_give_one_answer() -> None:
+    """The processor's own and one that every x86-64 has; where there is no other, the same."""
+    one, two = under(), under(OPENBLAS_CORETYPE="Nehalem")
+    for name in CASES:
+        assert one[name][0] == two[name][0], name
+        np.testing.assert_allclose(one[name][1], two[name][1], rtol=1e-8)
+    assert one["said"] == two["said"]
+    assert one["rivals"] == two["rivals"]
+
+
 @pytest.mark.parametrize("name", ["frame-solid", "hframe"])
 def test_the_sensitivity_method_stops_where_it_would_without_rounding(
     name: str, monkeypatch: pytest.MonkeyPatch
