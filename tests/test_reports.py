@@ -158,15 +158,6 @@ class TestTerminal:
         assert [row[6:9] for row in rows[1:4]] == [["0", "of", "1"]] * 3
         assert "some models lost rigid-body modes or have negative eigenvalues" in text
 
-    def test_several_seeds_show_an_interval_and_gather_failures(self) -> None:
-        results = [result("good", 0.1 + 0.1 * seed, seed=seed) for seed in range(5)]
-        failed = [replace(FAILED, seed=seed) for seed in range(5)]
-        text = TerminalReporter().render(run_of(*results, *failed))
-        assert "95 % interval" in text
-        assert re.search(r"good +0\.\d{3} +0\.\d{3} to 0\.\d{3}", text)
-        assert re.search(r"broken +0, 1, 2, +failed", text)
-        assert text.count("measured 3e-2") == 1
-
     def test_failures_are_told_and_counted(self) -> None:
         text = TerminalReporter().render(RUN)
         assert re.search(r"beam +broken +0 +failed +stiffness: measured 3e-2,", text)

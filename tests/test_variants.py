@@ -17,10 +17,6 @@ from femubench.plugins.strategies.unchanged import Unchanged
 KNOWN: dict[str, Strategy] = {s.name: s for s in (GenericLS(), Spring(), Unchanged())}
 
 
-def test_a_plain_name_is_the_strategy_itself() -> None:
-    assert strategy_of("generic-ls", KNOWN) is KNOWN["generic-ls"]
-
-
 def test_options_are_set_and_told_by_the_name() -> None:
     words = "generic-ls:orthogonality=false, plain=full"
     found = strategy_of(words, KNOWN)
