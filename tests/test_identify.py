@@ -37,14 +37,6 @@ def found(small: Any) -> Identification:
 
 
 @pytest.mark.slow(5)
-def test_all_modes_of_a_full_set_are_found() -> None:
-    truth = frf_set(1)
-    judged = score(truth, identify(truth.measured))
-    assert judged.within
-    assert judged.extra == 0
-
-
-@pytest.mark.slow(5)
 def test_stated_deviations_are_those_of_repeats(small: Any) -> None:
     """The scatter over several structures, in stated deviations; chance gives 0.7 to 1.3."""
     scores = [score(s, identify(s.measured)) for s in (frf_set(k, **SMALL) for k in range(20, 25))]

@@ -5,7 +5,6 @@ Environments are virtual ones with links to the installed dependencies, so that 
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
@@ -100,6 +99,7 @@ def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def built(kind: str, source: Path, output: Path, python: Path) -> Path:
     """Build a "wheel" or an "sdist" from a source folder."""
     code = f"import sys; from setuptools import build_meta as b; b.build_{kind}(sys.argv[1])"
+    output.mkdir()
     succeeded(python, "-c", code, output, cwd=source)
     (file,) = output.iterdir()
     return file
@@ -107,19 +107,11 @@ def built(kind: str, source: Path, output: Path, python: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def archives(clone: Path, python: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Return a wheel of the clone, an sdist of it, and a wheel of the sdist."""
+    """Return a wheel of the clone, and the source that it was built of."""
     folder = tmp_path_factory.mktemp("built")
     source = Path(shutil.copytree(clone, folder / "source", symlinks=True))
     (source / "femubench-results").mkdir(exist_ok=True)  # of a run; no package
-    for name in ("wheel", "sdist", "again"):
-        (folder / name).mkdir()
-    wheel = built("wheel", source, folder / "wheel", python)
-    sdist = built("sdist", source, folder / "sdist", python)
-    with tarfile.open(sdist) as archive:
-        assert not [member.name for member in archive if member.issym() or member.islnk()]
-    succeeded(python, "-m", "tarfile", "-e", sdist, folder / "extracted", cwd=folder)
-    (extracted,) = (folder / "extracted").iterdir()
-    return [wheel, sdist, built("wheel", extracted, folder / "again", python)]
+    return [built("wheel", source, folder / "wheel", python), source]
 
 
 def contents(wheel: Path) -> dict[str, bytes]:
@@ -129,12 +121,6 @@ def contents(wheel: Path) -> dict[str, bytes]:
         assert not [entry for entry in entries if stat.S_ISLNK(entry.external_attr >> 16)]
         assert len({entry.filename for entry in entries}) == len(entries)
         return {entry.filename: archive.read(entry) for entry in entries}
-
-
-def test_clone_needs_no_install(clone: Path, python: Path) -> None:
-    code = "import femubench, femubench.core.cli.main as m; print(femubench.__file__, m.__file__)"
-    files = (clone / "femubench" / "__init__.py", clone / "femubench" / "core" / "cli" / "main.py")
-    assert succeeded(python, "-c", code, cwd=clone).split() == list(map(str, files))
 
 
 def test_clone_finds_its_own_plugins(clone: Path, python: Path) -> None:
@@ -162,8 +148,15 @@ def test_wheel_holds_every_file_once(clone: Path, archives: list[Path]) -> None:
     assert {name: wheel[name] for name in wheel if ".dist-info/" not in name} == expected
 
 
-def test_sdist_builds_the_same_wheel(archives: list[Path]) -> None:
-    wheel, _, again = archives
+@pytest.mark.nightly
+def test_sdist_builds_the_same_wheel(archives: list[Path], python: Path, tmp_path: Path) -> None:
+    wheel, source = archives
+    sdist = built("sdist", source, tmp_path / "sdist", python)
+    with tarfile.open(sdist) as archive:
+        assert not [member.name for member in archive if member.issym() or member.islnk()]
+    succeeded(python, "-m", "tarfile", "-e", sdist, tmp_path / "extracted", cwd=tmp_path)
+    (extracted,) = (tmp_path / "extracted").iterdir()
+    again = built("wheel", extracted, tmp_path / "again", python)
     assert contents(again) == contents(wheel)
 
 
@@ -180,6 +173,7 @@ def test_wheel_works_where_it_is_installed(archives: list[Path], tmp_path: Path)
     assert "frame" in shown
 
 
+@pytest.mark.nightly
 def test_install_by_link_leads_to_the_clone(clone: Path, tmp_path: Path) -> None:
     python = environment(tmp_path / "venv")
     pip = (python, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps")
@@ -199,51 +193,8 @@ def test_without_links_the_import_says_so(without_links: Path, python: Path) -> 
         assert f"ImportError: {NO_LINKS}" in result.stderr.splitlines()[-1]
 
 
-def test_without_links_nothing_is_built(without_links: Path, python: Path, tmp_path: Path) -> None:
-    words = ("-m", "pip", "wheel", "--no-index", "--no-deps", "--no-build-isolation")
-    result = done(python, *words, "--wheel-dir", tmp_path, without_links, cwd=tmp_path)
-    assert result.returncode == 1
-    assert (result.stdout + result.stderr).count(NO_LINKS) == 1
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_without_links_make_says_so(without_links: Path) -> None:
     result = done("make", "run", cwd=without_links)
     assert (result.returncode, result.stdout) == (2, "")
     (line,) = result.stderr.splitlines()
     assert NO_LINKS in line
-
-
-def test_make_installs_anew_only_with_other_dependencies(clone: Path, tmp_path: Path) -> None:
-    def steps(target: str) -> str:
-        return succeeded("make", "--dry-run", target, f"VENV={tmp_path}", cwd=clone)
-
-    (tmp_path / "bin").mkdir()
-    (tmp_path / "bin" / "python").touch()
-    assert "install --quiet -e ." in steps("run")
-    for mark in (".installed", ".installed-test"):
-        (tmp_path / mark).touch()
-    now = (tmp_path / ".installed").stat().st_mtime
-    os.utime(clone / "pyproject.toml", (now - 10, now - 10))
-    os.utime(clone / "core" / "errors.py", (now + 10, now + 10))
-    assert "bench run" in steps("run")
-    assert "bin/pytest" in steps("test")
-    assert "-m pip" not in steps("run") + steps("test")
-    os.utime(clone / "pyproject.toml", (now + 10, now + 10))
-    assert "install --quiet -e '.[test]'" in steps("test")
-
-
-@pytest.mark.nightly
-def test_coverage_finds_the_files_through_the_links(clone: Path, python: Path) -> None:
-    coverage = (python, "-m", "coverage")
-    tests = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/test_sections.py")
-    succeeded(*coverage, "run", "--source=femubench", *tests, cwd=clone)
-    report = json.loads(succeeded(*coverage, "json", "-q", "-o", "/dev/stdout", cwd=clone))
-    measured = report["files"]
-    assert measured["core/fem/sections.py"]["summary"]["percent_covered"] > 80.0
-    sources = {
-        str(path.relative_to(clone)) for room in ROOMS for path in (clone / room).rglob("*.py")
-    }
-    facade = {f"femubench/{path.name}" for path in (clone / "femubench").glob("*.py")}
-    assert measured.keys() - sources == facade
-    assert sources <= measured.keys()

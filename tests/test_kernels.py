@@ -73,7 +73,7 @@ def test_two_kernels_give_one_answer() -> None:
     assert one["rivals"] == two["rivals"]
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", ["frame-solid", "hframe"])
 def test_the_sensitivity_method_stops_where_it_would_without_rounding(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -88,7 +88,7 @@ def test_the_sensitivity_method_stops_where_it_would_without_rounding(
         return counter.count, result.parameters[0].after
 
     count, value = run()
-    for seed in range(5):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
 
         def rounded(
@@ -133,7 +133,7 @@ def test_a_drawn_shape_has_one_sign() -> None:
     np.testing.assert_allclose(*found, atol=1e-9)
 
 
-@pytest.mark.slow(5)
+@pytest.mark.nightly
 def test_mirrored_places_are_said_to_tie() -> None:
     """Frequencies alone cannot tell the front of a table from its back."""
     said = diagnose(draw_case(4005, "C", structure="table", effect="member-mass").case)

@@ -60,7 +60,7 @@ def test_the_table_of_whole_sets_says_the_same_as_the_page() -> None:
             assert as_printed(next(numbers)) == figure
 
 
-@pytest.mark.slow(60)
+@pytest.mark.nightly
 def test_what_an_optimiser_finds_on_some_structures_is_no_better_on_others() -> None:
     found = mean_gain(problems(*SOME), search(problems(*OTHERS)))["gain"]
     assert found <= mean_gain(problems(*SOME), MAKERS["shifted"])["gain"] + 0.02

@@ -125,7 +125,7 @@ def test_frequencies_alone_find_the_class_of_mirror_images(asymmetric_ladder: Fr
     assert right >= 8
 
 
-@pytest.mark.parametrize("joint", range(6))
+@pytest.mark.parametrize("joint", [0, 4])
 def test_an_added_mass_shows_at_its_joint(ladder: FrameBuilder, joint: int) -> None:
     nominal, name = ladder(polar=False, accelerometer=False), "ABCDEF"[joint]
     fine = ladder(polar=False, accelerometer=False, elements=8)
@@ -195,19 +195,6 @@ def test_a_soft_joint_shows_in_its_springs(ladder: FrameBuilder) -> None:
     assert ranking(rows, "energy-error", tuple("ABCDEF"))[0] == "D"
 
 
-def test_every_kind_of_place_is_scaled_to_one(ladder: FrameBuilder) -> None:
-    frame = ladder(polar=False)
-    truth, _ = damaged(ladder(polar=False, elements=8), np.random.default_rng(2))
-    rows = locate(Model.of(frame), measured(truth, 0, f_std=1e-3, std=0.01))
-    for indicator in ("force-residual", "energy-error", "mdlac"):
-        for names in (members_of(frame), elements_of(frame)):
-            values = [r.value for r in rows if r.indicator == indicator and r.place in names]
-            assert len(values) == len(names)
-            assert max(values) == 1.0
-            assert min(values) >= 0.0
-    assert len([r for r in rows if r.indicator == "ecomac"]) == 13
-
-
 def test_an_exact_model_has_no_place(ladder: FrameBuilder) -> None:
     frame = ladder()
     # The correction for the mesh would be an error of its own here: the truth has this mesh.
@@ -255,24 +242,6 @@ def test_a_pair_of_matrices_has_nodes_and_groups(ladder: FrameBuilder) -> None:
     places = tuple(f"group:{name}" for name in groups)
     assert ranking(rows, "energy-error", places)[0] == f"group:{place.partition('/')[0]}"
     assert len(structure.properties) == n
-
-
-def test_a_frame_in_space(portal: FrameBuilder) -> None:
-    frame = portal(1, elements=3)
-    points = np.array([joint.xyz for joint in frame.joints])
-    xyz = np.repeat(points, 3, axis=0)
-    sensors = Sensors(tuple(f"q{k}" for k in range(len(xyz))), xyz, ("x", "y", "z") * len(points))
-    truth = Model.of(replace(frame, factors=(Factor("E", ("m6",), 0.7),)))
-    modes = solve_modes(truth).elastic
-    shapes = np.asarray(truth.observe(sensors) @ modes.shapes[:, :6])
-    shapes = shapes / np.abs(shapes).max(axis=0)
-    f = modes.natural_frequencies[:6]
-    noise = np.full(shapes.shape, 1e-3)
-    numbers = tuple(range(6))
-    data = Measurement(sensors, numbers, f, 1e-4 * f, np.full(6, np.nan), shapes, noise)
-    # The mesh of the truth is the model's, so the model is not refined either.
-    rows = locate(Model.of(frame), data)
-    assert ranking(rows, "energy-error", members_of(frame))[0] == "m6"
 
 
 def _softer(labels: tuple[str, ...]) -> Property:

@@ -22,7 +22,7 @@ def clean(ladder: FrameBuilder) -> Frame:
     return ladder("timoshenko", polar=False, elements=8)
 
 
-@pytest.mark.parametrize("relative", [0.0, 1e-7, 0.4, np.nan])
+@pytest.mark.parametrize("relative", [1e-7, 0.4, np.nan])
 def test_absurd_deviations_are_found(clean: Frame, relative: float) -> None:
     model = Model.of(clean)
     data = measured(model)
@@ -43,28 +43,19 @@ def test_two_sensors_at_one_place(clean: Frame) -> None:
     assert "s3" in warning.what
 
 
-@pytest.mark.parametrize(("sensor", "gain"), [(0, -1.0), (7, -1.0), (5, 0.3), (9, 3.0), (12, 10.0)])
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(("sensor", "gain"), [(0, -1.0), (5, 0.3), (12, 10.0)])
 def test_a_sensor_with_another_gain_is_found(
-    asymmetric_ladder: FrameBuilder, sensor: int, gain: float, seed: int
+    asymmetric_ladder: FrameBuilder, sensor: int, gain: float
 ) -> None:
     model = Model.of(asymmetric_ladder(polar=False))
     truth = Model.of(asymmetric_ladder(softness=2.0, elements=8))  # also the wrong torsion constant
-    data = measured(truth).with_noise(np.random.default_rng(seed))
+    data = measured(truth).with_noise(np.random.default_rng(0))
     data.shapes[sensor] *= gain
     (warning,) = texts(look(model, data), "other sensors")
     assert warning.where == f"s{sensor}"
 
 
-def test_two_wrong_sensors_are_found(ladder: FrameBuilder) -> None:
-    data = measured(Model.of(ladder(elements=8)))
-    data.shapes[2] *= -1.0
-    data.shapes[11] *= 0.25
-    found = texts(look(Model.of(ladder()), data), "other sensors")
-    assert {w.where for w in found} == {"s2", "s11"}
-
-
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_no_sensor_is_blamed_for_an_error_of_the_model(ladder: FrameBuilder, seed: int) -> None:
     rng = np.random.default_rng(seed)
     truth = ladder(polar=bool(seed % 2), elements=8)

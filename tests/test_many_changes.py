@@ -76,10 +76,10 @@ def elastic_gap(found: Modes, expected: Modes) -> float:
 
 
 @pytest.mark.slow(5)
-def test_a_hundred_changes_are_those_of_full_solutions(small: Model) -> None:
+def test_forty_changes_are_those_of_full_solutions(small: Model) -> None:
     many = many_changes(small, COUNT)
     proven = 0
-    for masses, springs in drawn(small, 100, seed=5):
+    for masses, springs in drawn(small, 40, seed=5):
         changed = small.attach(masses, springs)
         expected = solve_modes(changed, COUNT)
         found = many.proven(masses, springs, COUNT)
@@ -88,7 +88,7 @@ def test_a_hundred_changes_are_those_of_full_solutions(small: Model) -> None:
         assert elastic_gap(found, expected) < 1e-5
         gram = found.shapes.T @ changed.mass @ found.shapes
         np.testing.assert_allclose(gram, np.eye(COUNT), atol=1e-9)
-    assert proven >= 95
+    assert proven >= 38
 
 
 def test_one_solution_and_one_factorisation_serve_all(
@@ -105,9 +105,9 @@ def test_one_solution_and_one_factorisation_serve_all(
 
     monkeypatch.setattr(module, "solve_modes", counted("solutions", solve_modes))
     monkeypatch.setattr(module, "ShiftedModel", counted("factorisations", module.ShiftedModel))
-    changes = [change for i, change in enumerate(drawn(block, 40, seed=6)) if i % 5 < 2]
+    changes = [change for i, change in enumerate(drawn(block, 20, seed=6)) if i % 5 < 2]
     found = modes_of_changes(block, changes, COUNT)
-    assert len(found) == 16
+    assert len(found) == 8
     assert made == {"solutions": 1, "factorisations": 1}
     for change, modes in zip(changes, found, strict=True):
         assert elastic_gap(modes, solve_modes(block.attach(*change), COUNT)) < 1e-5
@@ -166,13 +166,3 @@ def test_matrices_without_a_frame_and_a_frame_on_supports(block: Model) -> None:
             "ij,ij->j", found.shapes, model.attach(*change).mass @ expected.shapes
         )[~expected.rigid]
         np.testing.assert_allclose(np.abs(likeness), 1.0, atol=1e-5)
-
-
-def test_answers_that_fill_the_memory_are_not_sought(
-    block: Model, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    change = [PointMass(Place(joint=block.frame_structure.frame.joints[0].name), 0.1)], []
-    many = many_changes(block, COUNT)
-    assert many.proven(*change, COUNT) is not None
-    monkeypatch.setattr(module, "_MOST_NUMBERS", block.size)
-    assert many.proven(*change, COUNT) is None

@@ -10,10 +10,8 @@ import pytest
 
 from femubench import InputError, Measurement, Sensors, read_case
 from femubench.core.case.case import Case
-from femubench.core.case.matching import parse_frame
 from femubench.core.case.writing import write_case
 from femubench.core.errors import FemubenchError
-from femubench.core.modal.eigen import modes_of
 
 CASES = Path(__file__).parent / "cases"
 PLACES = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.5], [0.75, 0.0, 1.1], [1.5, 0.0, 0.6]])
@@ -114,13 +112,6 @@ def test_frames_that_are_none(tmp_path: Path, text: str) -> None:
         read(tmp_path, Reader(PLACES), f'frame = "{text}"')
 
 
-def test_frames_are_rotations() -> None:
-    for text in ("x,z,-y", "-x,-y,z", "y,z,x"):
-        turn = parse_frame(text)
-        np.testing.assert_array_equal(turn @ turn.T, np.eye(3))
-        assert np.linalg.det(turn) == 1.0
-
-
 def test_two_sensors_at_one_place_and_direction(tmp_path: Path) -> None:
     shared = PLACES.copy()
     shared[1] = PLACES[0] + np.array([-0.01, 0.0, 0.0])
@@ -149,17 +140,6 @@ def test_what_would_fit_is_told(tmp_path: Path, xyz: np.ndarray, keys: str, advi
 def test_a_test_of_a_small_part_is_told(tmp_path: Path) -> None:
     case = read(tmp_path, Reader(PLACES[0] + 0.02 * (PLACES - PLACES[0])))
     assert any("the structure 1.92 m: is one of the units wrong?" in note for note in case.notes)
-
-
-def test_oblique_sensor_reads_the_projection(tmp_path: Path) -> None:
-    """A reading along an oblique axis is the projection of the motion, in frames and matrices."""
-    case = read_case(CASES / "3d")
-    at = np.repeat(case.measurement.sensors.xyz[:1], 4, axis=0)
-    axis = np.array([2.0, -1.0, 2.0]) / 3.0
-    sensors = Sensors(tuple("abcd"), at, ("x", "y", "z", "2 -1 2"))
-    motion = modes_of(case.model).shapes[:, :4]
-    found = case.model.observe(sensors) @ motion
-    np.testing.assert_allclose(found[3], axis @ found[:3], atol=1e-12 * np.abs(found).max())
 
 
 def test_oblique_direction_in_a_table(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.plugin.loader import load_plugins
 from tests.lattices import lattice
 
-QUICK = ("baruch", "berman", "eigensensitivity")
+QUICK = ("baruch", "berman")
 # What solves equations for the entries or the elements of the matrices has limits of its own.
 OTHERS = ("kabe", "nobari", "generic", "physical")
 USED = 5

@@ -99,12 +99,6 @@ def test_a_case_names_variables_and_takes_stated_deviations(tmp_path: Path) -> N
     assert np.isnan(m.shapes[1]).all()
 
 
-def test_complex_shapes_come_through_a_file(tmp_path: Path) -> None:
-    scipy.io.savemat(tmp_path / "test.mat", {"f": HERTZ, "phi": SHAPES * np.exp(0.7j)})
-    found = MatlabReader().read_modes(tmp_path / "test.mat").shapes
-    np.testing.assert_allclose(np.abs(found), np.abs(SHAPES), rtol=1e-9)
-
-
 def test_names_that_are_not_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"no variable 'peaks' .*f"):
         case_of(tmp_path, 'variables = {frequencies = "peaks"}', f=HERTZ)

@@ -21,7 +21,6 @@ from femubench.core.inference.model_error import (
     class_widths,
     condition_noise,
     error_slopes,
-    kind,
 )
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.prior import Base
@@ -245,10 +244,6 @@ def test_a_cause_beside_a_model_error_keeps_its_size(
     blurred = fit(replace(present, noise=alone.noise(alone.fit(nothing))), (part,), np.array([0.3]))
     assert blurred is not None
     assert blurred.covariance[0, 0] > found.covariance[0, 0]
-
-
-def test_shapes_share_a_width_whatever_their_mode(slopes: dict[str, FloatArray]) -> None:
-    assert {kind(name) for name in slopes} == set(WIDTHS)
 
 
 def test_what_a_cause_changes_may_be_off_by_a_share_of_it(

@@ -13,8 +13,6 @@ from femubench.core.case.schema import LengthUnit
 from femubench.core.case.units import from_si, in_si
 from femubench.fem import GroundSpring, JointSpring, Oscillator, Place, PointMass, matrix_model
 
-KILO = 1e3  # kg in a tonne
-
 
 def laden_frame() -> Model:
     """Return a frame with what has units of its own: masses on arms, springs, oscillators."""
@@ -55,18 +53,6 @@ def test_what_an_update_changed_in_the_matrices_stays() -> None:
     for role in ("mass", "stiffness"):
         one, other = getattr(back, role), getattr(updated, role)
         assert abs(one - other).max() < 1e-12 * abs(other).max()
-
-
-def test_millimetres_are_those_of_tonnes_and_megapascals() -> None:
-    model = laden_frame()
-    frame = from_si(model, "mm").frame_structure.frame
-    origin = model.frame_structure.frame
-    steel, before = frame.members[0].material, origin.members[0].material
-    assert pytest.approx(before.E / 1e6) == steel.E
-    assert steel.rho == pytest.approx(before.rho / KILO / 1e9)
-    assert frame.springs[0].stiffness == pytest.approx(30.0)  # N/mm
-    assert frame.springs[1].stiffness == pytest.approx(2e6)  # N mm
-    assert frame.masses[0].mass == pytest.approx(3e-4)
 
 
 def test_a_spring_of_one_pound_an_inch() -> None:

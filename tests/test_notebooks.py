@@ -20,7 +20,6 @@ NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 # Its data are not ours to ship: who has none of them reads the outputs.
 BRIDGE = ROOT / "examples" / "8-footbridge.ipynb"
 BRIDGE_DATA = Path(os.environ.get(VARIABLE, ROOT.parent / "shared" / "data" / "bridge"))
-OWN = [path for path in NOTEBOOKS if path != BRIDGE]
 ENDLESS = 600  # s of a processor, for a whole notebook
 
 
@@ -32,10 +31,6 @@ def code(path: Path) -> list[str]:
     """Return the code cells as Python, magics left out."""
     cells = [cell.source for cell in read(path).cells if cell.cell_type == "code"]
     return ["\n".join(x for x in cell.splitlines() if x[:1] != "%") for cell in cells]
-
-
-def test_there_are_eight() -> None:
-    assert [path.name[0] for path in NOTEBOOKS] == list("12345678")
 
 
 @pytest.mark.nightly
@@ -69,59 +64,17 @@ def test_it_runs(path: Path, tmp_path: Path) -> None:
     assert any("image/png" in output.get("data", {}) for output in outputs)
 
 
-@pytest.mark.parametrize("path", OWN, ids=lambda path: path.stem)
-def test_it_is_kept_without_outputs(path: Path) -> None:
+def test_they_are_kept_as_they_were_typed_and_teach_facts_by_public_names() -> None:
     """So that a difference in git is one that somebody typed."""
-    assert not any(cell.get("outputs") for cell in read(path).cells)
-
-
-def test_the_footbridge_is_kept_with_small_outputs() -> None:
-    """What is kept of GPL data are tables of a few rows and two drawings."""
-    cells = [cell for cell in read(BRIDGE).cells if cell.cell_type == "code"]
-    outputs = [output for cell in cells for output in cell.outputs]
-    assert len(outputs) == len(cells) - 1  # of all but the imports
-    assert {output.output_type for output in outputs} == {"execute_result"}
-    drawings = [d for output in outputs if (d := output["data"].get("image/png"))]
-    assert len(drawings) == 2
-    assert max(map(len, drawings)) < 100_000
-    texts = [output["data"]["text/plain"] for output in outputs]
-    assert max(text.count("\n") for text in texts) < 8
-    assert not any("/tmp" in text for text in texts)
-
-
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_it_is_kept_as_it_was_typed(path: Path) -> None:
-    data = json.loads(path.read_text(encoding="utf-8"))
-    nbformat.validate(data)
-    for cell in data["cells"]:
-        assert cell.get("execution_count") is None
-        assert cell["metadata"] == {}
-    assert data["metadata"].keys() == {"kernelspec", "language_info"}
-    assert data["metadata"]["language_info"] == {"name": "python"}
-
-
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_it_teaches_facts_by_public_names(path: Path) -> None:
-    text = "\n".join(code(path))
-    assert text.count("\nassert ") + text.count("\n    assert ") >= 4
-    for private in ("femubench.core", "femubench.plugins", "femubench.papers", "seconds"):
-        assert private not in text
-
-
-@pytest.mark.nightly
-def test_pyright_finds_nothing(tmp_path: Path) -> None:
-    """It reads no notebooks: their cells are given to it as modules."""
+    assert [path.name[0] for path in NOTEBOOKS] == list("12345678")
     for path in NOTEBOOKS:
-        module = tmp_path / f"{path.stem.replace('-', '_')}.py"
-        module.write_text("\n\n".join(code(path)), encoding="utf-8")
-    settings = {
-        "include": ["."],
-        "extraPaths": [str(ROOT)],
-        "typeCheckingMode": "basic",
-        # A last expression is what a cell shows.
-        "reportUnusedExpression": False,
-    }
-    (tmp_path / "pyrightconfig.json").write_text(json.dumps(settings))
-    command = ("-m", "pyright", "--pythonpath", sys.executable, "--project", str(tmp_path))
-    done = subprocess.run([sys.executable, *command], capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout
+        data = json.loads(path.read_text(encoding="utf-8"))
+        nbformat.validate(data)
+        for cell in data["cells"]:
+            assert cell.get("execution_count") is None
+            assert cell["metadata"] == {}
+            assert path == BRIDGE or not cell.get("outputs")
+        text = "\n".join(code(path))
+        assert text.count("\nassert ") + text.count("\n    assert ") >= 4
+        for private in ("femubench.core", "femubench.plugins", "femubench.papers", "seconds"):
+            assert private not in text

@@ -9,7 +9,6 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
-import yaml
 
 import femubench
 from femubench.core.plugin.markers import PROJECT
@@ -46,18 +45,6 @@ def test_facade_gives_every_name_that_it_lists() -> None:
     assert set(femubench.__all__) <= set(dir(femubench))
     with pytest.raises(AttributeError, match="no attribute 'Stratgy'"):
         femubench.Stratgy  # noqa: B018
-
-
-def test_citation_says_what_the_project_says() -> None:
-    """The keys that the Citation File Format 1.2.0 requires; the version is left to the package."""
-    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
-    project = PYPROJECT["project"]
-    assert citation["cff-version"] == "1.2.0"
-    assert citation["title"].startswith(f"{project['name']}: ")
-    assert citation["message"]
-    assert citation["license"] == project["license"]
-    assert citation["keywords"] == project["keywords"]
-    assert citation["authors"] == project["authors"]
 
 
 def test_facade_says_the_same_to_python_and_to_type_checkers() -> None:

@@ -5,9 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,15 +13,13 @@ import pytest
 import scored
 from synthetic_run import synthetic_run
 
-from femubench.core.score.comparison import Against, compare_runs
-from femubench.core.score.statistics import Differences
 from femubench.papers.printed import read_printed
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.page import data as page
 from femubench.reports.page.data import page_data
 from femubench.reports.page.document import SCRIPTS, STYLES, asset, embed_json
 from femubench.reports.page.papers import papers_of
-from femubench.reports.page.rounding import compact_json, plain_data, round_figures
+from femubench.reports.page.rounding import compact_json
 from femubench.reports.runs import MarkdownReporter
 from femubench.results import (
     Block,
@@ -31,13 +27,11 @@ from femubench.results import (
     PairedMode,
     Rule,
     Run,
-    Standings,
     leaderboard,
     rank_results,
     run_to_json,
 )
 
-ASSETS = Path(__file__).parents[1] / "reports" / "page" / "assets"
 SMALL = synthetic_run(6, 8, seeds=2)
 
 
@@ -46,22 +40,6 @@ def data_in(html: str) -> dict[str, Any]:
     (text,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', html, re.S)
     found: dict[str, Any] = json.loads(text)
     return found
-
-
-def outcome_of(run: Run) -> Differences:
-    return Standings.of(run).apart
-
-
-def with_errors(table: Mapping[str, list[float]]) -> Run:
-    """Return a run with the given errors in percent, a case of one held-out mode a column."""
-    count = max(map(len, table.values()))
-    errors = {f"case-{n}": {"used": 1.0, "higher": 10.0} for n in range(count)}
-    results = [
-        scored.result(f"case-{n}", name, higher=error)
-        for name, own in table.items()
-        for n, error in enumerate(own)
-    ]
-    return scored.run(errors, results, strategies=list(table))
 
 
 class TestNumbers:
@@ -103,31 +81,6 @@ class TestNumbers:
             ]
             assert np.mean(gains) == pytest.approx(row["gain"], abs=1e-12)
 
-    def test_modes_of_the_first_seed(self) -> None:
-        found = data_in(HtmlReporter().render(SMALL))
-        first = {(r.case, r.strategy): r for r in SMALL.results if r.seed == 1}
-        assert found["details"]
-        for key, detail in found["details"].items():
-            c, s = map(int, key.split(":"))
-            result = first[found["cases"][c]["name"], found["strategies"][s]["name"]]
-            modes = [mode for block in result.blocks.values() for mode in block.modes]
-            assert [mode["mode"] for mode in detail["modes"]] == [mode.number for mode in modes]
-            assert [mode["predicted_hz"] for mode in detail["modes"]] == pytest.approx(
-                [mode.predicted_hz for mode in modes], rel=1e-6
-            )
-            assert len(detail["parameters"]) == len(result.parameters)
-            assert len(detail["history"]) == len(result.history)
-
-    def test_rounding(self) -> None:
-        assert [
-            round_figures(x, 4) for x in (1234.56, 0.000123456, 5, None, math.nan, "x", True)
-        ] == [*(1235, 0.0001235, 5, None, None, None, None)]
-        assert plain_data({"a": [math.inf, np.float64(2.0)]}) == {"a": [None, 2.0]}
-        deep: Any = []
-        for _ in range(20):
-            deep = [deep]
-        assert json.dumps(plain_data(deep)).count("[") == 8
-
     def test_a_page_keeps_to_its_size(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(page, "MOST_DETAILS", 20_000)
         found = page_data(SMALL)
@@ -161,61 +114,6 @@ class TestNumbers:
         run = Run(SMALL.meta, (replace(result, key="other"),))
         found = data_in(HtmlReporter().render_with(run, Shelf()))
         assert found["details"]["0:0"]["exhibit"] is None
-
-
-class TestStatistics:
-    def test_the_board_names_between_whom_a_difference_is_shown(self) -> None:
-        run = synthetic_run(12, 40)
-        found, rows = outcome_of(run), leaderboard(run).set_index("strategy")
-        assert len(found.pairs) == 12 * 11 / 2
-        for better, worse, p in found.pairs:
-            assert (worse in rows.loc[better, "better_than"]) == (p < 0.05)
-            assert (better in rows.loc[worse, "worse_than"]) == (p < 0.05)
-            assert rows.loc[better, "gain"] >= rows.loc[worse, "gain"] - 1e-12
-        shown = page_data(run)["statistics"]
-        assert len(shown["pairs"]) == len(found.pairs)
-        assert shown["note"] == found.note
-
-    @pytest.mark.parametrize("seeds", [1, 3])
-    def test_the_page_and_compare_give_the_same_answer(self, seeds: int) -> None:
-        """Two strategies alone, so that the family is of one comparison in both."""
-        whole = synthetic_run(30, 9, seeds=seeds)
-        shown = set()
-        for first, second in (("strategy-003", "strategy-025"), ("strategy-012", "strategy-013")):
-            kept = tuple(r for r in whole.results if r.strategy in (first, second))
-            run = Run({**whole.meta, "strategies": [first, second]}, kept)
-            ((*_, p),) = outcome_of(run).pairs
-            (ours,) = compare_runs(run, run, against=Against(first, second)).evidence
-            assert p == pytest.approx(ours.p)
-            shown.add(ours.verdict)
-        assert shown == {"worse", "no difference shown"}
-
-    def test_few_structures_are_not_tested_and_equals_are_not_apart(self) -> None:
-        for step, cases in ((1.0, 5), (0.0, 12), (1e-9, 12)):
-            table = {name: [1.0 + step * k] * cases for k, name in enumerate("abc")}
-            found = outcome_of(with_errors(table))
-            assert all(p == 1.0 for *_, p in found.pairs)
-            assert ("not tested" in found.note) == (cases == 5) == (found.pairs == ())
-
-    def test_a_failure_counts_as_the_start_and_a_missing_result_too(self) -> None:
-        whole = synthetic_run(4, 12, failing=0.0)
-        names = ["strategy-000", "strategy-001"]
-        broken = [
-            replace(r, status="failed", blocks={}) if r.strategy == names[0] else r
-            for r in whole.results
-        ]
-        gone = [r for r in whole.results if r.strategy != names[0]]
-        for results in (broken, gone):
-            run = Run(whole.meta, tuple(results))
-            rows = leaderboard(run).set_index("strategy")
-            assert rows.loc[names[0], "gain"] == 0.0
-            assert rows.loc[names[0], "answered"] == 0
-            assert names[0] in rows.loc[names[1], "better_than"]
-
-    def test_markdown_has_coverage_and_the_test(self) -> None:
-        text = MarkdownReporter().render(SMALL)
-        assert "| above | below |" in text
-        assert "signs of all differences on a structure are flipped" in text
 
 
 class TestPapers:
@@ -282,20 +180,6 @@ class TestDocument:
         assert not re.search(r"(src|href)\s*=\s*[\"']?\s*(https?:)?//", outside)
         assert not re.search(r"@import|url\(\s*['\"]?(?!data:|#)", outside)
         assert html.count("<script") == 2
-
-    def test_every_asset_of_the_run_page_is_in_it(self) -> None:
-        others = (
-            "diagnosis",
-            "feed",
-            "identification",
-            "site",
-            "report",
-            "reproduction",
-            "blocks",
-        )
-        own = [p.name for p in ASSETS.iterdir() if not p.name.startswith((*others, "vendor"))]
-        own += [f"vendor/{p.name}" for p in (ASSETS / "vendor").glob("*.js")]
-        assert sorted(own) == sorted([*SCRIPTS, *STYLES, "run.html"])
 
     def test_no_asset_ends_its_element(self) -> None:
         for name in (*SCRIPTS, *STYLES):

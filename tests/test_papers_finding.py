@@ -6,34 +6,22 @@ import numpy as np
 import pytest
 
 from femubench.core.case.reader import read_case
-from femubench.core.fem.frame import GroundSpring, PointMass
-from femubench.core.fem.model import Model
+from femubench.core.fem.frame import GroundSpring
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.fem import Place
-from femubench.modal import receptance
 from femubench.papers import PAPERS
 from femubench.papers.frame.causes import CAUSES, JOINTS, TORSION, Ladder, best_factor, shares_of
 from femubench.papers.frame.changes import (
     SOLUTIONS,
-    change_figures,
-    element_kinds,
     recover_change,
-    relative_change,
 )
-from femubench.papers.frame.finding import finding
 from femubench.papers.frame.receptances import (
-    DAMPING,
     bundles,
-    receptance_figures,
-    receptance_sentences,
 )
-from femubench.papers.printed import read_printed
-from femubench.reproduction import Bars, Curves, MatrixImage, StructureMap, Workbench
+from femubench.reproduction import Workbench
 from femubench.results import stiffness_difference
 from femubench.scenarios import HERE
-
-TABLE = read_printed("frame")["table1"]
 
 
 @pytest.fixture(scope="module")
@@ -51,13 +39,6 @@ def worst(ladder: Ladder, causes: tuple[str, ...], factor: float = 1.0, **option
     found = ladder.frequencies(ladder.frame(causes, **options))  # type: ignore[arg-type]
     scale = best_factor(found, ladder.measured) if factor == 0.0 else factor
     return float(np.abs(ladder.errors(scale * found)).max())
-
-
-def test_no_cause_is_the_paper_s_model(ladder: Ladder) -> None:
-    np.testing.assert_allclose(ladder.frequencies(ladder.frame(())), TABLE["fe"], rtol=1e-3)
-    np.testing.assert_allclose(
-        ladder.errors(ladder.frequencies(ladder.nominal)), TABLE["error_percent"], atol=0.4
-    )
 
 
 @pytest.mark.parametrize("accelerometer", [True, False])
@@ -95,26 +76,6 @@ def test_torsion_is_the_largest_cause_of_mode_1_in_both_orders(ladder: Ladder) -
     assert shares.last[JOINTS][0] < shares.mean[JOINTS][0] < shares.first[JOINTS][0]
 
 
-def test_the_best_factor_balances_the_extremes() -> None:
-    measured, found = np.array([100.0, 200.0, 300.0]), np.array([101.0, 208.0, 309.0])
-    error = best_factor(found, measured) * found / measured - 1.0
-    assert error.max() == pytest.approx(-error.min())
-
-
-def test_finding_gives_tables_figures_and_sentences(bench: Workbench) -> None:
-    extras, figures, sentences = finding(bench)
-    for extra in extras:
-        assert all(len(row) == len(extra.columns) for row in extra.rows)
-    chain, causes = figures
-    assert isinstance(chain, Bars)
-    assert isinstance(causes, Bars)
-    (first, *_, last) = [np.array(values) for _, values in chain.series]
-    assert first[0] == pytest.approx(TABLE["error_percent"][0], abs=0.05)
-    assert np.abs(last).max() < 2.0
-    assert len(causes.series) == 3
-    assert all(sentence.endswith(".") for sentence in sentences)
-
-
 def test_difference_matrix_is_symmetric_and_in_one_unit(bench: Workbench) -> None:
     model = bench.cases["frame"].model
     updated = bench.update("frame", "baruch").model
@@ -142,31 +103,6 @@ def test_element_matrices_are_recovered_from_the_parameters(bench: Workbench, wo
     assert abs(assembled - expected).max() < 1e-9 * abs(expected).max()
 
 
-def test_a_factor_on_all_elements_is_their_relative_change(bench: Workbench) -> None:
-    from femubench.fem import stiffness_matrices
-
-    structure = bench.cases["frame"].model.frame_structure
-    change = 0.07 * np.asarray(stiffness_matrices(structure.properties))
-    np.testing.assert_allclose(relative_change(structure, change), 0.07, rtol=1e-12)
-
-
-def test_change_figures(bench: Workbench) -> None:
-    matrix, *maps = change_figures(bench)
-    assert isinstance(matrix, MatrixImage)
-    assert matrix.matrix.shape == (81, 81)
-    assert matrix.separators == (18, 27, 36, 45, 54, 63, 72)
-    for figure in maps:
-        assert isinstance(figure, StructureMap)
-        assert len(figure.values) == 28
-        assert figure.values.min() > 0.0
-    structure = bench.cases["frame"].model.frame_structure
-    assert element_kinds(structure).sum(axis=1).tolist() == [8, 6, 14]
-    # Tied elements of a kind change alike.
-    tied = maps[1].values  # type: ignore[union-attr]
-    for kind in element_kinds(structure)[[0, 2]]:
-        assert np.ptp(tied[kind > 0.0]) < 0.01
-
-
 def test_stand_in_resonates_where_the_test_does(bench: Workbench) -> None:
     before, after = bundles(bench)
     case = bench.cases["frame-beam"]
@@ -177,66 +113,9 @@ def test_stand_in_resonates_where_the_test_does(bench: Workbench) -> None:
     np.testing.assert_allclose(after.test.resonances[: len(stored)], stored, rtol=1e-5)
 
 
-def test_resonances_and_antiresonances_are_where_the_curve_says(bench: Workbench) -> None:
-    point = bundles(bench)[0].test
-    for found, sign in ((point.resonances[:5], -1.0), (point.antiresonances[:5], 1.0)):
-        companions = np.stack([found * (1.0 - DAMPING), found, found * (1.0 + DAMPING)])
-        level = sign * np.array([point.level(row) for row in companions])
-        assert (level[1] < level[0]).all()
-        assert (level[1] < level[2]).all()
-
-
-def test_what_is_attached_at_a_point_leaves_its_antiresonances(bench: Workbench) -> None:
-    before, after = bundles(bench)
-    for one, other in ((before.test, after.test), (before.nominal, after.nominal)):
-        np.testing.assert_allclose(one.antiresonances[:4], other.antiresonances[:4], rtol=1e-6)
-
-
 def test_antiresonances_are_those_of_the_held_structure(bench: Workbench) -> None:
     model = bench.cases["frame-beam"].model
     place = Place(member="front-left", s=0.5)
     held = solve_modes(model.attach((), (GroundSpring(place, "z", 1e13),))).natural_frequencies
     found = bundles(bench)[0].nominal.antiresonances[:4]
     assert all(np.abs(held / f - 1.0).min() < 1e-4 for f in found)
-
-
-def test_receptance_of_the_stand_in_is_reciprocal(bench: Workbench) -> None:
-    model = Model.of(Ladder.of(bench).truth)
-    rows = model.observe(bench.cases["frame-beam"].measurement.sensors)
-    found = receptance(solve_modes(model), rows, rows, np.array([50.0, 227.0, 700.0]), DAMPING)
-    np.testing.assert_allclose(found, np.swapaxes(found, 1, 2), rtol=1e-9, atol=1e-18)
-
-
-def test_modal_receptance_is_the_inverse_dynamic_stiffness(bench: Workbench) -> None:
-    case = bench.cases["frame-beam"]
-    mass = PointMass(Place(member="front-left", s=0.5), 0.5)
-    model = case.model.attach((mass,), ())
-    row = model.observe(case.measurement.sensors)[[5]].toarray()
-    omega = 2.0 * np.pi * 400.0
-    dynamic = (model.stiffness - omega**2 * model.mass).toarray()
-    direct = float((row @ np.linalg.solve(dynamic, row.T))[0, 0])
-    modal = receptance(solve_modes(model), row, row, np.array([400.0]))[0, 0, 0]
-    assert modal.real == pytest.approx(direct, rel=1e-8)
-
-
-def test_receptance_figures(bench: Workbench) -> None:
-    figures = receptance_figures(bench)
-    assert [f.name for f in figures] == [f"frame-figure-{n}" for n in range(6, 12)]
-    for figure in figures:
-        assert isinstance(figure, Curves)
-        assert "Hz" in figure.x_label
-        assert "dB re 1 m/N" in figure.y_label
-        assert "0.2 %" in figure.caption
-        assert len({curve.role for curve in figure.curves}) == len(figure.curves)
-        assert all(np.isfinite(curve.y).all() for curve in figure.curves)
-    # Baruch's model has three resonances of the test and the others of the nominal model.
-    before, _ = bundles(bench)
-    baruch = before.updated["baruch"].resonances
-    np.testing.assert_allclose(baruch[:3], before.test.resonances[:3], rtol=1e-6)
-    np.testing.assert_allclose(baruch[3:5], before.nominal.resonances[3:5], rtol=1e-6)
-
-
-def test_sentences_name_the_models(bench: Workbench) -> None:
-    text = " ".join(receptance_sentences(bench))
-    assert all(word in text for word in ("Baruch", "Kabe", "generic elements", "dB", "Hz"))
-    assert "-0.0 " not in text

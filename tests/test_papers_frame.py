@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
-from femubench import InputError, read_case, solve_modes
+import femubench.papers
+from femubench import InputError, read_case
+from femubench.core.cli.main import bench as command
 from femubench.core.plugin.loader import load_plugins
 from femubench.papers import PAPERS, study
 from femubench.papers.frame import (
-    counts,
-    mass_matrix,
     misprints,
     predictions,
     readings,
@@ -27,7 +29,6 @@ from femubench.reproduction import Cell, Extra, Study, Workbench
 pytestmark = pytest.mark.slow(20)
 
 Key = tuple[str, str, str]
-MEASURED = np.array([226.8, 275.2, 537.4])
 
 
 @pytest.fixture(scope="module")
@@ -160,25 +161,11 @@ def test_least_squares_column_comes_from_one_reading_that_the_note_names(
     assert np.abs(text - 1.0).min() > 0.01
 
 
-def test_a_column_that_hardly_moves_is_not_explained_by_what_hardly_moves(
-    bench: Workbench,
-) -> None:
-    values = read_printed("frame")["table3"]["physical"]["modes"]
-    assert readings.farthest(bench, "unchanged", values) < 1.0
-    assert readings.farthest(bench, "physical", values) > 10.0
-
-
 def test_nobari_keeps_one_zero_and_turns_one_imaginary(bench: Workbench) -> None:
     lowest, zero, third = rigid_modes(bench, "nobari")
     assert lowest < -50.0
     assert abs(zero) < 1e-3
     assert third > 10.0
-
-
-def test_nobari_with_rigid_modes_is_physical(bench: Workbench) -> None:
-    assert counts.largest_difference(bench) <= 1e-6
-    one, other = strain_modes(bench, "nobari-rigid"), strain_modes(bench, "physical")
-    np.testing.assert_allclose(one, other, rtol=1e-6)
 
 
 def test_sets_of_matrices_are_counted_by_rank_and_coincide(bench: Workbench) -> None:
@@ -192,46 +179,6 @@ def test_sets_of_matrices_are_counted_by_rank_and_coincide(bench: Workbench) -> 
     assert bench.update(CASE, "kabe-rigid").parameter_count == found.kept_by_rigid
 
 
-def test_sets_are_the_same_by_sampling_too(bench: Workbench) -> None:
-    """A change by kabe-rigid is an assembly of beams and rods: no coupling is left over."""
-    nominal, kept = bench.cases[CASE].model, bench.update(CASE, "kabe-rigid").model
-    structure = nominal.frame_structure
-    change = (kept.stiffness - nominal.stiffness).toarray()
-    family = spaces.generic_family(structure, plain="none", joint="none")
-    size = 1.0 / np.sqrt(nominal.stiffness.diagonal())
-    chosen = [i for i, n in enumerate(family.names) if n.startswith(("k11", "k12", "k22", "k33"))]
-    entries = (change * np.outer(size, size))[np.triu_indices(nominal.size)]
-    columns = spaces._assembled(family, chosen, size)
-    rest = entries - columns @ np.linalg.lstsq(columns, entries, rcond=None)[0]
-    assert np.linalg.norm(rest) < 1e-9 * np.linalg.norm(entries)
-    fewer = columns[:, [i for i, c in enumerate(chosen) if not family.names[c].startswith("k12")]]
-    rest = entries - fewer @ np.linalg.lstsq(fewer, entries, rcond=None)[0]
-    assert np.linalg.norm(rest) > 1e-3 * np.linalg.norm(entries)
-
-
-def test_mass_matrix_is_the_unit_matrix_for_the_models_own_modes(bench: Workbench) -> None:
-    case = bench.cases[CASE]
-    modes = solve_modes(case.model).elastic
-    own = replace(
-        case.measurement,
-        frequencies=modes.natural_frequencies[:5],
-        shapes=case.model.observe(case.measurement.sensors) @ modes.shapes[:, :5],
-    )
-    np.testing.assert_allclose(mass_matrix.generalised_mass(case.model, own), np.eye(5), atol=1e-6)
-
-
-def test_mass_matrix_of_the_twin_is_below_the_printed_one(
-    bench: Workbench, cells: Mapping[Key, Cell]
-) -> None:
-    found = [cell for cell in cells.values() if cell.table == "generalised mass"]
-    assert len(found) == 10
-    assert {cell.verdict for cell in found} == {"cannot-be-checked"}
-    case = bench.cases[CASE]
-    low, high = (mass_matrix.scatter(case.model, case.measurement, s) for s in (0.01, 0.03))
-    size = np.sqrt(np.mean([cell.printed**2 for cell in found]))
-    assert low < size < high
-
-
 def test_cutoff_decides_on_the_non_zeros(rerun: Study, bench: Workbench) -> None:
     rows = extra(rerun, "Changing non-zeros").rows
     ranks = [int(row[1]) for row in rows]
@@ -243,21 +190,6 @@ def test_cutoff_decides_on_the_non_zeros(rerun: Study, bench: Workbench) -> None
         bench.update(CASE, "kabe:cutoff=0")
     firm = strain_modes(bench, readings.kabe_words(0.001))[4] / strain_modes(bench, "kabe")[4]
     assert abs(firm - 1.0) > 0.02
-
-
-def test_one_factor_on_the_whole_stiffness_beats_the_nominal_model(bench: Workbench) -> None:
-    case = bench.cases[CASE]
-    quasi = readings.quasi_measured_modes(case.model, case.used_measurement())
-    factor, before, after = readings.uniform_factor(bench, quasi)
-    nominal = strain_modes(bench, "unchanged")[:3]
-    assert (MEASURED / nominal).min() ** 2 < factor < (MEASURED / nominal).max() ** 2
-    assert after < 0.5 * before
-
-
-def test_energy_of_the_used_modes_is_hardly_shear(bench: Workbench) -> None:
-    bend, shear, twist = readings.energy_shares(bench)
-    assert bend + shear + twist == pytest.approx(100.0)
-    assert shear < 5.0 < twist < bend
 
 
 def test_misprints_are_told_by_their_figures(bench: Workbench) -> None:
@@ -288,12 +220,17 @@ def test_design_change_brings_the_fourth_strain_mode_below_the_range(bench: Work
     assert baruch[1].predicted_hz == pytest.approx(truth[1], rel=1e-3)
 
 
-def test_a_sentence_is_judged_by_its_figures(bench: Workbench) -> None:
-    claims = [
-        predictions.Sentence("", ("baruch",), 4, claim) for claim in ("wrong", "exact", "absent")
-    ]
-    assert [predictions.holds(bench, TRUTH, s)[0] for s in claims] == [True, False, True]
-    better = predictions.Sentence("", ("kabe-rigid", "baruch"), 4, "better")
-    worse = predictions.Sentence("", ("baruch", "kabe-rigid"), 4, "better")
-    assert predictions.holds(bench, TRUTH, better)[0]
-    assert not predictions.holds(bench, TRUTH, worse)[0]
+def test_the_document_of_the_verb_holds_every_figure(
+    rerun: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(femubench.papers, "study", lambda *_: rerun)
+    result = CliRunner().invoke(command, ["reproduce", "frame", "-o", str(tmp_path)])
+    assert (result.exit_code, result.stderr) == (0, "")
+    source = (tmp_path / "reproduce.html").read_text(encoding="utf-8")
+    drawings = list((tmp_path / "figures").iterdir())
+    assert len(drawings) >= 9
+    assert source.count("<svg") == source.count("</svg>") == len(drawings)
+    ids = re.findall(r'\sid="([^"]+)"', source)
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r"(?:url\(#|href=\"#)([^)\"]+)", source)) <= set(ids)
+    assert not re.search(r"<script|<link|<img|@import|url\((?!#)|src=", source)

@@ -15,7 +15,6 @@ from femubench.core.library.report import rendering
 from femubench.core.library.reproduce import studies_of
 from femubench.core.pace import Advance
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.plugin.variants import strategy_of
 from femubench.papers import DONE, study
 from femubench.papers.hframe.beyond import compare
 from femubench.papers.hframe.meshes import frequencies, mesh_cells
@@ -23,7 +22,7 @@ from femubench.papers.hframe.physical import physical_model, shape_paired_errors
 from femubench.papers.hframe.rows import FREE_EI, ROWS, at_printed, parameter_values, row_of, run
 from femubench.papers.hframe.shapes import compute_expanded_mac, shape_cells
 from femubench.papers.printed import read_printed
-from femubench.reproduction import VERDICTS, Bars, Cell, Study, Workbench
+from femubench.reproduction import VERDICTS, Cell, Study, Workbench
 from femubench.scenarios import HERE
 
 pytestmark = pytest.mark.slow(20)
@@ -99,31 +98,6 @@ def test_verdicts_are_what_is_known_and_say_why(cells: Cells) -> None:
     for cell in cells.values():
         assert len(cell.note) > 30
         assert "no reading of the text" not in cell.note
-
-
-def test_what_was_fitted_or_taken_over_is_never_independent(cells: Cells) -> None:
-    """Row C_a and its copies are what the dimensions come from; 4b and 4c what was stopped for."""
-    for (table, row, name), cell in cells.items():
-        if row in ("C_a", "analytical frequency") or (
-            table in ("4a", "4b") and name == "initial" and cell.unit == "Hz"
-        ):
-            assert cell.verdict == ("does-not-follow" if (table, row, name) in OPEN else "fitted")
-        if table in ("4b", "4c") and name == "updated":
-            assert cell.verdict == "fitted"
-        if name == "ratio" or name.endswith("error"):
-            assert cell.verdict in ("input", "misprint")
-    assert [cells["4d", mode, "initial"].printed for mode in MODES] == [
-        cells["4c", mode, "initial"].printed for mode in MODES
-    ]
-    assert {cells["4d", mode, "initial"].verdict for mode in MODES} == {"input"}
-
-
-def test_no_option_of_an_independent_update_was_set(cells: Cells) -> None:
-    words = [c.note for (_, _, name), c in cells.items() if name == "updated"]
-    assert any("options." in note for note in words)
-    stated = "options.residual=eigenvalue"  # the text writes its equations with eigenvalues
-    for cell in cells.values():
-        assert cell.verdict != "independent" or "options." not in cell.note.replace(stated, "")
 
 
 def test_what_was_chosen_for_a_fitted_cell_matters(bench: Workbench, cells: Cells) -> None:
@@ -231,31 +205,6 @@ def test_row_c_determines_a_ratio_only(bench: Workbench) -> None:
     assert np.abs(flexible / np.array(printed_hertz) - 1.0).max() > 5e-3
 
 
-def test_what_an_update_rests_on_ends_with_words_that_bench_run_takes(
-    bench: Workbench, cells: Cells
-) -> None:
-    notes = {
-        c.note
-        for (table, _, name), c in cells.items()
-        if table > "3" and name == "updated" and c.verdict != "does-not-follow"
-    }
-    assert len(notes) == 8
-    for note in notes:
-        words = re.search(r"bench run hframe -s '([^']+)'$", note)
-        assert words is not None
-        assert strategy_of(words[1], bench.strategies).name == words[1]
-
-
-def test_misprints(done: Study) -> None:
-    extra = next(e for e in done.extras if e.title == "Misprints")
-    assert [line[0] for line in extra.rows] == [
-        "table 4c, mode 1, initial error",
-        "table 4c, mode 4, initial error",
-        "table 4d, mode 4, initial error",
-        "section 8 against table 4e, a_V",
-    ]
-
-
 def test_held_out_modes(bench: Workbench) -> None:
     comparison = compare(bench)
     expected = {
@@ -279,25 +228,6 @@ def test_the_physical_model_is_fitted_to_the_used_modes_alone(bench: Workbench) 
     shifted = np.where(np.isin(data.numbers, case.held_out), 1.1, 1.0) * data.frequencies
     other = replace(case, measurement=replace(data, frequencies=shifted))
     assert physical_model(other).joint_stiffness == best.joint_stiffness
-
-
-def test_extras_and_figure_are_complete(done: Study) -> None:
-    assert len(done.findings) == 6
-    assert len(done.premises) >= 5
-    for extra in done.extras:
-        assert extra.rows
-        assert {len(line) for line in extra.rows} == {len(extra.columns)}
-    titles = [extra.title for extra in done.extras]
-    assert [t for t in titles if t.startswith("Iterations")] == [
-        f"Iterations of table 4{letter}" for letter in "abcde"
-    ]
-    (bars,) = done.figures
-    assert isinstance(bars, Bars)
-    assert [name for name, _ in bars.series] == [
-        *("C_a as built", "a", "b", "d", "e", "shear, k_theta, E")
-    ]
-    assert all(len(values) == len(bars.groups) == 7 for _, values in bars.series)
-    assert "%" in bars.value_label
 
 
 def test_the_transcription_contradicts_itself_at_the_misprints_only() -> None:

@@ -1,11 +1,10 @@
-"""docs/development/performance.md has the kept figures, and calls a bar met when it is."""
+"""docs/development/performance.md has the kept figures."""
 
 from __future__ import annotations
 
 import json
 
 import performance
-import pytest
 
 
 def test_page_has_the_kept_figures() -> None:
@@ -14,30 +13,3 @@ def test_page_has_the_kept_figures() -> None:
     assert page.partition(performance._BEGIN)[2].partition(performance._END)[0] == (
         performance.page_of(kept) + "\n"
     )
-
-
-def test_every_bar_is_that_of_a_series() -> None:
-    sections = {section.word: section.series for section in performance.SECTIONS}
-    for bar in performance.BARS:
-        names = {series.name: series.sizes for series in sections[bar.section]}
-        assert bar.size in names[bar.series]
-        assert bar.over in ("", "anchor", *names)
-
-
-def test_bars_are_met_from_the_right_side() -> None:
-    rows = [
-        {"series": "one factorisation, lattice", "size": 9, "seconds": 1.0},
-        {"series": "modes of a lattice", "size": 9, "seconds": 2.0},
-        {"series": "eigsh as called, lattice", "size": 9, "seconds": 90.0},
-    ]
-    kept = {"lattice": {"rows": rows}}
-    rival, ours = performance.BARS[0].line(kept), performance.BARS[2].line(kept)
-    assert (rival["found"], rival["met"]) == ("45", "yes")
-    assert (ours["found"], ours["met"]) == ("2", "no")
-    assert performance.BARS[3].line(kept)["met"] == ""
-
-
-def test_exponents_are_those_of_powers() -> None:
-    sizes = [10.0, 100.0, 1000.0, 10000.0]
-    found = performance.exponent(sizes, [1.0, 1.0, 3.0 * 1000.0**1.5, 3.0 * 10000.0**1.5])
-    assert found == pytest.approx(1.5)

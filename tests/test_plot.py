@@ -16,7 +16,6 @@ import scored
 from diagnosis_toys import STRUCTURE, data_of
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.quiver import Quiver
 
 from femubench import (
     Case,
@@ -29,10 +28,7 @@ from femubench import (
     solve_modes,
 )
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.drawing.places import find_wireframe
 from femubench.core.errors import InputError
-from femubench.core.plot.findings import scale_end
-from femubench.core.plot.style import COLOURS, place_names
 from femubench.core.schema.diagnosis import LocationRow, ResidualRow
 from femubench.core.schema.results import JobResult
 from femubench.modal import mac
@@ -113,34 +109,6 @@ class TestModeShape:
         away = np.linalg.norm(np.array(first) - still[ends], axis=-1).max()
         assert away == pytest.approx(0.12 * np.ptp(still, axis=0).max(), rel=0.05)
 
-    def test_arrows_are_the_measured_shape_on_the_scale_of_the_mode(self, hframe: Case) -> None:
-        """Where the test agrees (MAC 1.00), the tips of the arrows lie on the deformed line."""
-        ax = plot.mode_shape(hframe, 1)
-        (arrows,) = (item for item in ax.collections if isinstance(item, Quiver))
-        data = hframe.measurement
-        modes = solve_modes(hframe.model).elastic
-        predicted = np.asarray(hframe.model.observe(data.sensors) @ modes.shapes[:, 0])
-        along = np.hypot(arrows.U, arrows.V)
-        assert len(along) == np.isfinite(data.shapes[:, 0]).sum()
-        ratio = along / np.abs(predicted)
-        strong = np.abs(predicted) > 0.3 * np.abs(predicted).max()
-        assert np.ptp(ratio[strong]) < 0.1 * ratio[strong].mean()
-        assert "measured mode 1 at 77.13 Hz, MAC 1.000" in ax.get_title()
-
-    def test_out_of_its_plane_from_above_a_corner(self, frame: Case) -> None:
-        ax = plot.mode_shape(frame, 1, measured=False)
-        assert texts(ax)[:3:2] == ["x", "y"]
-        assert labels(ax) == ["mode 1, 255.8 Hz"]
-        still, moved = (np.array(part) for part in segments(ax))
-        # z is up: the motion has no part across.
-        view = still[0, 0]
-        assert np.isin(view[0].round(9), moved[..., 0].round(9))
-
-    def test_nodes_of_matrices(self) -> None:
-        ax = plot.mode_shape(matrices(), 2)
-        (moved,) = (line for line in ax.get_lines() if str(line.get_label()).startswith("mode 2,"))
-        assert len(moved.get_xydata()) == len(wireframe_of(matrices()).nodes)
-
     def test_axes_are_those_given_and_no_figure_is_left_behind(self, hframe: Case) -> None:
         mine = Figure().subplots()
         assert plot.mode_shape(hframe.model, ax=mine) is mine
@@ -167,30 +135,17 @@ class TestMac:
         assert next(t.get_text() for t in ax.get_yticklabels()) == "1: 226.8"
         assert ax.get_ylabel() == "measured mode: frequency, Hz"
 
-    def test_of_shapes_with_each_other(self, hframe: Case) -> None:
-        ax = plot.mac(np.eye(4)[:, :3])
-        assert texts(ax) == ["1.00", "0.00", "0.00", "0.00", "1.00", "0.00", "0.00", "0.00", "1.00"]
-        # Mode 7 has a frequency alone.
-        assert "–" in texts(plot.mac(hframe.measurement))
-
-    def test_of_an_updated_model(self, frame: Case) -> None:
-        found = plot.mac(frame.measurement, UpdateResult(frame.model))
-        assert texts(found) == texts(plot.mac(frame.measurement, frame.model))
-
 
 def test_receptance_of_the_case_and_of_models(frame: Case) -> None:
     softer = UpdateResult(replace(frame.model, stiffness=0.81 * frame.model.stiffness))
     ax = plot.receptance(frame, {"softer": softer})
     assert labels(ax) == ["measured modes", "nominal model", "softer"]
-    assert (ax.get_xlabel(), ax.get_ylabel()[-11:]) == ("frequency, Hz", "dB re 1 m/N")
     _, nominal, soft = (line.get_xydata() for line in ax.get_lines())
     first = solve_modes(frame.model).elastic.natural_frequencies[0]
     for curve, top in ((nominal, first), (soft, 0.9 * first)):
         near = np.abs(curve[:, 0] - top) < 0.05 * top
         peak = curve[near][np.argmax(curve[near, 1]), 0]
         assert abs(peak - top) <= np.diff(curve[:2, 0])[0]
-    other = plot.receptance(frame, sensor=frame.measurement.sensors.labels[2])
-    assert frame.measurement.sensors.labels[2] in other.get_ylabel()
 
 
 class TestUpdating:
@@ -206,11 +161,6 @@ class TestUpdating:
         signed = update(history=({"residual": -1.0}, {"residual": 1.0}))
         assert plot.convergence(signed).get_yscale() == "linear"
 
-    def test_convergence_of_a_run(self) -> None:
-        ax = plot.convergence(run())
-        assert labels(ax) == ["fast", "slow"]
-        assert labels(plot.convergence(run(), quantity="other")) == ["fast"]
-
     def test_parameters_in_percent_with_their_deviations(self) -> None:
         ax = plot.parameters(update())
         assert [bar.get_width() for bar in ax.patches] == pytest.approx([-10.0, 25.0])
@@ -219,12 +169,6 @@ class TestUpdating:
         (segment,) = bars.get_segments()  # type: ignore[attr-defined]
         np.testing.assert_allclose(segment, [[-11.0, 0.0], [-9.0, 0.0]])
         assert ax.get_xlabel() == "change, %"
-
-    def test_parameters_from_zero_have_values(self) -> None:
-        springs = (ParameterEstimate("c", 0.0, 2.0, "1/Nm", 0.5),)
-        ax = plot.parameters(update(parameters=springs))
-        assert [bar.get_width() for bar in ax.patches] == [2.0]
-        assert ax.get_xlabel() == "after the update, 1/Nm"
 
 
 def test_calibration_is_the_share_of_modes_in_each_interval() -> None:
@@ -240,13 +184,9 @@ def test_calibration_is_the_share_of_modes_in_each_interval() -> None:
 
 
 def test_error_against_cost() -> None:
-    ax = plot.error_against_cost(run(), error="used_percent")
-    physical, unphysical = ax.get_lines()
+    physical, unphysical = plot.error_against_cost(run(), error="used_percent").get_lines()
     assert physical.get_xydata() == pytest.approx(np.array([[0.1, 1.0], [1.0, 2.0]]))
     assert unphysical.get_xydata() == pytest.approx(np.array([[10.0, 3.0]]))
-    assert unphysical.get_marker() != physical.get_marker()
-    assert sorted(texts(ax)) == ["fast", "odd", "slow"]
-    assert "s (median" in ax.get_xlabel()
 
 
 class TestResiduals:
@@ -268,19 +208,11 @@ class TestResiduals:
         companions = [t.get_text() for t in ax.child_axes[0].get_yticklabels()]
         assert companions == ["-1.9 → +0.0", "+2.1 → +400.0", "– → –"]
 
-    def test_shapes_are_root_mean_squares(self) -> None:
-        (dot,) = plot.residual_dots(diagnosis_toys.made(), "shape")
-        assert (dot.before, dot.after) == pytest.approx((np.sqrt(12.5), 1.0))
-
-    def test_of_any_size(self) -> None:
-        rows = (ResidualRow("frequency", 1, "", 1.0, 1e300, -1e300),)
-        assert max(map(abs, plot.residuals(diagnosis_toys.made(residuals=rows)).get_xlim())) < 1e13
-
 
 class TestEvidence:
     WORDS = ("all", "type:T", "beam@J1", "beam/2", "beam", "J1", "p2", "nowhere", "beam/9")
 
-    @pytest.mark.parametrize("plane", ["in-plane", "out-of-plane", "3d", "matrices"])
+    @pytest.mark.parametrize("plane", ["in-plane", "matrices"])
     def test_places_are_found(self, plane: str) -> None:
         rows = tuple(LocationRow("evidence", word, 0.5) for word in self.WORDS)
         data = {**data_of(locations=rows, causes=()), "structure": {**STRUCTURE, "plane": plane}}
@@ -294,48 +226,6 @@ class TestEvidence:
         assert shown == found
         assert [a.get_gid() for a in ax.get_children()].count("everywhere-1") == 1
         assert {"J1", "J3", "beam"} <= set(texts(ax))
-
-    def test_stronger_is_thicker_and_darker(self, hframe: Case) -> None:
-        rows = (LocationRow("evidence", "upper-1", 1.0), LocationRow("evidence", "upper-2", 0.1))
-        found = diagnosis_toys.made(locations=rows, causes=())
-        ax = plot.evidence(found, case=hframe)
-        strong, weak = (
-            next(a for a in ax.get_children() if a.get_gid() == f"at-{k}") for k in (0, 1)
-        )
-        assert isinstance(strong, LineCollection)
-        assert isinstance(weak, LineCollection)
-        assert strong.get_linewidth()[0] > weak.get_linewidth()[0]  # type: ignore[index]
-        assert sum(strong.get_color()[0][:3]) < sum(weak.get_color()[0][:3])
-        sensors = [a for a in ax.get_children() if str(a.get_gid()).startswith("sensor-")]
-        assert len(sensors) == len(hframe.measurement.sensors)
-
-    def test_causes_are_numbered(self) -> None:
-        cause = replace(
-            diagnosis_toys.SOFT,
-            place=harness_toys.tiny_case().model.frame_structure.frame.joints[0].name,
-        )
-        ax = plot.evidence(diagnosis_toys.made(causes=(cause,), locations=()))
-        assert "1" in [t.get_text() for t in ax.texts if t.get_weight() == "bold"]
-
-    def test_causes_stand_where_they_sit_and_are_listed(self) -> None:
-        ax = plot.evidence(diagnosis_toys.made(locations=()))
-        listed = labels(ax)
-        causes = data_of()["causes"]
-        assert listed[len(causes) :] == ["evidence by place, of all explanations"]
-        assert all(any(text.startswith(f"{k} ") for text in listed) for k in range(1, len(causes)))
-        marks = [a for a in ax.get_lines() if str(a.get_gid()).startswith("finding-")]
-        assert all(mark.get_marker() in "DosX" for mark in marks)
-
-    def test_a_fault_marks_its_sensor(self, hframe: Case) -> None:
-        label = hframe.measurement.sensors.labels[3]
-        cause = replace(
-            diagnosis_toys.SOFT, effect="sensor-sign", place=f"sensor:{label}", side="data"
-        )
-        ax = plot.evidence(diagnosis_toys.made(causes=(cause,), locations=()), case=hframe)
-        (mark,) = (a for a in ax.get_lines() if a.get_gid() == "finding-0")
-        xyz = hframe.measurement.sensors.xyz[3]
-        assert mark.get_xydata()[0] == pytest.approx((xyz[0], xyz[2]))
-        assert mark.get_marker() == "X"
 
     @pytest.mark.parametrize("xyz", [[0.0, 0.0, 0.0], [1e308, -1e308, 1e308]])
     def test_no_extent_no_drawing(self, xyz: list[float]) -> None:
@@ -355,30 +245,21 @@ class TestChanges:
         (ring,) = (a for a in ax.get_lines() if a.get_gid() == "finding-1")
         assert ring.get_marker() == "o"
 
-    def test_one_outlier_does_not_make_the_rest_pale(self) -> None:
-        assert scale_end([0.02, -0.03, 0.9]) == pytest.approx(0.09)
-        assert scale_end([0.02, -0.03]) == pytest.approx(0.03)
-
 
 WRONG: list[Callable[[Case], object]] = [
     lambda case: plot.mode_shape(case, 0),
-    lambda case: plot.mode_shape(case, 10_000),
     lambda case: plot.mode_shape(case.measurement),  # type: ignore[arg-type]
     lambda case: plot.mac(case.measurement.shapes, case.model),
     lambda case: plot.mac(np.eye(3), np.eye(4)),
-    lambda case: plot.mac("shapes"),  # type: ignore[arg-type]
     lambda case: plot.receptance(case.model),  # type: ignore[arg-type]
     lambda case: plot.receptance(case, sensor="nowhere"),
-    lambda case: plot.receptance(case, modification="none such"),
     lambda case: plot.convergence(update(history=())),
-    lambda case: plot.convergence(run(), case="other"),
     lambda case: plot.convergence(run(), quantity="other one"),
     lambda case: plot.parameters(update(parameters=())),
     lambda case: plot.parameters(
         update(parameters=(ParameterEstimate("a", 0.0, 1.0, "m"), ParameterEstimate("b", 1.0, 1.0)))
     ),
     lambda case: plot.error_against_cost(run(), error="beauty"),
-    lambda case: plot.error_against_cost(run(results=())),
     lambda case: plot.residuals(case),  # type: ignore[arg-type]
     lambda case: plot.residuals(diagnosis_toys.made(residuals=())),
     lambda case: plot.changes(case, update()),
@@ -391,21 +272,6 @@ def test_what_cannot_be_drawn_says_so_in_a_line(draw: Callable[[Case], object]) 
     with pytest.raises(InputError) as caught:
         draw(harness_toys.tiny_case())
     assert "\n" not in str(caught.value)
-
-
-def test_names_stand_apart_and_hold_nothing_that_cannot_be_shown() -> None:
-    ax = Figure(figsize=(4, 3)).subplots()
-    points = np.array([[0.5, 0.5], [0.505, 0.5], [0.5, 0.505]])
-    place_names(ax, points, ["first", "second", diagnosis_toys.NASTY])
-    ax.get_figure().draw_without_rendering()  # type: ignore[union-attr]
-    boxes = [text.get_window_extent() for text in ax.texts]
-    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[k + 1 :])
-    assert ax.texts[2].get_text().isprintable()
-    assert len(ax.texts[2].get_text()) <= 22
-
-
-def test_colours_of_a_themed_drawing_have_one_name_each() -> None:
-    assert len(set(COLOURS.values())) == len(COLOURS)
 
 
 class TestWireframe:
@@ -423,23 +289,3 @@ class TestWireframe:
                 assert (
                     np.linalg.norm(np.cross(np.subtract(found.nodes[k], start), end - start)) < 1e-9
                 )
-
-    def test_a_model_has_no_sensors_and_matrices_no_members(self) -> None:
-        found = wireframe_of(matrices())
-        assert found.plane == "matrices"
-        assert (found.members, found.sensors, found.elements) == ((), (), ())
-        assert len(found.joints) == len(found.nodes) > 0
-
-    @pytest.mark.parametrize(
-        ("word", "kind", "count"),
-        [
-            ("T:branch", "end", 2),
-            ("T", "joint", 2),
-            ("upper-1/3", "element", 1),
-            ("T1-T2", "pair", 2),
-        ],
-    )
-    def test_places(self, word: str, kind: str, count: int, hframe: Case) -> None:
-        found = find_wireframe(hframe, [word]).place(word)
-        assert found.kind == kind
-        assert len(found.spans) + len(found.points) == count

@@ -68,7 +68,7 @@ def data(model: Model, factor: float = 1.01) -> Measurement:
     return Measurement(sensors, numbers, hertz, 0.002 * hertz, none, shapes, noise)
 
 
-@pytest.mark.parametrize("stiffer", [1.0, 1e2, 1e4])
+@pytest.mark.parametrize("stiffer", [1.0, 1e4])
 def test_entries_off_by_rounding_move_the_eigenvalues_within_the_bound(stiffer: float) -> None:
     model, rng = aeroplane(stiffer), np.random.default_rng(1)
     modes = elastic(model)
@@ -85,22 +85,9 @@ def test_entries_off_by_rounding_move_the_eigenvalues_within_the_bound(stiffer: 
     assert worst.max() > 0.1
 
 
-@pytest.mark.parametrize("stiffer", [1.0, 1e1, 1e2, 1e3, 1e4])
-def test_stiff_parts_keep_no_promise_from_being_kept(stiffer: float) -> None:
-    model = aeroplane(stiffer)
-    measurement = data(model)
-    met = with_measured_frequencies(model, measurement)
-    result = UpdateResult(met, parameter_count=1)
-    assert (
-        find_missing_mode(Given(UpdatingProblem("", model, measurement), result, frozenset()))
-        is None
-    )
-
-
 @pytest.mark.parametrize("name", ["berman", "secant", "baruch"])
-@pytest.mark.parametrize("stiffer", [1e1, 1e3])
-def test_matrix_methods_work_beside_stiff_parts(name: str, stiffer: float) -> None:
-    model = aeroplane(stiffer)
+def test_matrix_methods_work_beside_stiff_parts(name: str) -> None:
+    model = aeroplane(1e3)
     measurement = data(model)
     result = strategies[name]().update(model, measurement, np.random.default_rng(0))
     assert (
@@ -109,7 +96,7 @@ def test_matrix_methods_work_beside_stiff_parts(name: str, stiffer: float) -> No
     )
 
 
-@pytest.mark.parametrize("stiffer", [1.0, 1e1, 1e3])
+@pytest.mark.parametrize("stiffer", [1.0, 1e3])
 def test_a_broken_promise_is_told_all_the_same(stiffer: float) -> None:
     model = aeroplane(stiffer)
     modes = elastic(model)

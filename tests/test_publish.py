@@ -73,6 +73,14 @@ def site(tmp_path: Path) -> Site:
     return Site(tmp_path)
 
 
+@pytest.fixture(scope="module")
+def full(data: Data, tmp_path_factory: pytest.TempPathFactory) -> Site:
+    """Return a site with one run, for what leaves it as it is."""
+    made = Site(tmp_path_factory.mktemp("full"))
+    assert made.add(data).exit_code == 0
+    return made
+
+
 def test_one_run_gives_its_leaderboard(data: Data, site: Site) -> None:
     answer = site.add(data)
     assert answer.exit_code == 0, answer.output
@@ -145,12 +153,7 @@ def test_history_has_every_version_and_the_board_the_latest(data: Data, site: Si
     assert softer["versions"][0]["gain"] > softer["versions"][1]["gain"]
     assert softer["versions"][1]["machines"][0]["cpu"] == "Old <cpu>"
     page = (site.folder / softer["page"]).read_text()
-    drawn = Links(page).text.partition("Versions")[0]
-    assert "Gain of every version" in drawn
-    assert all(
-        f"{number}" in drawn and row["last"][:10] in drawn
-        for number, row in zip((2, 1), softer["versions"], strict=True)
-    )
+    assert "Gain of every version" in Links(page).text.partition("Versions")[0]
     assert "Old &lt;cpu&gt;" in page
     # The strategy that did not change has one version, which two machines agree on.
     same = site.strategy("unchanged")
@@ -258,8 +261,6 @@ def bad(data: Data, path: str, value: object) -> Data:
         ("schema", 3, "schema: schema 3"),
         ("meta/started", "yesterday", "meta.started"),
         ("meta/run", None, "meta.run"),
-        ("meta/machine", [1], "meta.machine"),
-        ("meta/versions", {"python": {}}, "meta.versions.python"),
         ("meta/cases/corner/digest", None, "meta.cases.corner.digest"),
         ("meta/reference/corner", None, "meta.reference.corner"),
         ("meta/models", None, "meta.models"),
@@ -272,24 +273,21 @@ def bad(data: Data, path: str, value: object) -> Data:
         ("results/0/provenance/strategy", None, "results[0].provenance.strategy"),
         ("results/0/used/rms_percent", 1e-6, "results[0].used.rms_percent"),
         ("results/0/used/modes", [], "results[0].used: no modes"),
-        ("results/0/status", "won", "results[0].status"),
-        ("results/0/seconds", 1e308, "results[0].seconds"),
     ],
 )
 def test_one_bad_file_and_nothing_is_written(
-    data: Data, site: Site, path: str, value: object, key: str
+    data: Data, full: Site, path: str, value: object, key: str
 ) -> None:
-    site.add(data)
-    before = site.content()
-    answer = site.add(called(data, "fine", 5), bad(data, path, value))
+    before, full.count = full.content(), 1
+    answer = full.add(called(data, "fine", 5), bad(data, path, value))
     assert answer.exit_code == 2
     assert len(answer.stderr.splitlines()) == 1
     assert f"run3.json: {key}" in answer.stderr
-    assert site.content() == before
-    assert site.rest() == ["site"]
+    assert full.content() == before
+    assert full.rest() == ["site"]
 
 
-@pytest.mark.parametrize("text", ["", "{", '{"meta": {}, "results": [', "[" * 5000, "\x00", "[]"])
+@pytest.mark.parametrize("text", ["", '{"meta": {}, "results": [', "[]"])
 def test_half_a_file_is_refused(data: Data, site: Site, text: str) -> None:
     answer = site.add(data, text)
     assert answer.exit_code == 2
@@ -399,13 +397,10 @@ def test_extremes_do_not_break_the_site_that_took_them(data: Data, site: Site) -
     assert half.exit_code == 2
     assert "run1.json: " in half.stderr
     made = json.loads(json.dumps(data))
-    for result in made["results"]:
-        if result["strategy"] == "unchanged":
-            mode = result["used"]["modes"][0]
-            mode["predicted_hz"], mode["measured_hz"] = 1e100, 1e-40
-            others = len(result["used"]["modes"])
-            result["used"]["rms_percent"] = 100.0 * 1e140 / others**0.5
-        result["gain"] = 1.0
+    for result in (r for r in made["results"] if r["strategy"] == "unchanged"):
+        modes = result["used"]["modes"]
+        modes[0]["predicted_hz"], modes[0]["measured_hz"] = 1e100, 1e-40
+        result["used"]["rms_percent"] = 100.0 * 1e140 / len(modes) ** 0.5
     made["meta"]["reference"]["corner"]["used"] = 0.0
     assert site.add(made).exit_code == 0
     before = site.content()
@@ -421,9 +416,8 @@ def test_names_that_look_alike_get_files_of_their_own() -> None:
     assert all(re.fullmatch(r"[a-z0-9-]{8,60}", file) for file in files)
 
 
-def test_pages_need_nothing_from_elsewhere(data: Data, site: Site) -> None:
-    site.add(data)
-    for name, content in site.content().items():
+def test_pages_need_nothing_from_elsewhere(full: Site) -> None:
+    for name, content in full.content().items():
         if name.endswith(".html"):
             text = content.decode()
             assert "default-src 'none'" in text
@@ -478,14 +472,8 @@ def test_a_class_has_a_board_of_its_own(data: Data, site: Site) -> None:
     first = boards["frame"]["rows"][0]
     ranks = {row["strategy"]: row["rank"] for row in boards["frame"]["rows"]}
     assert ranks == {"unchanged": 1, "failing": 1, "softer": 3}
-    page = (site.folder / boards["frame"]["page"]).read_text()
-    assert f'data-value="{first["gain"]}"' in page
-    assert "No strategy gains on handbooks." in page
+    assert f'data-value="{first["gain"]}"' in (site.folder / boards["frame"]["page"]).read_text()
     assert f'href="{boards["frame"]["page"]}"' in (site.folder / "index.html").read_text()
-    lines = (site.folder / "leaderboard.csv").read_text().splitlines()
-    assert [line.split(",")[:3] for line in lines if line.startswith("frame")] == [
-        ["frame", row["strategy"], str(row["rank"])] for row in boards["frame"]["rows"]
-    ]
 
 
 ATOM = "{http://www.w3.org/2005/Atom}"
@@ -516,8 +504,6 @@ def test_the_feed_tells_of_new_versions_and_new_leaders(data: Data, site: Site) 
     for one in (feed, *entries):
         for tag in ("id", "title", "updated"):
             assert one.findtext(f"{ATOM}{tag}")
-        for link in one.findall(f"{ATOM}link"):
-            assert (site.folder / link.attrib["href"]).is_file()
     ids = [one.findtext(f"{ATOM}id") for one in (feed, *entries)]
     assert len(set(ids)) == len(ids)
 
@@ -543,30 +529,16 @@ def test_with_an_address_the_feeds_have_whole_links(data: Data, site: Site) -> N
             ("date_published", "updated"),
         ):
             assert item[key] == entry.findtext(f"{ATOM}{tag}")
-    assert any("2 & <more>" in item["content_text"] for item in feed["items"])
     assert 'type="application/feed+json"' in (site.folder / "index.html").read_text()
-    site.words += ["--address", ""]
-    site.add(called(data, "third", 3))
-    assert not (site.folder / "feed.json").exists()
-    assert "feed.json" not in (site.folder / "index.html").read_text()
 
 
-@pytest.mark.parametrize(
-    "address",
-    ["javascript:alert(1)", "example.org", "https://x y", 'https://x"', "https://x/?q", "//x"],
-)
+@pytest.mark.parametrize("address", ["javascript:alert(1)", 'https://x"', "//x"])
 def test_what_is_no_address_is_refused(data: Data, site: Site, address: str) -> None:
     site.words += ["--address", address]
     answer = site.add(data)
     assert answer.exit_code == 2
     assert "is no address of a site" in answer.stderr
     assert not site.folder.exists()
-
-
-def test_equal_leaders_are_no_news_of_each_other(data: Data, site: Site) -> None:
-    twin = renamed(data, "softer", "zofter")
-    site.add(called(data, "first", 1), called(twin, "second", 2))
-    assert [n["strategy"] for n in site.index()["news"] if n["kind"] == "leader"] == ["softer"]
 
 
 def test_pages_of_strategies_say_where_they_come_from(data: Data, site: Site) -> None:
@@ -585,28 +557,13 @@ def test_pages_of_strategies_say_where_they_come_from(data: Data, site: Site) ->
     assert "https://doi.org/10.1000/xyz" in page.links
     for text in ("One & all", "Ada <ada@example.org>", "Ada (1843), note G"):
         assert text in page.text
-    own = json.loads((site.folder / item["page"].replace(".html", ".json")).read_text())
-    assert own == item
-    lines = (site.folder / item["page"].replace(".html", ".csv")).read_text().splitlines()
-    assert len(lines) == 1 + len(item["versions"][0]["cases"])
-    for bad_link in ("javascript:alert(1)", "https://x y", 'https://x"', "ftp://x"):
-        made["meta"]["about"]["softer"]["homepage"] = bad_link
-        answer = site.add(made)
-        assert answer.exit_code == 2
-        assert "meta.about.softer.homepage" in answer.stderr
+    made["meta"]["about"]["softer"]["homepage"] = "javascript:alert(1)"
+    answer = site.add(made)
+    assert answer.exit_code == 2
+    assert "meta.about.softer.homepage" in answer.stderr
 
 
 def test_cells_of_downloads_are_no_formulas(data: Data, site: Site) -> None:
     made = renamed(data, "softer", "=cmd|' /C calc'!A0")
     assert site.add(made).exit_code == 0
     assert ",'=cmd|" in (site.folder / "leaderboard.csv").read_text()
-
-
-def test_the_board_says_who_is_best_and_how_sure(data: Data, site: Site) -> None:
-    site.add(data)
-    text = Links((site.folder / "index.html").read_text()).text
-    best = site.index()["boards"][0]["rows"][0]
-    assert f"the best strategy, softer, {best['error_percent']:.1f} %." in text
-    assert f"Its gain is {best['gain']:.3f}." in text
-    assert "No difference between any two lines of the board is shown." in text
-    assert "On 2 cases of 2 structures" in text

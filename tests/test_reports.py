@@ -17,8 +17,7 @@ from femubench.core.library.report import render_report
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import check_reporter
 from femubench.reports import femubench_reporters
-from femubench.reports.cells import format_fixed, hertz, plain, shorten_text, whole
-from femubench.reports.csvs import CsvReporter, ModesCsvReporter
+from femubench.reports.csvs import CsvReporter
 from femubench.reports.jsons import JsonReporter
 from femubench.reports.markdown import escape
 from femubench.reports.runs import MarkdownReporter, TerminalReporter
@@ -159,37 +158,6 @@ class TestTerminal:
         assert [row[6:9] for row in rows[1:4]] == [["0", "of", "1"]] * 3
         assert "some models lost rigid-body modes or have negative eigenvalues" in text
 
-    def test_fits_80_columns_whatever_the_names_and_figures(self) -> None:
-        name = "a-strategy-with-a-very-long-name-that-nobody-would-type"
-        wild = result(
-            name,
-            3e4,
-            seconds=12345.678,
-            parameter_count=123456,
-            evaluations=1234567,
-            rigid_body_modes=0,
-            negative_eigenvalues=1234,
-        )
-        reason = "no convergence " * 20 + "x" * 200
-        failed = replace(FAILED, case="scenario-name/part-of-it-with-a-long-name", reason=reason)
-        many = [replace(result(f"s{i}"), seed=seed) for i in range(12) for seed in range(3)]
-        text = TerminalReporter().render(run_of(wild, failed, *many))
-        assert max(len(line) for line in text.splitlines()) <= 80
-        assert "a-strategy-with…" in text
-        assert "no convergence" in text
-
-    def test_several_seeds_show_an_interval_and_gather_failures(self) -> None:
-        results = [result("good", 0.1 + 0.1 * seed, seed=seed) for seed in range(5)]
-        failed = [replace(FAILED, seed=seed) for seed in range(5)]
-        text = TerminalReporter().render(run_of(*results, *failed))
-        assert "95 % interval" in text
-        assert re.search(r"good +0\.\d{3} +0\.\d{3} to 0\.\d{3}", text)
-        assert re.search(r"broken +0, 1, 2, +failed", text)
-        assert text.count("measured 3e-2") == 1
-
-    def test_one_seed_shows_no_interval(self) -> None:
-        assert "interval" not in TerminalReporter().render(RUN)
-
     def test_failures_are_told_and_counted(self) -> None:
         text = TerminalReporter().render(RUN)
         assert re.search(r"beam +broken +0 +failed +stiffness: measured 3e-2,", text)
@@ -198,76 +166,9 @@ class TestTerminal:
         many = [replace(FAILED, case=f"case{number}") for number in range(30)]
         assert "... and 10 more in the report" in TerminalReporter().render(run_of(*many))
 
-    def test_control_characters_do_not_reach_the_terminal(self) -> None:
-        evil = replace(FAILED, reason="\x1b[2Jgone\nnext\x07", case="a\x9bcase", strategy="s\x1bx")
-        text = TerminalReporter().render(run_of(evil))
-        assert not re.search(r"[\x00-\x09\x0b-\x1f\x7f-\x9f]", text)
-        assert "[2Jgone next" in text
-
 
 class TestMarkdown:
     TEXT = MarkdownReporter().render(RUN)
-
-    def test_says_how_to_repeat_the_run(self) -> None:
-        found = dict(with_header(self.TEXT, "", ""))
-        assert found["run"] == "20260101T000000Z-abcdef"
-        assert found["seed"] == "0"
-        assert found["versions"] == "python 3.11.0, femubench 0.1.0"
-        assert found["machine"] == r"platform Linux, cpu\_count 2"
-
-    def test_leaderboard(self) -> None:
-        rows = with_header(self.TEXT, "#", "strategy", "gain")
-        assert [row[:2] for row in rows] == [
-            ["1", "good"],
-            [r"\*2", "broken"],
-            ["!2", "imaginary"],
-            [r"\*2", "picky"],
-            ["5", "worse"],
-        ]
-        assert [row[2] for row in rows[1:4]] == ["0.000"] * 3
-
-    def test_coverage_and_reasons(self) -> None:
-        rows = {row[0]: row[1:] for row in with_header(self.TEXT, "strategy", "ok")}
-        assert rows["good"] == ["1", "0", "0", "1"]
-        assert rows["broken"] == ["0", "0", "1", "1"]
-        assert rows["picky"] == ["0", "1", "0", "1"]
-        reasons = [t for t in tables(self.TEXT) if t[0][-1] == "reason"]
-        assert [table[2][1] for table in reasons] == ["broken", "picky"]
-        assert reasons[0][2] == ["beam", "broken", "0", "failed", FAILED.reason]
-
-    def test_frequencies_as_in_the_papers(self) -> None:
-        assert "## Case beam\n\nThe beam." in self.TEXT
-        rows = with_header(self.TEXT, "strategy", "used 1", "used 2", "higher 3")
-        assert rows[0][:4] == ["measured", "100.0", "200.0", "300.0"]
-        found = {row[0]: row[1:] for row in rows[1:]}
-        assert found["good"][:3] == ["101.0 (+1.00)", "202.0 (+1.00)", "303.0 (+1.00)"]
-        assert found["worse"][0] == "115.0 (+15.00)"
-
-    def test_imaginary_and_missing_modes(self) -> None:
-        lost = result("lost", blocks={"used": block(mode(1, 100.0, None), mode(2, 200.0, -102.46))})
-        rows = with_header(MarkdownReporter().render(run_of(lost)), "strategy", "used 1")
-        assert rows[1][1:3] == ["– (no partner)", "102.5 i"]
-
-    def test_blocks_that_differ_between_strategies_keep_the_columns(self) -> None:
-        """`imaginary` has no higher block: its row must not shift."""
-        rows = {r[0]: r for r in with_header(self.TEXT, "strategy", "used 1")}
-        assert rows["imaginary (unphysical)"][3] == "–"
-        assert len(rows["imaginary (unphysical)"]) == len(rows["good"])
-
-    def test_design_changes(self) -> None:
-        rows = with_header(self.TEXT, "strategy", "1", "2")
-        assert "- **1**: beam: mass at 6\n- **2**: beam: spring at 6" in self.TEXT
-        found = {row[0]: [float(cell) for cell in row[1:]] for row in rows}
-        expected = 100.0 * math.sqrt((0.15**2 + 1.0) / 2.0)
-        assert found["worse"] == pytest.approx([expected, 15.0], abs=0.01)
-        assert list(found) == ["worse", "good"]
-
-    def test_design_changes_of_one_scenario_share_a_table(self) -> None:
-        parts = [result("good", 0.1, case=f"changes/{part}") for part in ("solid", "beam")]
-        rows = with_header(
-            MarkdownReporter().render(run_of(*parts)), "strategy", "1", "2", "3", "4"
-        )
-        assert rows == [["good", "70.71", "1.00", "70.71", "1.00"]]
 
     def test_names_cannot_break_it(self) -> None:
         evil = "a|b <script>*x*</script> [l](u) `c`\n| new"
@@ -288,12 +189,6 @@ class TestCsv:
         assert float(rows[1]["used_percent"]) == pytest.approx(1.0)
         assert rows[3]["reason"] == FAILED.reason
 
-    def test_modes(self) -> None:
-        rows = list(csv.DictReader(io.StringIO(ModesCsvReporter().render(RUN))))
-        assert len(rows) == 6 + 6 + 2
-        assert float(rows[0]["error_percent"]) == pytest.approx(15.0)
-        assert float(rows[12]["predicted_hz"]) == pytest.approx(-102.46)
-
     @pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r"])
     def test_no_cell_is_a_formula(self, start: str) -> None:
         reason = f'{start}HYPERLINK(1),"x"'
@@ -301,21 +196,8 @@ class TestCsv:
         (row,) = csv.DictReader(io.StringIO(text, newline=""))
         assert row["reason"] == row["case"] == f"'{reason}"
 
-    def test_negative_numbers_stay_numbers(self) -> None:
-        """A minus sign makes a formula of a text, not of a frequency."""
-        assert ",-102.46," in ModesCsvReporter().render(RUN)
-
 
 class TestJson:
-    def test_contract(self) -> None:
-        data = json.loads(JsonReporter().render(RUN))
-        assert data["meta"]["run"] == RUN.meta["run"]
-        good = data["results"][1]
-        assert {"case", "strategy", "seed", "status", "reason", "seconds"} <= set(good)
-        assert good["used"]["modes"][0]["predicted_hz"] == pytest.approx(101.0)
-        assert {"measured_hz", "predicted_hz", "mac"} <= set(good["used"]["modes"][0])
-        assert data["results"][3]["used"] is None
-
     def test_is_strict(self) -> None:
         def refuse(word: str) -> None:
             raise AssertionError(word)
@@ -326,31 +208,6 @@ class TestJson:
         assert data["results"][0]["diagnostics"] == {"residual": None, "bound": None}
 
 
-def test_cells() -> None:
-    assert [format_fixed(x) for x in (0.0, 1.234, 123.456, 12345.6)] == [
-        "0.00",
-        "1.23",
-        "123.5",
-        "12346",
-    ]
-    assert [format_fixed(x, 2, 4) for x in (99.999, 1234567.0, None, math.nan)] == [
-        "100",
-        "1e6",
-        "–",
-        "–",
-    ]
-    assert [whole(x) for x in (3.0, 2.5, None)] == ["3", "2.5", "–"]
-    assert [hertz(x) for x in (226.84, -102.46, None)] == ["226.8", "102.5 i", "–"]
-    assert plain("a\x1b[0m\n b") == "a [0m b"
-    assert [shorten_text(x, 5) for x in ("abcde", "abcdef")] == ["abcde", "abcd…"]
-
-
-def test_a_lost_mode_counts_whole_after_a_design_change() -> None:
-    imaginary = result("x", blocks={"modified": block(mode(1, 50.0, -3.0, "c"))})
-    rows = with_header(MarkdownReporter().render(run_of(imaginary)), "strategy", "1")
-    assert rows == [["x", "100.00"]]
-
-
 class TestFinding:
     """The sentences on what a run shows."""
 
@@ -358,7 +215,7 @@ class TestFinding:
         return finding(run, list_rows(run))
 
     def test_how_far_off_in_percent_and_how_sure_that_is(self) -> None:
-        run = synthetic_run(60, 12, failing=0.0)
+        run = synthetic_run(20, 12, failing=0.0)
         best = leaderboard(run).to_dict("records")[0]
         said = [sentence.replace("\u2212", "-") for sentence in self.stated(run)]
         assert said[0] == (
@@ -375,17 +232,10 @@ class TestFinding:
         assert said[2] == (
             f"Its gain is {best['gain']:.3f} (95 % interval {ends} over {count} structures)."
         )
-        assert 5 < len(best["better_than"]) < 60
+        assert 5 < len(best["better_than"]) < 20
         below = [name for name in best["better_than"] if name != "unchanged"]
-        assert said[3] == f"It is shown to be better than {len(below)} of 58 other strategies."
+        assert said[3] == f"It is shown to be better than {len(below)} of 18 other strategies."
         assert said[4].startswith("Shown to be better than the models that were given: ")
-
-    def test_no_improvement_is_told_as_such(self) -> None:
-        first, second, *_, last = self.stated(run_of(WORSE))
-        assert first == "No strategy gains on the nominal models."
-        assert "the nominal models are 9.5 % off, the best strategy, worse, 14.0 %" in second
-        assert last == "No difference between any two lines of the board is shown."
-        assert "\u2212" in " ".join(self.stated(run_of(WORSE)))
 
     def test_a_yardstick_never_leads_and_stands_between_handbooks_and_the_best(self) -> None:
         line = {"good": "the given ratios carried on"}
@@ -394,20 +244,12 @@ class TestFinding:
             "9.5 % off, the given ratios carried on 1.0 %, the best strategy, best, 4.9 %" in first
         )
 
-    def test_equal_gains_share_the_lead(self) -> None:
-        twins = [result(name, 0.1) for name in ("a", "b")]
-        assert "the best strategies, a and b, 1.0 %" in self.stated(run_of(*twins))[0]
-
     def test_few_structures_or_no_model(self) -> None:
         alone = self.stated(run_of(GOOD))
         assert alone[1] == "That is better than the nominal models."
         assert "interval" not in " ".join(alone)
         assert self.stated(run_of(FAILED)) == ["No strategy gave a possible model."]
         assert self.stated(Run({}, ())) == []
-
-    def test_stands_in_the_markdown(self) -> None:
-        headline = self.stated(RUN)[0]
-        assert escape(headline) in MarkdownReporter().render(RUN)
 
 
 def test_notes_name_what_still_moves_and_what_does_not_apply() -> None:

@@ -11,33 +11,11 @@ from femubench.reproduction import (
     Choice,
     Convention,
     Equation,
-    PrintedTable,
-    as_printed,
-    places_of,
     under,
 )
 
 CELLS = toys.study().cells
 MATH = "<math><mi>x</mi></math>"
-
-
-class TestPrintedTable:
-    def test_what_no_layout_has_follows(self) -> None:
-        first, second = as_printed((toys.table(),), CELLS)
-        assert [table.table for table, _ in (first, second)] == ["1", "4d"]
-        table, own = first
-        placed = [place for grid in table.grids for place in grid.places]
-        assert sorted(placed) == sorted(own)
-        assert table.grids[1].heads == ("", "Kabe")
-
-    def test_no_cells(self) -> None:
-        ((table, own),) = as_printed((PrintedTable("9", "", ()),), ())
-        assert (table.grids, own) == ((), {})
-
-    def test_entries(self) -> None:
-        assert places_of("12.5") == ()
-        assert places_of(("a", "b")) == (("a", "b"),)
-        assert places_of((("a", "b"), ("a", "c"))) == (("a", "b"), ("a", "c"))
 
 
 class TestConvention:
@@ -48,10 +26,6 @@ class TestConvention:
         assert verdicts == {"mode 3": "does-not-follow", "mode 4": "under-convention"}
         assert found["1", "mode 4", "FE"].note.endswith("; with | it")
         assert found["1", "mode 3", "FE"].note == "the figures do not agree: with | it"
-
-    def test_what_cannot_be_checked_stays_so(self) -> None:
-        found = under(Choice("x", {("4d", "MAC", "1"): 75.0}, "independent"), CELLS)
-        assert [cell.verdict for cell in found.values()] == ["cannot-be-checked"]
 
     def test_unknown_cell(self) -> None:
         with pytest.raises(InputError, match="no judged cell"):

@@ -11,12 +11,10 @@ import scipy.sparse as sp
 
 from femubench.core.fem.frame import (
     Frame,
-    GroundSpring,
     Place,
     Support,
 )
-from femubench.core.fem.model import Dofs, LowRank, Model
-from femubench.core.fem.sensors import DIRECTIONS
+from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import (
     dense_matrices,
     solve_dense,
@@ -36,7 +34,7 @@ def straining(model: Model, vectors: FloatArray) -> float:
 
 
 @pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_any_free_spatial_frame_has_six_rigid_modes(
     fitted_portal: FrameBuilder, seed: int, theory: str
 ) -> None:
@@ -61,7 +59,7 @@ def turned_ladder(frame: Frame, plane: str, angle: float) -> Frame:
     return replace(frame, joints=tuple(joints), plane=plane)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.3, 1.0, np.pi / 2, 2.5])
+@pytest.mark.parametrize("angle", [0.3, np.pi / 2])
 @pytest.mark.parametrize("plane", ["in-plane", "out-of-plane"])
 def test_planar_frames_have_three_in_every_orientation(
     asymmetric_ladder: FrameBuilder, plane: str, angle: float
@@ -78,7 +76,7 @@ def test_planar_frames_have_three_in_every_orientation(
     )
 
 
-@pytest.mark.parametrize("elements", [4, 20, 60, 150])
+@pytest.mark.parametrize("elements", [4, 150])
 def test_fine_meshes_keep_their_rigid_modes(ladder: FrameBuilder, elements: int) -> None:
     model = Model.of(ladder(elements=elements))
     modes = solve_modes(model, 8)
@@ -86,20 +84,6 @@ def test_fine_meshes_keep_their_rigid_modes(ladder: FrameBuilder, elements: int)
     assert modes.rigid.sum() == 3
     assert np.abs(modes.eigenvalues[:3]).max() <= 1e-9 * modes.eigenvalues[3]
     assert straining(model, rigid_body_vectors(model.dofs)) < 1e-14
-
-
-@pytest.mark.parametrize("elements", [4, 12, 60])
-def test_a_soft_suspension_makes_rigid_modes_elastic_on_any_mesh(
-    ladder: FrameBuilder, elements: int
-) -> None:
-    springs = tuple(GroundSpring(Place(joint=j), "z", 100.0) for j in "ACDF")
-    frame = replace(ladder(elements=elements, accelerometer=False), springs=springs)
-    modes = solve_modes(Model.of(frame), 8)
-    assert not modes.rigid.any()
-    area, density = frame.members[0].section.A, 2700.0
-    length = 4 * 0.2921 + 3 * 0.2794
-    bounce = np.sqrt(400.0 / (area * density * length)) / (2 * np.pi)
-    assert modes.natural_frequencies[0] == pytest.approx(bounce, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -114,14 +98,6 @@ def test_supports_take_rigid_modes_away(
     assert np.sum(modes.eigenvalues <= zero_tolerance(modes)) == left
 
 
-def test_one_spring_leaves_two(ladder: FrameBuilder) -> None:
-    frame = replace(ladder(), springs=(GroundSpring(Place(member="EF", s=0.4), "z", 1e4),))
-    modes = solve_modes(Model.of(frame))
-    assert modes.rigid.sum() == 2
-    no_spring = replace(frame, springs=(GroundSpring(Place(member="EF", s=0.4), "z", 0.0),))
-    assert solve_modes(Model.of(no_spring)).rigid.sum() == 3
-
-
 def test_matrices_without_geometry_are_judged_by_energy(ladder: FrameBuilder) -> None:
     model = Model.of(ladder())
     bare = replace(model, structure=None, dofs=replace(model.dofs, axes=None))
@@ -130,29 +106,7 @@ def test_matrices_without_geometry_are_judged_by_energy(ladder: FrameBuilder) ->
     assert rigid_modes_of(held).shape == (81, 2)
 
 
-def test_a_lost_rigid_mode_is_not_counted_as_one(ladder: FrameBuilder) -> None:
-    model = Model.of(ladder())
-    rigid = rigid_modes_of(model)
-    force = np.asarray(model.mass @ rigid[:, :1])
-    stiff = replace(model, stiffness_change=LowRank(force, np.array([[(2 * np.pi * 90) ** 2]])))
-    modes = solve_modes(stiff)
-    kept = modes.rigid & (np.abs(modes.eigenvalues) <= zero_tolerance(modes))
-    assert kept.sum() == 2
-    assert np.abs(modes.natural_frequencies - 90.0).min() < 1e-6
-
-
-def test_rigid_vectors_of_labelled_dofs() -> None:
-    xyz = np.array([[1.0, 2.0, 3.0]] * 6 + [[-1.0, 0.5, 2.0]] * 6)
-    dofs = Dofs(np.repeat([0, 1], 6), DIRECTIONS * 2, xyz)
-    vectors = rigid_body_vectors(dofs)
-    assert vectors.shape == (12, 6)
-    assert np.linalg.matrix_rank(vectors) == 6
-    # Every motion keeps the distance of the two points to first order.
-    gap = xyz[0] - xyz[6]
-    assert np.abs(gap @ (vectors[:3] - vectors[6:9])).max() < 1e-14
-
-
-@pytest.mark.parametrize("height", [0.0, 0.1, 0.2, 0.7])
+@pytest.mark.parametrize("height", [0.0, 0.7])
 def test_a_plane_off_the_origin_has_no_further_rigid_modes(
     hframe: FrameBuilder, height: float
 ) -> None:

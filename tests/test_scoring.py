@@ -66,11 +66,6 @@ def test_rms_is_that_of_the_relative_frequency_errors(case: Case) -> None:
     assert 2.0 < block.rms_percent < 10.0  # E is 10 % too high
 
 
-def test_a_block_without_data_is_not_there(case: Case) -> None:
-    bare = replace(case, held_out=(), modifications=())
-    assert list(score_model(bare, case.model)) == ["used"]
-
-
 def test_the_truth_scores_almost_nothing(case: Case, reference: Reference) -> None:
     masses = (toys.PointMass(toys.Place(joint="A"), 0.005),)
     truth = Model.of(toys.frame(9, 70.0e9, masses))

@@ -9,7 +9,6 @@ import pytest
 
 from femubench.core.fem.sections import (
     SHAPES,
-    bredt,
     rectangular_tube,
     round_tube,
     saint_venant_rectangle,
@@ -58,16 +57,11 @@ def test_torsion_of_a_solid_rectangle(ratio: float, beta: float) -> None:
         assert saint_venant_rectangle(a, b) == pytest.approx(beta * ratio, rel=5e-4)
 
 
-@pytest.mark.parametrize("thickness", [1e-4, 1e-100, np.finfo(float).tiny])
+@pytest.mark.parametrize("thickness", [1e-4, np.finfo(float).tiny])
 def test_torsion_of_a_foil_is_a_third_of_width_times_thickness_cubed(thickness: float) -> None:
     assert saint_venant_rectangle(100.0, thickness) == pytest.approx(
         100.0 * thickness**3 / 3.0, rel=1e-5
     )
-
-
-def test_bredt_is_four_area_squared_over_the_wall_integral() -> None:
-    b, h, wall = 0.03, 0.05, 0.002
-    assert bredt(b, h, wall) == pytest.approx(4 * (b * h) ** 2 / (2 * (b + h) / wall), rel=1e-14)
 
 
 def test_round_sections() -> None:
@@ -77,7 +71,7 @@ def test_round_sections() -> None:
     assert tube.J == tube.Jp == pytest.approx(2 * tube.Iy)
 
 
-@pytest.mark.parametrize("wall", [0.0001, 0.004, 0.0199])
+@pytest.mark.parametrize("wall", [0.0001, 0.0199])
 def test_the_wall_follows_from_the_area(wall: float) -> None:
     assert wall_of(rectangular_tube(0.04, 0.08, wall)) == pytest.approx(wall, rel=1e-9)
     assert wall_of(round_tube(0.04, wall)) == pytest.approx(wall, rel=1e-9)
@@ -85,7 +79,7 @@ def test_the_wall_follows_from_the_area(wall: float) -> None:
     assert wall_of(replace(rectangular_tube(0.04, 0.08, wall), shape="")) == 0.0
 
 
-@pytest.mark.parametrize("nu", [0.0, 0.25, 0.33, 0.5])
+@pytest.mark.parametrize("nu", [0.0, 0.33])
 def test_cowpers_coefficients(nu: float) -> None:
     # Cowper 1966, table 1: closed forms of the special sections.
     square = SHAPES["square-tube"][0](0.04, 0.002).kappa
@@ -100,22 +94,3 @@ def test_cowpers_coefficients(nu: float) -> None:
     }
     for kappa, value in expected.items():
         np.testing.assert_allclose(kappa(nu), [value, value], rtol=1e-8)
-
-
-def test_shear_in_a_deep_box_is_carried_by_its_webs() -> None:
-    # Without Poisson's effect kappa A of a deep box is about its web area; wide flanges lag.
-    box = rectangular_tube(0.10, 0.04, 0.002)
-    assert box.kappa is not None
-    along_y, along_z = box.kappa(0.0)
-    assert along_y * box.A == pytest.approx(2 * 0.098 * 0.002, rel=0.15)
-    assert along_z * box.A < 2 * 0.038 * 0.002
-
-
-def test_every_shape_is_named_and_positive() -> None:
-    sizes = {"width": 0.04, "height": 0.05, "diameter": 0.03, "wall": 0.003}
-    for name, (build, keys) in SHAPES.items():
-        section = build(*(sizes[key] for key in keys))
-        assert section.shape, name
-        assert min(section.A, section.Iy, section.Iz, section.J, section.Jp) > 0.0
-        assert section.width is not None
-        assert section.height is not None

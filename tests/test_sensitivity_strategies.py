@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from scipy import stats
 
 from femubench import (
@@ -22,6 +20,7 @@ from femubench import (
     UpdateResult,
     solve_modes,
 )
+from femubench.core.conformance.problems import problem
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.fem.model_parameters import matrix_slopes
 from femubench.core.fem.sections import constant_kappa
@@ -33,16 +32,12 @@ from femubench.fem import (
     Frame,
     GroundSpring,
     Joint,
-    JointSpring,
     Material,
     Member,
     Place,
     PointMass,
     Property,
     Section,
-    Structure,
-    Support,
-    rectangular_tube,
 )
 from femubench.plugins.strategies.bayesian import Bayesian
 from femubench.plugins.strategies.factors import Global, Local
@@ -58,15 +53,12 @@ from femubench.update import (
     select_determined,
     sensitivity_update,
     spring_estimates,
-    with_joint_springs,
 )
 
 RNG = np.random.default_rng(0)
 HFRAME_HZ = np.array([77.13, 137.60, 300.90, 404.98, 482.23])
 LADDER_HZ = np.array([226.8, 275.2, 537.4])
 PAPER_SPRINGS = {"x": 3.30e9, "z": 4.48e9, "ry": 3.02e6}
-STRONGLY_DAMPED = UpdateOptions(damping=3e-3)
-EVERY = (Global(), Local(), Spring(), Offset(), Bayesian())
 
 
 def sensors_on(frame: Frame) -> Sensors:
@@ -116,68 +108,6 @@ def ratios(result: UpdateResult) -> dict[str, float]:
     return {p.name: p.after / p.before for p in result.parameters}
 
 
-# Table 4 --------------------------------------------------------------------------------------
-
-
-def test_row_a_global(hframe_case: Any) -> None:
-    paper = UpdateOptions(residual="eigenvalue")
-    result = Global(options=paper).update(*hframe_case, RNG)
-    assert ratios(result) == {"EI all members": pytest.approx(0.8942, abs=1e-4)}
-    np.testing.assert_allclose(
-        solve_modes(result.model).elastic.natural_frequencies[:5],
-        [74.26, 139.33, 282.84, 385.96, 495.16],
-        rtol=4e-4,
-    )
-
-
-def test_row_b_local(hframe_case: Any) -> None:
-    result = Local().update(*hframe_case, RNG)
-    assert ratios(result) == {
-        "EI at T branch": pytest.approx(0.4906, abs=1e-4),
-        "EI at T through": pytest.approx(1.0878, abs=1e-4),
-    }
-    # the paper stopped a little short of the optimum: .4928 and 1.0814
-    assert ratios(result)["EI at T branch"] == pytest.approx(0.4928, rel=0.01)
-    assert ratios(result)["EI at T through"] == pytest.approx(1.0814, rel=0.01)
-
-
-def test_row_d_spring_with_the_global_factor_frozen(hframe_case: Any) -> None:
-    strategy = Spring(
-        arm=0.02, stiffness=PAPER_SPRINGS, free_stiffness=False, options=STRONGLY_DAMPED
-    )
-    result = strategy.update(*hframe_case, RNG)
-    after = {p.name: p.after for p in result.parameters}
-    assert after["k_ry T branch"] == pytest.approx(273725, rel=1e-3)
-    assert after["k_x T branch"] == pytest.approx(3.24e9, rel=0.01)
-    assert after["k_z T branch"] == pytest.approx(4.35e9, rel=0.015)
-    np.testing.assert_allclose(
-        solve_modes(result.model).elastic.natural_frequencies[:5],
-        [75.16, 135.41, 298.82, 402.89, 482.51],
-        rtol=4e-4,
-    )
-    nominal = [79.31, 151.45, 299.05, 411.55, 539.36]
-    first = with_joint_springs(
-        hframe_case[0].frame_structure,
-        {f"horizontal@{joint}": PAPER_SPRINGS for joint in ("T1", "T2")},
-        arm=0.02,
-    )
-    np.testing.assert_allclose(
-        solve_modes(Model.of(first)).elastic.natural_frequencies[:5], nominal, rtol=1e-4
-    )
-
-
-def test_row_d_spring_with_the_global_factor_free(hframe_case: Any) -> None:
-    strategy = Spring(arm=0.02, stiffness=PAPER_SPRINGS, options=STRONGLY_DAMPED)
-    result = strategy.update(*hframe_case, RNG)
-    assert result.parameter_count == 4
-    assert ratios(result)["EI all members"] == pytest.approx(1.0133, abs=1e-4)
-    assert ratios(result)["k_ry T branch"] == pytest.approx(259210 / 3.02e6, rel=1e-3)
-    # the rule of the paper on mesh C comes near the same
-    by_rule = Spring(arm=0.02, options=STRONGLY_DAMPED).update(*hframe_case, RNG)
-    assert ratios(by_rule)["EI all members"] == pytest.approx(1.0133, abs=1e-3)
-    assert by_rule.parameters[0].after == pytest.approx(259210, rel=0.01)
-
-
 def nearest_factor(residual: str, measured_hz: np.ndarray, nominal_hz: np.ndarray) -> float:
     """Return the factor on the whole stiffness with the least sum of squares, in closed form."""
     if residual == "frequency":
@@ -203,46 +133,6 @@ def test_global_gives_the_factor_that_its_residual_asks_for(ladder: Any, residua
         assert abs(factor / nearest_factor(other, LADDER_HZ, nominal) - 1.0) > 1e-3
 
 
-@pytest.mark.nightly
-def test_spring_comes_nearer_to_the_data_the_weaker_its_damping(hframe_case: Any) -> None:
-    costs = [
-        Spring(options=UpdateOptions(damping=damping)).update(*hframe_case, RNG).history[-1]["cost"]
-        for damping in (0.1, 3e-3, UpdateOptions().damping)
-    ]
-    assert costs == sorted(costs, reverse=True)
-    assert costs[2] < 0.9 * costs[1]
-    assert Spring().update(*hframe_case, RNG).history[-1]["cost"] == costs[2]
-
-
-def test_row_e_offset(hframe_case: Any) -> None:
-    result = Offset(length=0.02, options=STRONGLY_DAMPED).update(*hframe_case, RNG)
-    assert ratios(result)["a T branch"] == pytest.approx(-1.4248, abs=1e-3)
-    assert ratios(result)["EI all members"] == pytest.approx(1.0053, abs=1e-4)
-    assert ratios(result)["a T through"] == pytest.approx(1.0, abs=1e-3)
-    np.testing.assert_allclose(
-        solve_modes(result.model).elastic.natural_frequencies[:5],
-        [76.70, 138.77, 299.18, 405.73, 482.17],
-        rtol=1.5e-3,
-    )
-
-
-def test_row_c_scales_all_members_of_the_spring_model(hframe_case: Any) -> None:
-    """The updated column of the paper needs rigid springs; only the ratio is determined."""
-    rigid = {name: 1e4 * value for name, value in PAPER_SPRINGS.items()}
-    heavy = UpdateOptions(damping=1.0, max_iterations=12)
-    strategy = Spring(arm=0.02, stiffness=rigid, variant="global", options=heavy)
-    result = strategy.update(*hframe_case, RNG)
-    found = ratios(result)
-    assert set(found) == {"EI all members", "rhoA all members"}
-    ratio = found["EI all members"] / found["rhoA all members"]
-    assert ratio == pytest.approx((15826 / 17015) / (3.159 / 2.814), rel=2e-3)
-    np.testing.assert_allclose(
-        solve_modes(result.model).elastic.natural_frequencies[:5],
-        [72.67, 139.82, 273.31, 376.71, 500.00],
-        rtol=4e-4,
-    )
-
-
 def test_initial_springs_are_twice_those_of_the_element_behind(hframe_case: Any) -> None:
     """The printed values come from elements of 0.0450 m, mesh C has 0.04625 m."""
     frame = hframe_case[0].frame_structure.frame
@@ -251,11 +141,6 @@ def test_initial_springs_are_twice_those_of_the_element_behind(hframe_case: Any)
     powers = {"x": 1, "z": 3, "ry": 1}
     expected = {name: PAPER_SPRINGS[name] / longer**power for name, power in powers.items()}
     assert found == pytest.approx(expected, rel=2e-3)
-
-
-def test_a_section_given_as_numbers_has_no_depth(hframe_case: Any) -> None:
-    frame = hframe_case[0].frame_structure.frame
-    assert half_depth(frame, "horizontal@T1") == 0.0
 
 
 # The iteration --------------------------------------------------------------------------------
@@ -297,11 +182,8 @@ def test_every_step_is_equation_4(hframe_case: Any) -> None:
     assert structure.changes == ()
 
 
-@pytest.mark.parametrize("damping", [0.0, 1e-9])
-def test_stiffness_stays_positive_where_damping_is_too_small(
-    hframe_case: Any, damping: float
-) -> None:
-    options = UpdateOptions(damping=damping)
+def test_stiffness_stays_positive_without_damping(hframe_case: Any) -> None:
+    options = UpdateOptions(damping=0.0)
     strategy = Spring(arm=0.02, stiffness=PAPER_SPRINGS, options=options)
     result = strategy.update(*hframe_case, RNG)
     for entry in result.history:
@@ -312,8 +194,6 @@ def test_stiffness_stays_positive_where_damping_is_too_small(
 @pytest.mark.parametrize(
     ("strategy", "residual"),
     [
-        (Local, "eigenvalue"),
-        (Local, "relative-eigenvalue"),
         (Local, "frequency"),
         (Spring, "relative-eigenvalue"),
         (Offset, "eigenvalue"),
@@ -418,57 +298,32 @@ def test_no_more_parameters_than_frequencies(hframe_case: Any) -> None:
 # Other frames ---------------------------------------------------------------------------------
 
 
-def table_frame(elements: int, beam: str, softness: float = 0.0, **parts: Any) -> Frame:
-    """Return a 3-D box of eight tubes on four feet, a rail across; softer joints on request."""
-    tube = rectangular_tube(0.04, 0.04, 0.0025)
-    at = {
-        "A": (0.0, 0.0, 0.0),
-        "B": (1.0, 0.0, 0.0),
-        "C": (1.0, 0.8, 0.0),
-        "D": (0.0, 0.8, 0.0),
-        "E": (0.0, 0.0, 0.6),
-        "F": (1.0, 0.0, 0.6),
-        "G": (1.0, 0.8, 0.6),
-        "H": (0.0, 0.8, 0.6),
-        "M": (0.5, 0.0, 0.6),
-        "N": (0.5, 0.8, 0.6),
-    }
-    kinds = {**dict.fromkeys("ABCD", "foot"), **dict.fromkeys("EFGH", "corner")}
-    joints = tuple(Joint(name, xyz, kinds.get(name, "T")) for name, xyz in at.items())
-    pairs = ("AE", "BF", "CG", "DH", "EM", "MF", "FG", "GN", "NH", "HE", "MN")
-    material = parts.pop("material")
-    members = tuple(Member(p, (p[0], p[1]), elements, tube, material) for p in pairs)
-    springs = tuple(
-        JointSpring(joint, member, {"ry": 3e4, "rz": 3e4})
-        for joint, member in (("F", "BF"), ("M", "MN"), ("N", "MN"))
-        if softness
-    )
-    return Frame("3d", beam, joints, members, joint_springs=springs, **parts)  # type: ignore[arg-type]
-
-
-def other_cases(ladder: Any, asymmetric: Any) -> Iterator[tuple[str, Frame, Measurement]]:
-    finer = ladder("timoshenko", polar=False, elements=8, E=71e9)
-    yield "ladder", ladder(), measured(finer, 3, LADDER_HZ)
-    supports = (Support(Place(joint="A"), ("z", "rx", "ry")), Support(Place(joint="D"), ("z",)))
-    held = replace(ladder(), supports=supports)
-    yield "supported", held, measured(replace(finer, supports=supports), 4)
-    truth = asymmetric(3.0, beam="timoshenko", polar=False, elements=8, E=71e9)
-    yield "asymmetric", ladder(stretch=1.04), measured(truth, 5)
-    aluminium = ladder().members[0].material
-    space = table_frame(4, "timoshenko", 1.0, material=replace(aluminium, E=66e9))
-    yield "3d", table_frame(2, "euler-bernoulli", material=aluminium), measured(space, 5)
+IN_PLANE, IN_SPACE = "grounded frame in plane", "free frame in space"
 
 
 @pytest.fixture(scope="module")
 def cases(ladder: Any, asymmetric_ladder: Any) -> dict[str, tuple[Model, Measurement]]:
+    finer = ladder("timoshenko", polar=False, elements=8, E=71e9)
+    truth = asymmetric_ladder(3.0, beam="timoshenko", polar=False, elements=8, E=71e9)
     return {
-        name: (Model.of(nominal), data)
-        for name, nominal, data in other_cases(ladder, asymmetric_ladder)
+        "ladder": (Model.of(ladder()), measured(finer, 3, LADDER_HZ)),
+        "asymmetric": (Model.of(ladder(stretch=1.04)), measured(truth, 5)),
+        **{name: (problem(name).model, problem(name).measurement) for name in (IN_PLANE, IN_SPACE)},
     }
 
 
-@pytest.mark.parametrize("case", ["ladder", "supported", "asymmetric", "3d"])
-@pytest.mark.parametrize("strategy", EVERY, ids=lambda s: s.name)
+@pytest.mark.parametrize(
+    ("strategy", "case"),
+    [
+        *((Global(), "ladder"), (Local(), IN_PLANE), (Spring(), IN_SPACE), (Spring(), IN_PLANE)),
+        *(
+            (Offset(), "asymmetric"),
+            (Offset(), IN_SPACE),
+            (Bayesian(), "ladder"),
+            (Bayesian(), IN_SPACE),
+        ),
+    ],
+)
 def test_every_strategy_gives_a_physical_model_on_other_frames(
     cases: Any, strategy: Strategy, case: str
 ) -> None:
@@ -501,23 +356,14 @@ def test_the_softer_joint_of_the_asymmetric_frame_comes_out_softer(cases: Any) -
     assert estimates["E at L"].after < 1.0 - 2.0 * (estimates["E at L"].std or 0.0)
 
 
-def test_joint_groups(hframe: Any, ladder: Any, cases: Any) -> None:
+def test_joint_groups(hframe: Any, ladder: Any) -> None:
     groups = {group.name: group.ends for group in joint_groups(hframe())}
     assert groups == {
         "T through": ("lower1@T1", "upper1@T1", "lower2@T2", "upper2@T2"),
         "T branch": ("horizontal@T1", "horizontal@T2"),
     }
-    assert {g.name: len(g.ends) for g in joint_groups(ladder())} == {
-        "L": 8,
-        "T through": 4,
-        "T branch": 2,
-    }
-    space = cases["3d"][0].frame_structure.frame
-    assert {g.name: len(g.ends) for g in joint_groups(space)} == {
-        "corner": 12,
-        "T through": 4,
-        "T branch": 2,
-    }
+    found = {group.name: len(group.ends) for group in joint_groups(ladder())}
+    assert found == {"L": 8, "T through": 4, "T branch": 2}
     untyped = replace(ladder(), joints=tuple(replace(j, type="") for j in ladder().joints))
     assert len(joint_groups(untyped)) == 8
     assert [g.name for g in groups_within(untyped, 3)] == ["all", "all through", "all branch"]
@@ -595,7 +441,7 @@ def test_the_stated_deviations_are_right(ladder: Any) -> None:
     std = np.array([change.parameters[0].std for change in changes])
     parameters = [change.property for change in changes]
     scores = []
-    for _ in range(60):
+    for _ in range(30):
         truth = std * rng.standard_normal(len(std))
         real = Model.of(structure.with_values(parameters, np.exp(truth)))
         data = measured(real, 6, std=0.003).with_noise(rng)
@@ -630,24 +476,6 @@ def test_weighing_tells_density_from_stiffness(ladder: Any) -> None:
     assert bare["E all members"].after == pytest.approx(1.0 / 1.05, rel=0.02)
 
 
-def test_shapes_as_data_sharpen_the_parameters(ladder: Any) -> None:
-    model = Model.of(ladder(elements=2))
-    options = replace(Bayesian().options, shapes=True)
-    structure = model.frame_structure
-    parameters = [change.property for change in Bayesian().pose(model, measured(model, 4))[1]]
-    values = [0.97, 0.8, 0.7, 1.1, 0.8]
-    truth = Model.of(structure.with_values(parameters, values))
-    rng = np.random.default_rng(5)
-    data = measured(truth, 4).with_noise(rng)
-    frequencies = Bayesian().update(model, data, RNG)
-    both = Bayesian(options=options).update(model, data, RNG)
-    for one, two, value in zip(frequencies.parameters, both.parameters, values, strict=True):
-        assert one.std is not None
-        assert two.std is not None
-        assert two.std < one.std
-        assert abs(two.after - value) < 4.0 * two.std
-
-
 def test_the_jacobian_of_scaled_shapes(ladder: Any) -> None:
     model = Model.of(ladder(elements=2))
     structure = model.frame_structure
@@ -671,16 +499,7 @@ def test_statistics_need_deviations(hframe_case: Any) -> None:
         Bayesian().update(model, replace(data, frequency_std=np.zeros(5)), RNG)
 
 
-def test_matrices_of_the_result_are_sparse(hframe_case: Any) -> None:
-    result = Offset().update(*hframe_case, RNG)
-    assert isinstance(result.model.frame_structure, Structure)
-    assert sp.issparse(result.model.stiffness)
-    assert result.model.stiffness_change is None
-
-
-@pytest.mark.parametrize(
-    "strategy", [Spring(), Offset(), Local(), Bayesian()], ids=lambda s: s.name
-)
+@pytest.mark.parametrize("strategy", [Spring(), Local(), Bayesian()], ids=lambda s: s.name)
 def test_sections_given_as_the_numbers_that_the_plane_needs(strategy: Strategy) -> None:
     section = Section(A=2.2e-4, Iy=2.0e-8, Iz=0.0, J=3.0e-8, Jp=4.0e-8)
     tube = Material(68e9, 0.33, 2700.0)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from diagnosis_problems import effects_named
 
 from femubench.core.challenge.draw import draw_case
 from femubench.core.cli.main import bench
@@ -26,25 +27,19 @@ from femubench.core.inference.settings import (
 ROOT = Path(__file__).parents[1]
 ROOMS = ("inference", "look", "advise", "diagnosis")
 NUMBER = re.compile(r"^_?[A-Z][A-Z_0-9, ]*(?::.*)? = .*[0-9]", re.MULTILINE)
-DECISIONS = [name for name, s in settings_table().items() if s.kind == "decision"]
 
 
-@pytest.mark.parametrize("name", settings_table())
-def test_every_number_stands_in_the_docs(name: str) -> None:
-    entry = settings_table()[name]
-    cells = f"`{name}`", format_value(entry.value), entry.unit, entry.kind, entry.why
-    assert f"| {' | '.join(cells)} |" in (ROOT / "docs" / "settings.md").read_text("utf-8")
-
-
-def test_the_docs_have_no_other_numbers() -> None:
+def test_the_docs_have_every_number_and_no_other() -> None:
     text = (ROOT / "docs" / "settings.md").read_text("utf-8")
+    for name, entry in settings_table().items():
+        cells = f"`{name}`", format_value(entry.value), entry.unit, entry.kind, entry.why
+        assert f"| {' | '.join(cells)} |" in text
     assert re.findall(r"^\| `(\w+)`", text, re.MULTILINE) == list(settings_table())
     assert len(settings_table()) < 120
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_no_module_has_numbers_of_its_own(room: str) -> None:
-    for path in (ROOT / "core" / room).glob("*.py"):
+def test_no_module_has_numbers_of_its_own() -> None:
+    for path in (path for room in ROOMS for path in (ROOT / "core" / room).glob("*.py")):
         found = NUMBER.findall(path.read_text("utf-8"))
         assert [line for line in found if not line.startswith("_CURRENT")] == [], path
 
@@ -63,12 +58,11 @@ def test_other_values_last_as_long_as_their_block() -> None:
     )
 
 
-@pytest.mark.parametrize("name", DECISIONS)
-def test_every_decision_can_be_given_its_own_value_in_words(name: str) -> None:
-    value = settings_table()[name].value
-    given = decisions_from([f"{name} = {format_value(value)}"])
-    assert given == {name: value}
-    assert type(given[name]) is type(value)
+def test_every_decision_can_be_given_its_own_value_in_words() -> None:
+    for name, value in ((n, s.value) for n, s in settings_table().items() if s.kind == "decision"):
+        given = decisions_from([f"{name} = {format_value(value)}"])
+        assert given == {name: value}
+        assert type(given[name]) is type(value)
 
 
 @pytest.mark.parametrize(
@@ -79,8 +73,6 @@ def test_every_decision_can_be_given_its_own_value_in_words(name: str) -> None:
         ("sure_fault", "--set sure_fault", "name=value"),
         ("sure_fault=much", "sure_fault = no number", "a number > 0 and < 1, such as 0.9"),
         ("sure_fault=1", "sure_fault = 1", "a number > 0 and < 1, such as 0.9"),
-        ("sure_fault=0.9,0.95", "sure_fault = 0.9,0.95", "a number > 0 and < 1, such as 0.9"),
-        ("too_small=0", "too_small = 0", "a number > 0, such as 12"),
         ("too_small=nan", "too_small = nan", "a number > 0, such as 12"),
         ("largest_group=2.5", "largest_group = 2.5", "a whole number >= 1, such as 6"),
         ("usual_std=0.1", "usual_std = 0.1", "2 numbers > 0, by comma, such as 1e-05,0.2"),
@@ -98,11 +90,12 @@ def test_what_cannot_be_set_gives_one_line(word: str, what: str, expected: str) 
 
 def test_a_verdict_moves_with_its_decision_and_a_note_says_so() -> None:
     case = draw_case(1001, "A", structure="ladder", hidden="none").case
-    plain = diagnose(case, pairs=False, faults=())
+    sought = effects_named("added-mass", "joint-rotation")
+    plain = diagnose(case, sought, pairs=False, faults=())
     assert plain.verdict == "none"
     assert not any("Settings" in note for note in plain.notes)
     with overridden({"nothing_missing": 0.999}):
-        moved = diagnose(case, pairs=False, faults=())
+        moved = diagnose(case, sought, pairs=False, faults=())
     assert moved.verdict != "none"
     assert moved.nothing == plain.nothing < 0.999
     assert moved.notes[-1] == "Settings other than the standard ones: nothing_missing = 0.999."

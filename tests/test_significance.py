@@ -25,7 +25,6 @@ from femubench.core.score.statistics import (
     weigh_evidence,
 )
 from femubench.core.typing import FloatArray
-from femubench.reports.runs import TerminalReporter
 from femubench.results import interval_kind, leaderboard, run_from_json, run_to_json
 
 TRIALS = 400
@@ -81,14 +80,14 @@ NINE = {
 }
 
 
-@pytest.mark.parametrize("seeds", [1, 5, 20])
-@pytest.mark.parametrize("structures", NINE.values(), ids=lambda s: f"{max(s) + 1}-structures")
-def test_no_difference_is_seldom_called_one(structures: Sequence[int], seeds: int) -> None:
+@pytest.mark.parametrize(("count", "seeds"), [(9, 1), (7, 5), (6, 20), (4, 1)])
+def test_no_difference_is_seldom_called_one(count: int, seeds: int) -> None:
     """The same on all but structures, cases and noise: 7 % of false alarms at most."""
+    structures = NINE[count]
     random = np.random.default_rng([7, seeds, max(structures)])
     said = Counter(judged(drawn(random, structures, seeds)).verdict for _ in range(TRIALS))
     false = said["better"] + said["worse"]
-    if max(structures) + 1 < 6:
+    if count < 6:
         assert said == {"too few structures": TRIALS}
     else:
         # Five in a hundred are what the test allows itself: none at all would be a test asleep.
@@ -138,7 +137,7 @@ def test_signs_are_counted_out_by_hand() -> None:
     assert flip_signs(np.column_stack([sizes, 0.0 * sizes])).tolist() == [p, 1.0]
 
 
-@pytest.mark.parametrize("count", [6, 8, 12, 30])
+@pytest.mark.parametrize("count", [6, 30])
 def test_intervals_hold_the_truth_as_often_as_they_say(count: int) -> None:
     random = np.random.default_rng(count)
     held = 0
@@ -169,19 +168,6 @@ def test_a_structure_counts_once_whatever_its_cases_and_seeds() -> None:
     assert found.structures == 12
 
 
-def test_seeds_on_few_structures_show_nothing_and_the_reader_is_told() -> None:
-    random = np.random.default_rng(5)
-    five = {f"case-{c}": f"s{c}" for c in range(5)}
-    one = dict.fromkeys(five, "s0")
-    for structures in (five, one):
-        worse = 0.1 * random.random((5, 20))
-        run = run_of({"a": np.full((5, 20), 0.9), "b": worse}, structures)
-        (found,) = compare_runs(run, run, against=Against("a", "b")).evidence
-        assert (found.verdict, found.p, found.low) == ("too few structures", None, None)
-        said = " ".join(TerminalReporter().render(run).split())
-        assert "Ranks are not tested: that takes 6 structures or more" in said
-
-
 TWENTY = {f"case-{c}": f"s{c}" for c in range(20)}
 
 
@@ -195,27 +181,6 @@ class TestBoard:
             {"behind", "as-far", "last"}, {"behind", "as-far", "last"}, {"last"}, {"last"}, set(),
         ]  # fmt: skip
         assert set(rows.loc["last", "worse_than"]) == {*means} - {"last"}
-
-    def test_the_screen_says_what_is_shown_and_what_is_not(self) -> None:
-        random = np.random.default_rng(5)
-        gains = {
-            name: mean + 0.02 * random.standard_normal((20, 1))
-            for name, mean in {"first": 0.6, "second": 0.6, "line": 0.6, "third": 0.1}.items()
-        }
-        run = run_of(gains, TWENTY)
-        run = Run({**run.meta, "yardsticks": {"line": "a line"}}, run.results)
-        text = TerminalReporter().render(run)
-        assert max(map(len, text.splitlines())) <= 80
-        said = " ".join(text.split())
-        assert "It is shown to be better than 1 of 2 other strategies." in said
-        assert "No strategy is shown to be better than a line." in said
-        assert "better than handbooks on 100 % of the 20 structures" in said
-
-    def test_says_that_nothing_is_shown(self) -> None:
-        gains = {"first": np.full((20, 9), 0.9), "second": np.full((20, 9), 0.1)}
-        text = TerminalReporter().render(run_of(gains, dict.fromkeys(TWENTY, "one")))
-        said = " ".join(text.split())
-        assert "No difference between any two lines of the board is shown." in said
 
 
 class TestGain:
@@ -231,18 +196,6 @@ class TestGain:
         half = student.ppf(0.975, 19) * own.std(ddof=1) / np.sqrt(20)
         assert row["gain_low"] == pytest.approx(own.mean() - half, abs=0.1 * half)
         assert row["gain_high"] == pytest.approx(own.mean() + half, abs=0.1 * half)
-
-    def test_grows_where_cases_share_structures_and_is_none_of_few(self) -> None:
-        own = np.repeat(np.random.default_rng(2).normal(0.5, 0.1, 10), 2)
-
-        def width(sharing: int) -> float:
-            labels = {case: f"s{c // sharing}" for c, case in enumerate(TWENTY)}
-            (row,) = leaderboard(run_of({"a": own[:, None]}, labels)).to_dict("records")
-            return float(row["gain_high"] - row["gain_low"])
-
-        # Half as many independent ones: wider by the root of two, and a little for Student.
-        assert 1.4 < width(2) / width(1) < 1.7
-        assert np.isnan(width(4))
 
 
 class TestLabels:

@@ -12,18 +12,15 @@ import scipy.sparse as sp
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import (
     Frame,
-    GroundSpring,
     Joint,
     JointSpring,
     Material,
     Member,
     Place,
     PointMass,
-    Support,
 )
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.sections import round_tube
-from femubench.core.modal import eigen
 from femubench.core.modal.eigen import dense_matrices, solve_dense, solve_modes
 from femubench.core.modal.sparse_eigen import ShiftedModel, lowest_eigenpairs
 from femubench.core.typing import FloatArray
@@ -56,22 +53,10 @@ def agree(model: Model, count: int, tolerance: float = 1e-8) -> FloatArray:
     return found
 
 
-def test_free_ladder(ladder: FrameBuilder) -> None:
-    agree(Model.of(ladder(elements=12)), 14)
-
-
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_spatial_frames_with_massless_joints(portal: FrameBuilder, seed: int) -> None:
     masses = (PointMass(Place(member="m2", s=0.37), 0.5, (0.1, 0.2, -0.1)),)
     agree(Model.of(portal(seed, joint_springs=SPRINGS, masses=masses)), 16)
-
-
-def test_supported_and_suspended_frames(ladder: FrameBuilder) -> None:
-    frame = ladder(elements=8)
-    held = replace(frame, supports=(Support(Place(joint="A"), ("z", "rx", "ry")),))
-    agree(Model.of(held), 10)
-    soft = tuple(GroundSpring(Place(joint=j), "z", 100.0) for j in "AC")
-    agree(Model.of(replace(frame, springs=soft)), 10, 1e-6)
 
 
 def test_low_rank_changes_with_negative_eigenvalues(ladder: FrameBuilder) -> None:
@@ -94,14 +79,6 @@ def test_indefinite_sparse_stiffness(ladder: FrameBuilder) -> None:
     assert (found < -1.0).any()
 
 
-def test_changes_without_full_rank(ladder: FrameBuilder) -> None:
-    model = Model.of(ladder(elements=12))
-    basis = np.asarray(model.mass @ solve_modes(model).shapes[:, 3:5])
-    doubled = LowRank(np.hstack([basis, basis]), np.diag([1e6, 0.0, 2e6, 0.0]))
-    agree(replace(model, stiffness_change=doubled), 12)
-    agree(replace(model, stiffness_change=LowRank(basis, np.zeros((2, 2)))), 12)
-
-
 def test_repeated_eigenvalues_are_all_found() -> None:
     section = round_tube(0.02, 0.002)
     joints = (Joint("A", (0.0, 0.0, 0.0)), Joint("B", (0.3, 0.4, 0.5)))
@@ -109,20 +86,6 @@ def test_repeated_eigenvalues_are_all_found() -> None:
     model = Model.of(Frame("3d", "euler-bernoulli", joints, (member,)))
     for count in (7, 8, 11, 14):
         agree(model, count)
-
-
-@pytest.mark.parametrize("mirrors", [3])
-def test_many_equal_substructures(mirrors: int, ladder: FrameBuilder) -> None:
-    # Unconnected equal beams: every eigenvalue is repeated, and the zero ones too.
-    section = round_tube(0.02, 0.002)
-    material = Material(70e9, 0.3, 2700.0)
-    joints, members = [], []
-    for i in range(mirrors):
-        joints += [Joint(f"A{i}", (0.0, float(i), 0.0)), Joint(f"B{i}", (0.5, float(i), 0.0))]
-        members.append(Member(f"m{i}", (f"A{i}", f"B{i}"), 10, section, material))
-    supports = tuple(Support(Place(joint=f"A{i}"), ("z", "rx", "ry")) for i in range(mirrors))
-    frame = Frame("out-of-plane", "euler-bernoulli", tuple(joints), tuple(members))
-    agree(Model.of(replace(frame, supports=supports)), 8)
 
 
 def test_inertia_counts_the_eigenvalues_below_a_shift(portal: FrameBuilder) -> None:
@@ -152,19 +115,6 @@ def test_solve_is_the_inverse(portal: FrameBuilder) -> None:
         shifted.solve(right), expected, rtol=0, atol=1e-8 * abs(expected).max()
     )
     np.testing.assert_allclose(shifted.solve(right[:, 0]), shifted.solve(right)[:, 0], rtol=1e-9)
-
-
-def test_large_models_go_the_sparse_way(
-    ladder: FrameBuilder, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    model = Model.of(ladder(elements=30))
-    assert model.size > eigen.DENSE_LIMIT
-    sparse = solve_modes(model, 12)
-    monkeypatch.setattr(eigen, "DENSE_LIMIT", 10_000)
-    whole = solve_modes(model, 12)
-    np.testing.assert_allclose(sparse.eigenvalues, whole.eigenvalues, rtol=1e-8)
-    np.testing.assert_array_equal(sparse.rigid, whole.rigid)
-    assert len(solve_modes(model)) == model.size
 
 
 def test_the_same_bits_twice(ladder: FrameBuilder) -> None:

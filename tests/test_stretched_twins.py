@@ -30,7 +30,7 @@ from truths.affine import StretchedSolid
 from truths.drawing import case_text
 from truths.elasticity import assemble
 from truths.measurement import modes_csv, record, sensors_csv
-from truths.reduction import basis_of, drawn_factors, rigid_fields, snapshots, stretched
+from truths.reduction import basis_of, drawn_factors, snapshots, stretched
 from truths.seats import rigid_fit
 from truths.sections import bar, channel, rectangular_tube
 from truths.stretch import stretch_of
@@ -105,17 +105,6 @@ def test_matrices_of_a_stretched_solid_are_those_of_an_assembly() -> None:
         np.testing.assert_allclose(total, shapes.T @ (matrix @ shapes), rtol=1e-9)
     weight = sum(np.prod(factors ** np.array(p)) * kg for p, kg in solid.masses().items())
     assert weight == pytest.approx(known.total_mass, rel=1e-12)
-
-
-def test_rigid_motions_of_a_stretched_solid_are_sums_of_the_fields() -> None:
-    structure, solid = tee(), small()
-    factors = drawn_factors(solid, 1, 4)[0]
-    x, y, z = solid.stretch.map(factors)(solid.nodes)
-    zero, fields = np.zeros_like(x), rigid_fields(structure, solid)
-    for turned in ((zero, -z, y), (z, zero, -x), (-y, x, zero)):
-        motion = np.array(turned).T.ravel()
-        share = np.linalg.lstsq(fields, motion, rcond=None)[0]
-        assert np.abs(fields @ share - motion).max() < 1e-12
 
 
 @pytest.mark.nightly
@@ -232,9 +221,8 @@ def test_the_drawing_is_stretched_as_the_solid(name: str, tmp_path: Path) -> Non
 
 
 @pytest.mark.nightly
-def test_twins_have_ratios_of_their_own_and_noise_of_the_stated_size() -> None:
-    name = NAMES[0]
-    case = builtin(name)
+def test_twins_have_ratios_of_their_own() -> None:
+    case = builtin(NAMES[0])
     twins = [twin_of(case, 1, seed) for seed in range(4)]
     assert all(twin.families == ("stretched", "similar") for twin in twins)
     ratios = np.array([t.measurement.frequencies / t.measurement.frequencies[0] for t in twins])
@@ -245,18 +233,6 @@ def test_twins_have_ratios_of_their_own_and_noise_of_the_stated_size() -> None:
     assert again.digest == twins[2].digest
     assert (again.measurement.frequencies == twins[2].measurement.frequencies).all()
     assert len({twin.digest for twin in twins}) == 4
-
-    solid = ReducedSolid.read(case.folder / FILE)
-    one = np.ones(len(solid.names))
-    exact = stretch_case(case, solid, one, None).measurement
-    drawn = [
-        stretch_case(case, solid, one, np.random.default_rng(seed)).measurement
-        for seed in range(200)
-    ]
-    spread = np.std([m.frequencies / exact.frequencies for m in drawn], axis=0)
-    np.testing.assert_allclose(spread, float(solid.arrays["scatter"]), rtol=0.2)
-    assert np.std([m.shapes for m in drawn]) > 0.0
-    assert all(np.abs(m.shapes).max(axis=0) == pytest.approx(1.0) for m in drawn[:3])
 
 
 def test_the_digest_of_a_twin_follows_from_the_file(tmp_path: Path) -> None:
@@ -307,9 +283,8 @@ def test_who_knows_ratios_by_heart_gains_nothing_on_stretched_twins() -> None:
 
 
 def test_strategies_that_reckon_are_not_marked() -> None:
-    names = ["local", "offset", "sparse", "eigensensitivity", "baruch"]
-    cases = ["suite/stiffened-strip", "suite/bracket"]
-    run = femubench.rank(cases, names, twins=(2, 21), nominal="textbook", jobs=1)
+    names = ["local", "eigensensitivity"]
+    run = femubench.rank("suite/bracket", names, twins=(2, 21), nominal="textbook", jobs=1)
     found = twin_gains(run)
     assert sorted(found) == sorted(names)
     assert {kind for kinds in run.meta["twins"]["kinds"].values() for kind in kinds} == {

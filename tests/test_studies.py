@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 from harness_toys import tiny_case
@@ -14,7 +13,7 @@ from numpy.testing import assert_allclose
 from study_toys import BROKEN, Spy
 
 import femubench
-from femubench import InputError, plot
+from femubench import InputError
 from femubench.core.cli.main import bench
 from femubench.core.library.rank import Run
 from femubench.core.library.report import render_report, reporter
@@ -27,7 +26,7 @@ from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult
 from femubench.core.study.conditions import vary_case
 from femubench.core.study.study_file import read_study
-from femubench.results import gain_by, leaderboard, results_frame
+from femubench.results import gain_by, leaderboard
 from tests.test_cli import put_case
 
 SENSORS = "label,x,y,z,direction\n" + "".join(f"s{i},{i / 5},0,0,z\n" for i in range(1, 6))
@@ -99,27 +98,6 @@ class TestExpansion:
         assert plan.axes.varied == ("noise", "sensors_left_out", "spy.factor", "spy.loud")
         assert plan.axes.pictured == ("noise", "sensors_left_out")
 
-    def test_conditions_of_their_own_make_the_jobs_of_a_plain_run(self) -> None:
-        """So that a store with one serves the other."""
-        text = STUDY.replace("[0.5, 1.0, 2.0]", "[1.0]").replace("[0, 3]", "[0]")
-        text = text.replace("[1.0, 1.2], loud = [false, true]", "1.2")
-        store = Store("results")
-        run_plan(plan_of(text), 1, store)
-        keys = {result.key for result in store.load().results}
-        femubench.rank(
-            "rod", Spy(1.2), seeds=2, nominal="textbook", jobs=1, store=store, overwrite="missing"
-        )
-        first, second = (store.load(run) for run in store.runs())
-        assert {result.key for result in second.results} == keys
-        assert [r.seconds for r in second.results] == [r.seconds for r in first.results]
-
-    def test_seeds_are_draws_or_a_list_or_the_data_as_recorded(self) -> None:
-        plain = STUDY.replace("noise = [0.5, 1.0, 2.0]\n", "")
-        first = plan_of(STUDY.replace('title = "A spy"', "seed = 7"))
-        assert first.options.all_seeds == range(8, 10)
-        assert plan_of(plain.replace("seeds = 2", "seeds = [0, 5]")).options.all_seeds == (0, 5)
-        assert plan_of(plain.replace("seeds = 2\n", "")).options.all_seeds == range(1)
-
 
 class TestConditions:
     CASE = tiny_case()
@@ -134,12 +112,6 @@ class TestConditions:
         assert_allclose(twice.shapes - true.shapes, 2 * (once.shapes - true.shapes))
         assert_allclose(twice.frequency_std, 2 * once.frequency_std)
         assert_allclose(twice.shape_std, 2 * once.shape_std)
-
-    def test_scatter_over_seeds_is_what_is_stated(self) -> None:
-        case = vary_case(self.CASE, 3.0, 0)
-        drawn = np.array([case.used_measurement(seed).frequencies for seed in range(1, 401)])
-        stated = case.used_measurement(1).frequency_std
-        assert_allclose(drawn.std(axis=0), stated, rtol=0.12)  # three sigma of 400 draws
 
     def test_sensors_are_left_out_with_their_readings(self) -> None:
         few = vary_case(self.CASE, 1.0, 3)
@@ -156,11 +128,6 @@ class TestConditions:
             vary_case(self.CASE, 1.0, 3).conditions(s)["sensors_left_out"] for s in range(1, 9)
         }
         assert len(others) > 3
-
-    def test_what_is_scored_stays(self) -> None:
-        case = vary_case(self.CASE, 2.0, 3)
-        assert case.measurement is self.CASE.measurement
-        assert case.modifications is self.CASE.modifications
 
 
 class TestRun:
@@ -201,20 +168,8 @@ class TestRun:
         assert broken["gain"] == 0.0  # as the model that was given
         part = Run(spied.meta, spied.results[1:])
         assert gain_by(part, "spy.factor")["missing"].tolist() == [1, 0, 0]
-
-    def test_axes_that_are_left_out_are_taken_together(self, spied: Run) -> None:
-        assert list(gain_by(spied).columns[:3]) == ["noise", "sensors_left_out", "spy.factor"]
-        assert len(gain_by(spied)) == 2 * 2 * 3
-        (whole,) = gain_by(spied, "strategy").to_dict("records")
-        assert (whole["jobs"], whole["failed"]) == (24, 8)
         with pytest.raises(InputError, match="no axis 'nois'; did you mean 'noise'"):
             gain_by(spied, "nois")
-
-    def test_results_by_row_have_the_axes(self, spied: Run) -> None:
-        frame = results_frame(spied)
-        assert set(frame["spy.factor"]) == {1.0, 1.2, BROKEN}
-        assert set(frame["plain_case"]) == {"rod"}
-        assert frame.groupby(["noise", "sensors_left_out"]).size().tolist() == [6] * 4
 
     def test_report_in_every_format(self, spied: Run) -> None:
         plugins = load_plugins()
@@ -229,17 +184,6 @@ class TestRun:
         assert "<svg" in str(texts["html"])
         cells = json.loads(str(texts["json"]))["cells"]
         assert [cell["gain"] for cell in cells] == gain_by(spied)["gain"].tolist()
-
-    def test_heat_map_has_a_number_and_a_hatch_a_cell(self, spied: Run) -> None:
-        ax = plot.heat_map(spied, "noise", "spy.factor")
-        assert len(ax.texts) == 6
-        hatched = [patch.get_xy() for patch in ax.patches if patch.get_hatch()]
-        assert hatched == [(-0.5, 1.5), (0.5, 1.5)]
-        low, high = ax.get_images()[0].get_clim()
-        assert low == -high
-        assert ax.get_xlabel() == "noise, times the stated standard deviations"
-        assert ax.get_ylabel() == "factor of spy"
-        assert plot.heat_map(spied).get_ylabel() == "sensors left out, number of them"
 
 
 class TestResume:
@@ -270,19 +214,6 @@ class TestResume:
         again = run_plan(plan, 2, store)
         assert [r.seconds for r in again.results] == [r.seconds for r in resumed.results]
 
-    def test_a_level_that_is_added_takes_the_others_from_the_store(self) -> None:
-        store = Store("results")
-        text = STUDY.replace(", loud = [false, true]", "").replace("[0, 3]", "[0]")
-        run_plan(plan_of(text.replace("[0.5, 1.0, 2.0]", "[1.0]")), 1, store)
-        plan = plan_of(text.replace("[0.5, 1.0, 2.0]", "[1.0, 4.0]"))
-        found = plan.forecast(store)
-        assert (found.jobs, found.done) == (8, 4)
-        assert not found.unknown
-        assert found.seconds > 0.0
-        before = {r.key: r.seconds for r in store.load().results}
-        after = {r.key: r.seconds for r in run_plan(plan, 1, store).results}
-        assert before.items() < after.items()
-
 
 class TestDryRun:
     TEXT = STUDY.replace('"spy"', '"unchanged"').replace(
@@ -301,13 +232,6 @@ class TestDryRun:
         assert "0 jobs in kept already, 12 to run" in done.output
         assert "unknown, since no result is stored, jobs of: unchanged on rod 12" in done.output
         assert not Path("kept").exists()
-
-
-def test_the_example_is_a_study() -> None:
-    file = Path(__file__).parents[1] / "examples" / "noise-and-weight.toml"
-    plan = study_plan(read_study(file), load_plugins())
-    assert (plan.cells, plan.jobs) == (32, 192)
-    assert plan.axes.pictured[0] == "noise"
 
 
 def test_a_study_goes_on_by_its_own_command() -> None:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import re
 import tomllib
-from itertools import combinations
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 from printed_boards import as_printed, assert_board_is_that_of, assert_same_errors, stored, text_of
@@ -35,7 +33,10 @@ def test_the_index_lists_the_folders() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_structure_is_complete(name: str) -> None:
-    """Modes, changes, picture, seed; both meshes agree to 0.7 % in every listed mode."""
+    """Modes, changes, picture, seed; both meshes agree to 0.7 % in every listed mode.
+
+    The nominal model misses the used modes by 0.5 to 60 %; each of them has a partner.
+    """
     case = read_case(SUITE / name)
     used, held = case.used, case.held_out
     assert 3 <= len(used) <= 12
@@ -47,36 +48,15 @@ def test_a_structure_is_complete(name: str) -> None:
     assert max(float(difference) for *_, difference, _ in modes) < 0.7
     assert re.search(r"\(seed \d+\)", text)
     assert "<svg" in (SUITE / name / "picture.svg").read_text(encoding="utf-8")
+    block = reference_of(case).blocks["used"]
+    assert 0.5 < block.rms_percent < 60.0
+    assert all(pair.predicted_hz is not None for pair in block.modes)
 
 
 def test_garteur_has_the_published_frequencies(tmp_path: Path) -> None:
     write_garteur(tmp_path / "garteur")
     stored = (ROOT / "scenarios" / "garteur" / "modes.csv").read_text(encoding="utf-8")
     assert (tmp_path / "garteur" / "modes.csv").read_text(encoding="utf-8") == stored
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_drawing_is_wrong_but_not_absurd(name: str) -> None:
-    """The nominal model misses the used modes by 0.5 to 60 %; each of them has a partner."""
-    case = read_case(SUITE / name)
-    block = reference_of(case).blocks["used"]
-    assert 0.5 < block.rms_percent < 60.0
-    assert all(pair.predicted_hz is not None for pair in block.modes)
-
-
-def test_no_two_structures_share_their_geometry() -> None:
-    """Compare the distances between joints in parts of the largest, whatever the size."""
-
-    def proportions(name: str) -> np.ndarray:
-        spec = tomllib.loads((SUITE / name / "case.toml").read_text(encoding="utf-8"))
-        xyz = np.array([joint["xyz"] for joint in spec["model"]["joints"]])
-        apart = np.sort(np.linalg.norm(xyz[:, None] - xyz[None], axis=2).ravel())
-        return apart / apart[-1]
-
-    shapes = {name: proportions(name) for name in NAMES}
-    for one, two in combinations(NAMES, 2):
-        alike = shapes[one].shape == shapes[two].shape and len(shapes[one]) > 4
-        assert not alike or np.abs(shapes[one] - shapes[two]).max() > 0.01, (one, two)
 
 
 def test_the_board_of_all_structures_is_that_of_the_run_kept() -> None:

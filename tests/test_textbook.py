@@ -14,10 +14,9 @@ from effect_checks import as_matrices
 import femubench
 from femubench import NotApplicable
 from femubench.core.cli.main import bench
-from femubench.core.library.rank import request_of
 from femubench.core.plugin.loader import list_effects, load_plugins
 from femubench.core.run.store import Store
-from femubench.effect import textbook_model, textbook_values
+from femubench.effect import textbook_model
 from femubench.fem import bredt
 from femubench.results import run_from_json, run_to_json, score_model
 from tests.test_cli import put_distribution
@@ -43,25 +42,12 @@ def test_what_is_repaired_stays_as_it_is(name: str) -> None:
         assert abs(one - two).max() <= 1e-12 * abs(one).max()
 
 
-def test_effects_that_need_a_fit_give_nothing() -> None:
-    model = femubench.cases["frame"].model
-    named = {effect.name: effect for effect in EFFECTS}
-    assert textbook_values(named["added-mass"], model) == {}
-    assert textbook_values(named["shear-deformation"], model) == {"all": (1.0,)}
-
-
 def test_effects_with_textbook_values_say_so() -> None:
     model = femubench.cases["frame"].model
     for effect in EFFECTS:
         found = [effect.parameters(model, place) for place in effect.places(model)]
         known = any(p.textbook is not None for parameters in found for p in parameters)
         assert getattr(effect, "handbook", None) is known, effect.name
-
-
-def test_effects_without_are_not_asked_for_their_places(monkeypatch: pytest.MonkeyPatch) -> None:
-    offset = next(effect for effect in EFFECTS if effect.name == "joint-offset")
-    monkeypatch.setattr(type(offset), "places", lambda *_: pytest.fail("asked for its places"))
-    assert textbook_values(offset, femubench.cases["frame"].model) == {}
 
 
 def test_matrices_have_no_textbook() -> None:
@@ -79,25 +65,6 @@ def test_as_a_strategy_it_looks_at_no_data() -> None:
     assert abs(one.stiffness - other.stiffness).max() == 0.0
     errors = {name: block.rms_percent for name, block in score_model(case, one).items()}
     assert errors["used"] < 0.5 * score_model(case, case.model)["used"].rms_percent
-
-
-def test_a_run_from_the_textbook_model_measures_against_it(tmp_path: Path) -> None:
-    wanted = ("frame", ["unchanged", "textbook"])
-    drawn = femubench.rank(*wanted, jobs=1, store=tmp_path, nominal="drawn")
-    repaired = femubench.rank(*wanted, jobs=1, store=tmp_path, nominal="textbook")
-    jobs = {
-        run.meta["request"]["nominal"]: run.table.set_index("strategy") for run in (drawn, repaired)
-    }
-    # Both runs measure against the textbook model, from wherever they start.
-    assert jobs["drawn"].loc["unchanged", "gain"] < -0.5
-    assert jobs["drawn"].loc["textbook", "gain"] == pytest.approx(0.0, abs=1e-9)
-    assert jobs["textbook"].loc["textbook", "gain"] == pytest.approx(0.0, abs=1e-9)
-    unchanged = jobs["textbook"].loc["unchanged"]
-    assert unchanged["used_percent"] == jobs["drawn"].loc["textbook", "used_percent"]
-    assert request_of(repaired).nominal == "textbook"
-    assert len({result.key for run in (drawn, repaired) for result in run.results}) == 4
-    again = femubench.rank(jobs=1, store=tmp_path, resume=True, overwrite="missing")
-    assert again.meta["request"]["nominal"] == "textbook"
 
 
 def test_a_run_starts_from_both_models_and_ranks_from_the_textbook_one(tmp_path: Path) -> None:
@@ -149,17 +116,6 @@ def test_no_plugin_moves_what_all_are_measured_against(
     assert femubench.rank("frame", "unchanged", jobs=1).meta["reference"] == plain
 
 
-def test_the_screen_says_where_all_start_from(tmp_path: Path) -> None:
-    words = ["run", "frame", "-s", "textbook", "-j", "1", "--nominal", "textbook"]
-    shown = CliRunner().invoke(bench, [*words, "--store", str(tmp_path)])
-    assert shown.exit_code == 0, shown.output
-    assert "1 case from the textbook models" in shown.output
-    assert "All start from the models of the textbooks." in " ".join(shown.output.split())
-    locked = CliRunner().invoke(bench, ["run", "--locked", "x", "--nominal", "textbook"])
-    assert locked.exit_code == 2
-    assert "nominal cannot be given with it" in locked.output
-
-
 def test_who_is_not_applicable_counts_as_who_leaves_the_model_as_it_is(tmp_path: Path) -> None:
     still = femubench.strategies["unchanged"]
     both = [still, toys.Declining()]
@@ -182,11 +138,7 @@ def test_who_is_not_applicable_counts_as_who_leaves_the_model_as_it_is(tmp_path:
     assert run_from_json(run_to_json(run)).results == run.results
 
 
-def test_a_result_that_is_reused_starts_from_where_it_is_asked_to(tmp_path: Path) -> None:
-    case = femubench.cases["frame"]
-    plain = replace(case, name="plain", model=as_matrices(case.model))
-    femubench.rank(plain, "unchanged", jobs=1, store=tmp_path, nominal="drawn")
-    both = femubench.rank(plain, "unchanged", jobs=1, store=tmp_path, overwrite="missing")
-    assert [item.nominal for item in both.results] == ["textbook"]
-    (row,) = both.leaderboard.to_dict("records")
-    assert (row["ok"], row["total"]) == (1, 1)
+def test_a_locked_run_takes_no_start_of_its_own() -> None:
+    locked = CliRunner().invoke(bench, ["run", "--locked", "x", "--nominal", "textbook"])
+    assert locked.exit_code == 2
+    assert "nominal cannot be given with it" in locked.output

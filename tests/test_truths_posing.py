@@ -51,11 +51,9 @@ def test_a_truth_is_read_as_it_was_written(tmp_path: Path) -> None:
         ('kind = "pair"', 'kind = "other"', "kind: unknown kind 'other'"),
         ('kind = "pair"', 'kind = "defect"', "cause: not what 'defect' has (expected 1 tables"),
         ("seed = 7", "seed = true", "seed: true or false (expected a whole number)"),
-        ("seed = 7", "seed = -7", "seed: out of bounds (expected a whole number >= 0"),
         ("seed = 7", "", "seed: missing"),
         ("held = ", "held = not", "expected valid TOML"),
         ("chi2 = 83.2", "chi2 = nan", "visible.chi2: out of bounds"),
-        ("chi2 = 83.2", "chi2 = -1", "visible.chi2: out of bounds"),
         ("size = 125000.0", 'size = "big"', "cause[0].size: a text (expected"),
         (
             'place = "J5"',
@@ -101,16 +99,6 @@ def test_a_case_is_the_files_of_the_truth_over_those_of_the_structure(
     assert case.measurement.frequencies[0] == 222.2222
     assert case.modifications == ()
     assert "# of the largest component" in (tmp_path / "case" / "case.toml").read_text()
-
-
-def test_a_reference_is_written_where_it_is_asked_for(tmp_path: Path, suite: Path) -> None:
-    modes = (suite / "frame-solid" / "modes.csv").read_text(encoding="utf-8")
-    room = written(tmp_path, healthy_csv=modes)
-    pose(room, tmp_path / "case", True, suite=suite)
-    assert (tmp_path / "case" / "healthy.csv").read_text(encoding="utf-8") == modes
-    text = (tmp_path / "case" / "case.toml").read_text(encoding="utf-8")
-    assert '[reference]\nmodes = "healthy.csv"\n' in text
-    assert "modification" not in text
 
 
 def test_what_cannot_be_posed_is_one_line(tmp_path: Path, suite: Path) -> None:

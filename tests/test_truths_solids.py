@@ -17,7 +17,7 @@ from truths.defects import KINDS, OUTSIDE
 from truths.drawing import case_text
 from truths.eigenmodes import attach, solve
 from truths.elasticity import assemble
-from truths.measurement import mac, paired, record, sensors_csv
+from truths.measurement import record, sensors_csv
 from truths.modes_of import assembled, mesh_of, modes_of
 from truths.prestress import with_misfit
 from truths.seats import rigid_fit
@@ -209,15 +209,6 @@ def test_every_kind_of_defect_can_be_seen() -> None:
         seen.add(kind)
     assert {"missing-weld", "slot", "thin-wall", "clamp-mass", "waist", "patch", "warm"} <= seen
     assert {"stiff-cord", "strut", "instrument", "water", "wrong-material", "gradient"} <= seen
-
-
-def test_modes_are_paired_by_shape() -> None:
-    rng = np.random.default_rng(1)
-    shapes = rng.standard_normal((4, 30))
-    hertz = np.array([10.0, 10.2, 30.0, 31.0])
-    order = np.array([1, 0, 3, 2])
-    assert (paired((hertz, shapes), (hertz[order] * 1.001, shapes[order])) == order).all()
-    np.testing.assert_allclose(mac(shapes, -2 * shapes).diagonal(), 1.0)
 
 
 def test_the_scatter_is_what_is_stated() -> None:

@@ -138,7 +138,10 @@ def shell(tmp_path: Path) -> Iterator[Shell]:
 
 @pytest.mark.nightly
 def test_every_line_of_the_tutorial(shell: Shell) -> None:
-    for step in steps(TUTORIAL.read_text(encoding="utf-8")):
+    text = TUTORIAL.read_text(encoding="utf-8")
+    # A block that is no step is not passed over in silence.
+    assert text.count("```") == 2 * len(re.findall(r"^```(?:console|python)$", text, re.MULTILINE))
+    for step in steps(text):
         if isinstance(step, File):
             target = shell.where() / step.name
             assert target.is_file(), f"the tutorial replaces {step.name}, which is not there"
@@ -150,40 +153,3 @@ def test_every_line_of_the_tutorial(shell: Shell) -> None:
         assert code == 0, f"$ {step.line}\n{printed}"
         lost = missing(step.output, printed)
         assert not lost, f"$ {step.line}\nnever printed: {lost}\nbut:\n{printed}"
-
-
-def test_tutorial_asks_for_what_it_is_about() -> None:
-    """The steps are found at all; a block that is no step is not passed over in silence."""
-    text = TUTORIAL.read_text(encoding="utf-8")
-    assert text.count("```") == 2 * len(re.findall(r"^```(?:console|python)$", text, re.MULTILINE))
-    lines = [step.line for step in steps(text) if isinstance(step, Command)]
-    for start in (
-        "bench plugins new my-method",
-        "pip install -e",
-        "pytest",
-        "bench plugins check my-method",
-        "bench run frame -s my-method",
-    ):
-        assert any(line.startswith(start) for line in lines), start
-    assert [step.name for step in steps(text) if isinstance(step, File)]
-
-
-def test_quoted_output_is_compared() -> None:
-    printed = "one  two\nthree 3.14 s\nfour\n"
-    assert missing(("one two", "...", "three ... s"), printed) == ""
-    assert missing(("three ... s", "one two"), printed) == "one two"
-    assert missing(("two three",), printed) == "two three"
-
-
-def test_shell_keeps_its_place_and_tells_what_failed(tmp_path: Path) -> None:
-    (tmp_path / "sub").mkdir()
-    shell = Shell(tmp_path, dict(os.environ))
-    try:
-        assert shell.type("cd sub")[0] == 0
-        assert shell.where() == tmp_path / "sub"
-        assert shell.type("false")[0] == 1
-        assert shell.type("cat")[1].strip() == ""  # has nothing to read, and ends
-        code, printed = shell.type("sh -c 'echo seen >&2; exit 3'")
-        assert (code, printed.strip()) == (3, "seen")
-    finally:
-        shell.close()

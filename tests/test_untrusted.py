@@ -10,7 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -68,7 +68,7 @@ def test_names_that_lead_out(case: Path, name: str) -> None:
     assert error.line is not None
 
 
-@pytest.mark.parametrize("file", ["case.toml", "sensors.csv", "modes.csv", "modified.csv"])
+@pytest.mark.parametrize("file", ["case.toml", "modified.csv"])
 def test_a_link_that_leads_out(case: Path, file: str) -> None:
     (case / file).rename(case.parent / file)
     (case / file).symlink_to(Path("..") / file)
@@ -107,7 +107,7 @@ def test_links_that_stay_inside_and_a_linked_folder_are_fine(case: Path) -> None
     assert read_case(case.parent / "mine").digest == read_case(CASE).digest
 
 
-@pytest.mark.parametrize("file", ["case.toml", "sensors.csv", "modes.csv"])
+@pytest.mark.parametrize("file", ["case.toml", "modes.csv"])
 def test_a_pipe_is_not_waited_for(case: Path, file: str) -> None:
     (case / file).unlink()
     os.mkfifo(case / file)
@@ -165,20 +165,23 @@ def test_the_header_of_a_matrix_is_not_believed(tmp_path: Path) -> None:
         assert what in refusal(folder).what
 
 
-@pytest.mark.parametrize("end", ["2 2 2.5.5", "2 2 2.5x", "2 2 2.5 \0\n", "2 2 2.5", "2 2 \n"])
-@pytest.mark.parametrize("pack", [False, True])
-def test_an_end_that_the_library_reads_beyond(tmp_path: Path, end: str, pack: bool) -> None:
-    folder = matrix_case(tmp_path / "case")
-    text = f"%%MatrixMarket matrix coordinate real general\n4 4 1\n{end}".encode()
-    (folder / "general.mtx").write_bytes(text)
-    (folder / "packed.mtx.gz").write_bytes(gzip.compress(text))
-    (folder / ("general.mtx" if pack else "packed.mtx.gz")).unlink()
-    toml = (folder / "case.toml").read_text().splitlines()
-    at = toml.index(f'stiffness = "{"general.mtx" if pack else "packed.mtx.gz"}"')
-    (folder / "case.toml").write_text("\n".join(toml[: at - 2] + toml[at + 1 :]))
-    code = f"import femubench\ntry: femubench.read_case({str(folder)!r})\n"
-    code += "except femubench.InputError as e: print(e)"
-    # A crash must not take the tests with it.
+def test_an_end_that_the_library_reads_beyond(tmp_path: Path) -> None:
+    """A crash must not take the tests with it."""
+    folders = []
+    for end, pack in product(
+        ("2 2 2.5.5", "2 2 2.5x", "2 2 2.5 \0\n", "2 2 2.5", "2 2 \n"), (0, 1)
+    ):
+        folder = matrix_case(tmp_path / str(len(folders)))
+        folders.append(str(folder))
+        text = f"%%MatrixMarket matrix coordinate real general\n4 4 1\n{end}".encode()
+        (folder / "general.mtx").write_bytes(text)
+        (folder / "packed.mtx.gz").write_bytes(gzip.compress(text))
+        (folder / ("general.mtx" if pack else "packed.mtx.gz")).unlink()
+        toml = (folder / "case.toml").read_text().splitlines()
+        at = toml.index(f'stiffness = "{"general.mtx" if pack else "packed.mtx.gz"}"')
+        (folder / "case.toml").write_text("\n".join(toml[: at - 2] + toml[at + 1 :]))
+    code = f"import femubench\nfor folder in {folders}:\n try: femubench.read_case(folder)\n"
+    code += " except femubench.InputError as e: print(e)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[:200]
 
@@ -233,12 +236,6 @@ def test_no_name_moves_a_cursor(case: Path, name: str) -> None:
 
 
 # --- results --------------------------------------------------------------------------------
-
-
-def changed(change: Callable[[dict[str, object]], None]) -> dict[str, object]:
-    data: dict[str, object] = json.loads(run_text())
-    change(data)
-    return data
 
 
 @pytest.mark.parametrize(

@@ -8,16 +8,13 @@ from dataclasses import replace
 import pytest
 
 from femubench import InputError, Strategy
+from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.variants import Variant, strategy_of
 from femubench.plugins.strategies.generic import GenericLS
 from femubench.plugins.strategies.spring import Spring
 from femubench.plugins.strategies.unchanged import Unchanged
 
 KNOWN: dict[str, Strategy] = {s.name: s for s in (GenericLS(), Spring(), Unchanged())}
-
-
-def test_a_plain_name_is_the_strategy_itself() -> None:
-    assert strategy_of("generic-ls", KNOWN) is KNOWN["generic-ls"]
 
 
 def test_options_are_set_and_told_by_the_name() -> None:
@@ -69,3 +66,11 @@ def test_a_wrong_option_is_one_line(words: str, says: str) -> None:
     with pytest.raises(InputError, match=says) as caught:
         strategy_of(words, KNOWN)
     assert "\n" not in str(caught.value)
+
+
+def test_other_settings_that_a_strategy_names_are_settings_and_not_the_usual_ones() -> None:
+    known = load_plugins().strategies
+    for name, usual in known.items():
+        variants = [strategy_of(f"{name}:{set_}", known) for set_ in getattr(usual, "settings", ())]
+        different = [usual, *(getattr(variant, "base", None) for variant in variants)]
+        assert len(set(map(repr, different))) == len(different), name
