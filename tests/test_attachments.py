@@ -78,13 +78,7 @@ def test_an_attachment_between_nodes_splits_its_element(ladder: FrameBuilder) ->
     assert np.count_nonzero(np.abs(change) > 1e-12) == 1
 
 
-def test_a_support_between_nodes_splits_its_element(ladder: FrameBuilder) -> None:
-    frame = replace(ladder(), supports=(Support(Place(member="EF", s=0.4), ("z",)),))
-    assert Model.of(frame).size == 83
-
-
-@pytest.mark.parametrize("beam", ["euler-bernoulli", "timoshenko"])
-@pytest.mark.parametrize("s", [0.3, 0.4, 0.93])
+@pytest.mark.parametrize(("beam", "s"), [("euler-bernoulli", 0.3), ("timoshenko", 0.93)])
 def test_what_is_put_on_a_model_gives_the_modes_of_the_frame_that_has_it(
     ladder: FrameBuilder, beam: str, s: float
 ) -> None:
@@ -133,7 +127,7 @@ def test_a_mass_between_nodes_gives_the_frequencies_of_a_beam_with_a_mass() -> N
         assert determinant(0.9999 * f) * determinant(1.0001 * f) < 0.0
 
 
-@pytest.mark.parametrize("distance", [1e-8, 1e-6, 1e-5, 1e-4, 1e-3])
+@pytest.mark.parametrize("distance", [1e-8, 1e-4])
 def test_an_attachment_close_to_a_node_spoils_nothing(
     ladder: FrameBuilder, distance: float
 ) -> None:
@@ -175,34 +169,13 @@ def test_a_mass_on_a_rigid_end_is_a_mass_with_an_offset(hframe: FrameBuilder) ->
     np.testing.assert_allclose(elastic(on_end), elastic(offset), rtol=1e-10)
 
 
-def test_stiff_joint_springs_are_no_springs(ladder: FrameBuilder) -> None:
-    stiff = JointSpring("A", "AB", {"rx": 1e9, "ry": 1e9})
-    np.testing.assert_allclose(
-        elastic(replace(ladder(), joint_springs=(stiff,))), elastic(ladder()), rtol=1e-4
-    )
-
-
-def test_soft_joint_springs_are_hinges(ladder: FrameBuilder) -> None:
-    # A bending hinge at both ends of the middle rung leaves it torsion and shear alone.
-    soft = tuple(JointSpring(j, "BE", {"ry": 1e-3}) for j in "BE")
-    hinged = elastic(replace(ladder(), joint_springs=soft))
-    harder = tuple(JointSpring(j, "BE", {"ry": 1.0}) for j in "BE")
-    assert (hinged <= elastic(ladder()) + 1e-6).all()
-    np.testing.assert_allclose(hinged, elastic(replace(ladder(), joint_springs=harder)), rtol=1e-3)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"joint_springs": (JointSpring("A", "nothing", {"ry": 1.0}),)}, "no member end"),
-        ({"joint_springs": (JointSpring("E", "AB", {"ry": 1.0}),)}, "no member end"),
         ({"rigid_ends": (RigidEnd("A", "BE", 0.01),)}, "no member end"),
-        ({"rigid_ends": (RigidEnd("A", "AB", 0.09),)}, "longer than its element"),
         ({"rigid_ends": (RigidEnd("A", "AB", 0.0, 0.09),)}, "longer than its element"),
         ({"joint_springs": (JointSpring("A", "AB", {"ry": 1.0}, 0.08),)}, "past its end element"),
-        ({"masses": (PointMass(Place(member="AB", s=1.2), 0.1),)}, "not within 0..1"),
         ({"masses": (PointMass(Place(member="ZZ", s=0.2), 0.1),)}, "no member"),
-        ({"masses": (PointMass(Place(joint="ZZ"), 0.1),)}, "no joint"),
         (
             {"joint_springs": (ARM,), "supports": (Support(Place(member="AB", s=0.03), ("z",)),)},
             "on the arm",
