@@ -133,28 +133,6 @@ def test_a_shape_that_is_hardly_better_does_not_outweigh_much_of_a_frequency(
     assert found.tolist() == [[partner]]
 
 
-def test_modes_that_an_effect_swaps_are_followed(ladder: FrameBuilder) -> None:
-    """Torsion and bending modes cross as the torsion constant grows."""
-    frame = ladder(accelerometer=False)
-    model = Model.of(frame)
-    (effect,) = effects_named("torsion-constant")
-    true = effect.extend(model, "all", (1.0,))
-    problem = problem_of(model, measured(true, frame), (effect,))
-    nominal = state_at(problem, (), NOTHING)
-    order = nominal.partner[:5]
-    assert (np.diff(order) < 0).any(), "the effect swaps no modes"
-    seen = problem.data.measurement.shapes[:, :5]
-    paired = nominal.readings[:, :5]
-    mac = np.square((seen * paired).sum(axis=0)) / (
-        np.square(seen).sum(axis=0) * np.square(paired).sum(axis=0)
-    )
-    assert mac.min() > 0.8
-    part = part_at(problem, "torsion-constant", "all")
-    exact = state_at(problem, (part,), coordinates(part, (1.0,)))
-    assert np.abs(exact.raw).max() < 1e-4
-    assert (np.diff(exact.partner) > 0).all()
-
-
 def test_a_rigid_mode_that_a_spring_makes_elastic_is_paired(ladder: FrameBuilder) -> None:
     frame = ladder(accelerometer=False)
     model = Model.of(frame)
