@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
-from blind_sweep import Record
-from stated_probabilities import (
-    statements,
-)
-from true_fit import fits_worse, is_search_fault
+from stated_probabilities import statements
 
 from femubench.core.challenge.answer import Answer
 
@@ -37,25 +32,3 @@ def test_names_and_places_are_stated_apart() -> None:
     # A best guess is no statement; a fault that is named next to it is.
     assert of(answer("unknown", mass, fault)) == [("name", 0.7, False), ("place", 0.7, False)]
     assert of(answer("not-confirmed", mass)) == of(answer("none")) == []
-
-
-def fits(leader: tuple[float, int, float], truth: tuple[float, int, float]) -> Record:
-    names = ("chi2", "unknowns", "log_weight")
-    return {
-        "leader_fit": dict(zip(names, leader, strict=True)),
-        "true_fit": dict(zip(names, truth, strict=True)),
-    }
-
-
-@pytest.mark.parametrize(
-    ("record", "worse", "fault"),
-    [
-        (fits((50.0, 2, -40.0), (40.0, 2, -35.0)), True, True),
-        (fits((50.0, 2, -40.0), (40.0, 2, -45.0)), True, False),  # prior and evidence chose
-        (fits((50.0, 1, -40.0), (40.0, 2, -35.0)), False, False),  # fewer unknowns
-        (fits((40.9, 2, -40.0), (40.0, 2, -35.0)), False, False),
-        ({}, None, None),
-    ],
-)
-def test_faults_of_search(record: Record, worse: bool | None, fault: bool | None) -> None:
-    assert (fits_worse(record), is_search_fault(record)) == (worse, fault)

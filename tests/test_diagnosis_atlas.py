@@ -6,14 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from diagnosis_problems import (
-    catalogue,
-    coordinates,
-    effects_named,
-    measured,
-    part_at,
-    problem_of,
-)
+from diagnosis_problems import catalogue, coordinates, effects_named, measured, part_at, problem_of
 
 from femubench import Model
 from femubench.core.challenge.structures import structure_named

@@ -102,13 +102,6 @@ def test_pairing_follows_shapes_where_frequencies_have_swapped() -> None:
     assert bare.pair(swapped, shapes[None, :, ::-1]).tolist() == [[0, 1]]
 
 
-def test_no_two_modes_share_a_partner() -> None:
-    data = toy([100.0, 101.0, 102.0], [[1.0] * 3, [1.0] * 3])
-    frequencies = np.array([[101.0, 150.0, 60.0]])
-    partner = data.pair(frequencies, np.ones((1, 2, 3)))[0]
-    assert sorted(partner.tolist()) == [0, 1, 2]
-
-
 def test_no_partner_is_far_away_as_long_as_another_is_left() -> None:
     """A shape may be as good as identical to a mode at five times the frequency."""
     shapes = np.array([[1.0], [0.5], [-0.7]])

@@ -24,12 +24,7 @@ from femubench.core.fit.modal_fit import Problem, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.projection import Projection, Projector
 from femubench.core.fit.residuals import Data
-from femubench.core.fit.static_response import (
-    Basis,
-    LargeProblem,
-    enrich_problem,
-    place_data,
-)
+from femubench.core.fit.static_response import Basis, LargeProblem, enrich_problem, place_data
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.screening import _pulls, screen_hypotheses
@@ -123,22 +118,6 @@ class TestCoordinates:
         raw = raw_residual(own, extend_model(model, parts, np.array(x)))
         assert_allclose(state.raw, raw, atol=1e-3)
 
-    def test_modes_alone_would_not_do(self, model: Model) -> None:
-        problem = posed_on(model, ())
-        part = projected(problem, one(model, JointRotation(), "E"))
-        state = state_at(problem, (part,), np.array([2.3]))
-        exact = np.sort(solve_modes(extend_model(model, (part,), state.x), 24).eigenvalues)
-        assert np.abs(state.eigenvalues[3:12] / exact[3:12] - 1.0).max() > 0.02
-
-    def test_two_causes_share_coordinates(self, model: Model) -> None:
-        problem = posed_on(model, ())
-        chosen = one(model, JointRotation(), "E"), one(model, AddedMass(), "A")
-        parts = tuple(projected(problem, hypothesis) for hypothesis in chosen)
-        own, parts = enrich_problem(problem, parts)
-        x = np.array([1.0, 1.5])
-        exact = np.sort(solve_modes(extend_model(model, parts, x), 24).eigenvalues)
-        assert_allclose(state_at(own, parts, x).eigenvalues[3:12], exact[3:12], rtol=1e-6)
-
     def test_one_basis_has_the_slopes_of_all(self, model: Model) -> None:
         """Forces at the sensors in the basis make readings right to first order."""
         problem = posed_on(model, ())
@@ -152,8 +131,7 @@ class TestCoordinates:
             assert_allclose(slope, (first - second) / step, atol=2e-3 * np.abs(slope).max())
 
     @pytest.mark.parametrize(
-        ("effect", "place"),
-        [(AttachedOscillator(), "BE@0.5"), (AddedMass(), "BC@0.25")],
+        ("effect", "place"), [(AttachedOscillator(), "BE@0.5"), (AddedMass(), "BC@0.25")]
     )
     def test_coordinates_of_many_are_those_of_each(
         self, model: Model, effect: Effect, place: str
@@ -204,9 +182,7 @@ class TestCoordinates:
 
 
 @pytest.mark.parametrize(
-    "effect",
-    [ShearDeformation(), Temperature(), AxialPreload()],
-    ids=lambda effect: effect.name,
+    "effect", [ShearDeformation(), Temperature(), AxialPreload()], ids=lambda effect: effect.name
 )
 def test_alike_elements_share_matrices_and_act_as_each_alone(model: Model, effect: Effect) -> None:
     frame = model.frame_structure.frame

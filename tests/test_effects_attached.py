@@ -15,11 +15,7 @@ from effect_checks import as_matrices, changed_matrices
 from femubench import Model, NotApplicable, Sensors, diagnose, solve_modes
 from femubench.core.challenge.structures import structure_named
 from femubench.core.challenge.truth import finer
-from femubench.core.change.hypothesis import (
-    by_themselves,
-    finer as finer_hypotheses,
-    hypothesis_at,
-)
+from femubench.core.change.hypothesis import by_themselves, finer as finer_hypotheses, hypothesis_at
 from femubench.core.diagnosis.region import Regions
 from femubench.core.diagnosis.tables import list_causes
 from femubench.core.effect.places import match
@@ -126,10 +122,7 @@ CASES = [
 
 @pytest.mark.parametrize(("effect", "name", "place"), CASES)
 def test_model_and_change_agree(
-    models: dict[str, Model],
-    effect: type[FrameEffect],
-    name: str,
-    place: str,
+    models: dict[str, Model], effect: type[FrameEffect], name: str, place: str
 ) -> None:
     made, model = effect(), models[name]
     assert bare_place(place) in made.places(model)

@@ -16,7 +16,6 @@ import pytest
 from distributions import install_metadata
 
 from femubench import Model
-from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.conformance.checking import findings, subjects
 from femubench.core.plugin.loader import Plugins, load_plugins
 from femubench.fem import Frame, Place, PointMass, Support
@@ -115,15 +114,3 @@ def bedding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
 def test_example_keeps_the_rules(bedding: Any) -> None:
     (subject,) = subjects(bedding.name, Plugins(effects={bedding.name: bedding}))
     assert [f for f in findings(subject) if f.verdict.status in ("fail", "warn")] == []
-
-
-def test_example_is_a_hypothesis_like_any_other(bedding: Any, ladder: FrameBuilder) -> None:
-    model = Model.of(ladder())
-    hypotheses = hypotheses_of(model, [bedding])
-    assert [h.place for h in hypotheses] == list(bedding.places(model))
-    one, x = hypotheses[5], np.array([[0.7]])
-    change = np.zeros((model.size, model.size))
-    for factor, term in zip(one.factors(x)[0], one.change.terms, strict=True):
-        change += factor * term.operator.apply(np.eye(model.size))
-    exact = bedding.extend(model, one.place, one.values(x)[0]).stiffness - model.stiffness
-    np.testing.assert_allclose(change, exact.toarray(), atol=1e-9 * np.abs(change).max())

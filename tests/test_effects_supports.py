@@ -40,10 +40,7 @@ SPACE = ("x", "y", "z", "rx", "ry", "rz")
 def held(ladder: FrameBuilder, hframe: FrameBuilder, portal: FrameBuilder) -> list[Model]:
     """Return a frame of each plane on supports, some between joints, some springs."""
     clamp, pin = ("z", "rx", "ry"), ("x", "z")
-    ladder_supports = (
-        Support(Place(joint="A"), clamp),
-        Support(Place(member="BC", s=0.4), ("z",)),
-    )
+    ladder_supports = (Support(Place(joint="A"), clamp), Support(Place(member="BC", s=0.4), ("z",)))
     cord = (GroundSpring(Place(joint="F"), "z", 1e4),)
     lies = replace(ladder(), supports=ladder_supports, springs=cord)
     feet = (Support(Place(joint="L1"), ("x", "z", "ry")), Support(Place(joint="L2"), pin))
@@ -61,17 +58,6 @@ def test_places_are_supports_and_springs_whole_and_by_direction(held: list[Model
     for model in held:
         assert all(has_place(model, place) for place in EFFECT.places(model))
         assert not has_place(model, "support:J3")
-
-
-def test_a_support_has_one_stiffness_of_each_kind(held: list[Model]) -> None:
-    def units(model: Model, place: str) -> list[str]:
-        return [p.unit for p in EFFECT.parameters(model, place)]
-
-    assert units(held[0], "support:A") == ["N/m", "N m/rad"]
-    assert units(held[1], "support:L2") == ["N/m"]
-    assert units(held[2], "support:J0:ry") == ["N m/rad"]
-    # A sprung foot is measured by its own spring.
-    assert EFFECT.parameters(held[0], "support:F:z")[0].scale == pytest.approx(1e4)
 
 
 def test_change_is_the_released_support_condensed(held: list[Model]) -> None:
