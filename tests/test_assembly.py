@@ -11,15 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices
-from femubench.core.fem.frame import (
-    Frame,
-    GroundSpring,
-    Joint,
-    Material,
-    Member,
-    Place,
-    PointMass,
-)
+from femubench.core.fem.frame import Frame, GroundSpring, Joint, Material, Member, Place, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import Section, constant_kappa

@@ -286,13 +286,7 @@ PIECES = st.sampled_from(
 EDITS = st.lists(st.tuples(st.integers(0, 5000), st.integers(0, 12), PIECES | st.text(max_size=4)))
 
 
-@pytest.mark.parametrize(
-    ("case", "file"),
-    [
-        ("in-plane", "case.toml"),
-        ("3d", "sensors.csv"),
-    ],
-)
+@pytest.mark.parametrize(("case", "file"), [("in-plane", "case.toml"), ("3d", "sensors.csv")])
 def test_only_input_errors_come_out(case: str, file: str) -> None:
     original = (CASES / case / file).read_text()
 

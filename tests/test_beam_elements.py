@@ -141,18 +141,6 @@ def test_partly_rigid_element_is_the_printed_equation(a: float) -> None:
     np.testing.assert_allclose(mirrored, expected, atol=tolerance, rtol=0)
 
 
-def test_shape_functions_of_a_partly_rigid_element_move_with_its_nodes() -> None:
-    p = one(rigid_1=0.1, rigid_2=0.2)
-    np.testing.assert_allclose(shape_functions(p, 0, 0.0), np.eye(12)[:6], atol=1e-14)
-    np.testing.assert_allclose(shape_functions(p, 0, 1.0), np.eye(12)[6:], atol=1e-14)
-    inside = shape_functions(p, 0, 0.05 / LENGTH)
-    np.testing.assert_allclose(inside[2, [2, 4]], [1.0, -0.05], atol=1e-14)
-    np.testing.assert_allclose(inside[1, [1, 5]], [1.0, 0.05], atol=1e-14)
-    edge = shape_functions(p, 0, 0.1 / LENGTH)
-    beyond = shape_functions(p, 0, 0.1 / LENGTH + 1e-9)
-    np.testing.assert_allclose(beyond, edge, atol=1e-7)
-
-
 def test_rigid_motion_costs_no_energy_and_carries_the_whole_mass() -> None:
     p = one(**SHEAR, **ROTARY, rigid_1=-0.1, rigid_2=0.05, shear_shape=1.0)
     x = np.array([0.0, LENGTH])

@@ -3,7 +3,6 @@
 import shutil
 import tomllib
 import typing
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -83,22 +82,6 @@ def test_modification() -> None:
     np.testing.assert_allclose(change.measurement.frequencies, [20.0, 70.5])
     assert change.measurement.shapes[2, 1] == 1.0
     assert np.isnan(change.measurement.shapes).sum() == 7
-
-
-def test_out_of_plane_frame() -> None:
-    case = read_case(CASES / "out-of-plane")
-    frame = frame_of(case)
-    assert (case.title, case.source, case.held_out, case.modifications) == ("grid", "", (), ())
-    assert frame.rotary_share == 0.0
-    tube, stiff, numbers = (member.section for member in frame.members)
-    assert stiff.J == 3.9125e-8
-    assert stiff == replace(tube, J=3.9125e-8, kappa=stiff.kappa)
-    assert (numbers.Jp, numbers.kappa) == (2.5e-8, None)
-    assert frame.masses[0].at == Place(member="long", s=0.2)
-    np.testing.assert_allclose(
-        case.measurement.sensors.xyz, [[0, 0, 0.3], [0.3, 0, 0.3], [0.675, 0.5, 0.3]]
-    )
-    np.testing.assert_allclose(case.measurement.shape_std, 0.015)
 
 
 def test_frame_in_space() -> None:

@@ -17,7 +17,6 @@ from femubench.core.errors import InputError
 from femubench.core.fem.frame import Frame, Joint, Material, Member, Place, PointMass
 from femubench.core.fem.mesh import Mesh, build_mesh
 from femubench.core.fem.sections import rectangular_tube
-from femubench.core.fem.structure import Structure
 
 CASES = Path(__file__).parent / "cases"
 JOINTS = "name,x,y,z\nfoot,0,0,0\nknee,0.0,0,0.5\ntip,0.4,0.3,0.6\n"
@@ -122,14 +121,3 @@ def test_members_meshed_together_are_those_meshed_one_by_one() -> None:
     one, other = build_mesh(frame), build_mesh(replace(frame, masses=masses))
     for first, second in zip(mesh_arrays(one), mesh_arrays(other), strict=True):
         assert np.array_equal(first, second)
-
-
-def test_elements_some_thousand_at_a_time_give_what_single_ones_give() -> None:
-    frame = plane_frame(5000, elements=0)
-    structure = Structure.build(frame)
-    assert len(structure.mesh.ends) > 2 * 4096
-    mass, stiffness = structure.matrices()
-    assert abs(stiffness - stiffness.T).max() == 0.0
-    shift = (np.array(structure.kinematics.direction) == "z").astype(float)
-    assert shift @ (mass @ shift) == pytest.approx(structure.total_mass, rel=1e-12)
-    assert np.abs(stiffness @ shift).max() < 1e-9 * stiffness.diagonal().max()

@@ -173,8 +173,7 @@ def test_a_point_without_a_mass_is_worse_than_any_model() -> None:
 
 def test_masses_of_matrices_and_of_held_frames_have_the_terms_in_them() -> None:
     held = replace(
-        FRAME.model.frame_structure.frame,
-        supports=(Support(Place(joint="J1"), ("z", "rx", "ry")),),
+        FRAME.model.frame_structure.frame, supports=(Support(Place(joint="J1"), ("z", "rx", "ry")),)
     )
     frame = ParametricModel(Model.of(held), tuple(list_changes(Model.of(held), "added-mass@J5")))
     (kilograms,) = frame.values(np.array([0.5]))

@@ -188,7 +188,6 @@ class TestWrongInput:
                 ["case", "-s", "test-nothin"],
                 "no strategy 'test-nothin'; did you mean 'test-nothing'",
             ),
-            (["frmae"], "no case 'frmae'; did you mean 'frame'"),
             (["some/where"], "some/where: folder does not exist"),
             (["empty"], "empty/case.toml: missing file"),
             (["case", "--json", "no/such.json"], "no: folder does not exist"),
@@ -215,14 +214,7 @@ class TestWrongInput:
         assert expected in line
         assert sorted(tmp_path.rglob("*")) == before
 
-    @pytest.mark.parametrize(
-        "words",
-        [
-            ["run", "--timeout", "soon"],
-            ["run", "-j", "0"],
-            ["--x"],
-        ],
-    )
+    @pytest.mark.parametrize("words", [["run", "--timeout", "soon"], ["run", "-j", "0"], ["--x"]])
     def test_usage(self, invoke: Invoke, words: list[str]) -> None:
         result = invoke(*words)
         assert result.exit_code == 2
@@ -330,16 +322,7 @@ class TestGoingOn:
 def done(site: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
     folder = tmp_path_factory.mktemp("run")
     case = put_case(folder / "case")
-    words = [
-        "run",
-        case,
-        "--store",
-        folder / "store",
-        "--seeds",
-        2,
-        "--json",
-        folder / "r.json",
-    ]
+    words = ["run", case, "--store", folder / "store", "--seeds", 2, "--json", folder / "r.json"]
     words += ["--csv", folder / "r.csv", "-j", 2, "--timeout", "1m", "--nominal", "drawn"]
     for strategy in ("test-nothing", "test-fails", "test-picky"):
         words += ["-s", strategy]

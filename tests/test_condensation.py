@@ -10,19 +10,9 @@ import pytest
 import scipy.linalg as la
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.frame import (
-    Frame,
-    JointSpring,
-    Place,
-    PointMass,
-)
+from femubench.core.fem.frame import Frame, JointSpring, Place, PointMass
 from femubench.core.fem.model import Model
-from femubench.core.modal.eigen import (
-    condense_massless,
-    dense_matrices,
-    solve_dense,
-    solve_modes,
-)
+from femubench.core.modal.eigen import condense_massless, dense_matrices, solve_dense, solve_modes
 from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]

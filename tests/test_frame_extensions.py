@@ -23,7 +23,6 @@ from femubench.core.fem.frame import (
     Factor,
     Frame,
     Joint,
-    JointSpring,
     Material,
     Member,
     Oscillator,
@@ -192,12 +191,6 @@ class TestEccentricMass:
         assert inertia[1, 1] == pytest.approx(steiner * LENGTH, rel=1e-12)
         assert inertia[0, 1] == pytest.approx(-0.01 * RHO_A * LENGTH, rel=1e-12)
 
-    def test_an_offset_that_the_plane_does_not_see_changes_nothing(self) -> None:
-        shifted = (Eccentricity("m", z=0.01),)
-        same(beam("out-of-plane", 2, eccentricities=shifted), beam("out-of-plane", 2))
-        shifted = (Eccentricity("m", y=0.01),)
-        same(beam("in-plane", 2, eccentricities=shifted), beam("in-plane", 2))
-
 
 class TestCoupling:
     def tip(self, coefficient: float, elements: int) -> dict[str, float]:
@@ -341,17 +334,6 @@ class TestOscillators:
         hung = beam(plane, 4, oscillators=(Oscillator(place, "z", 0.5, 3e5),))
         lumped = beam(plane, 4, masses=(PointMass(place, 0.5),))
         assert frequencies(hung, 4) == pytest.approx(frequencies(lumped, 4), rel=1e-5)
-
-    def test_they_may_hang_where_nothing_can_be_split(self, ladder: Any) -> None:
-        arm = JointSpring("B", "BE", {"rx": 1e3, "ry": 1e3}, 0.01)
-        for s in (0.01, 1.0 / 4 + 1e-6):
-            place = Place(member="BE", s=s)
-            frame = replace(ladder(accelerometer=False), joint_springs=(arm,))
-            nodes = len(Structure.build(frame).mesh.xyz)
-            hung = replace(frame, oscillators=(Oscillator(place, "z", 0.1, 1e5),))
-            lumped = replace(frame, masses=(PointMass(place, 0.1),))
-            assert len(Structure.build(hung).mesh.xyz) == nodes + 1
-            assert frequencies(hung, 5) == pytest.approx(frequencies(lumped, 5), rel=1e-4)
 
     def test_attachments_find_the_dofs_again(self, ladder: Any) -> None:
         hung = (Oscillator(Place(member="AB", s=0.4), "z", 0.1, 90.0),)
