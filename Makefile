@@ -18,7 +18,7 @@ endif
 
 # Tests whose figures go through linear algebra; KERNELS are those of OpenBLAS, of which a processor
 # without AVX-512 runs all but SkylakeX, and every x86-64 runs Nehalem.
-NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py asymmetric_frame.py attach*.py \
+NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py attach*.py \
 	beam_elements.py calibration.py challenge.py close_modes.py condensation.py diagnos*.py effects_*.py eigen.py \
 	element_strategies.py exhibits.py expansion.py frame_extensions.py frf.py kernels.py \
 	localisation.py look*.py matrix_strategies.py pairing.py papers_*.py preload.py rigid_modes.py \

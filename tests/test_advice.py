@@ -7,18 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from advice_problems import STD, advised, every_option, fitted, one_outlook, posed
-from numpy.testing import assert_allclose
+from advice_problems import STD, advised, every_option, fitted, posed
 
 from femubench import Model
 from femubench.core.advise.advice import advise
-from femubench.core.fit.modal_fit import fit
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
 from femubench.fem import Frame
 from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.material import Density, YoungsModulus
-from femubench.plugins.effects.shear_deformation import ShearDeformation
 from femubench.plugins.effects.temperature import Temperature
 
 FrameBuilder = Callable[..., Frame]
@@ -124,21 +121,3 @@ class TestGroups:
                 fall = 1.0 / np.sqrt(1.0 + change) - 1.0
                 expected = fall**2 / (2.0 * STD**2 + STD**2) * 6.0
                 assert levels[0].separation == pytest.approx(expected, rel=0.05)
-
-    def test_textbook_effects_under_the_causes(self, symmetric: Model) -> None:
-        effects = [JointRotation()]
-        shear = ShearDeformation().extend(symmetric, "all", [1.0])
-        truth = JointRotation().extend(shear, "A", [3000.0])
-        plain, above = (posed(model, truth, effects) for model in (symmetric, shear))
-        fits = [fitted(above, JointRotation(), "A"), fitted(plain, JointRotation(), "F")]
-        assert fits[0].state.chi2 < 1e-2 < fits[1].state.chi2
-        for problem, found in zip((above, plain), fits, strict=True):
-            own, _ = one_outlook(problem, found)
-            used = own.state.partner
-            assert_allclose(own.state.frequencies[used], found.state.frequencies[used], rtol=1e-9)
-        advice = advise(symmetric, [above, plain], fits, tolerance=0.0)
-        assert advice[0].separation > 50.0
-        nothing = fit(above, (), np.zeros(0))
-        assert nothing is not None
-        bare = advise(symmetric, [above, plain], [nothing, fits[1]], tolerance=0.0)
-        assert bare[0].separation > 50.0

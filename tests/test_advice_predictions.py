@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.linalg as la
-from advice_problems import STD, advised, every_option, fitted, one_outlook, part_of, posed
+from advice_problems import STD, every_option, fitted, one_outlook, part_of, posed
 from numpy.testing import assert_allclose
 from scipy.special import logsumexp
 
@@ -16,14 +16,11 @@ from femubench import Model, solve_modes
 from femubench.core.advise.advice import align_shapes
 from femubench.core.advise.point_attachments import antiresonances, predict_loaded_frequencies
 from femubench.core.advise.prediction import Outlook, Points, Predicted, distance
-from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.fem.model import Dofs
-from femubench.core.fit.modal_fit import Fit, fit, state_at
+from femubench.core.fit.modal_fit import Fit, state_at
 from femubench.core.inference.settings import overridden
 from femubench.effect import point_in, translation_rows
 from femubench.fem import FloatArray, Frame, Place, PointMass, Support
 from femubench.plugins.effects.added_mass import AddedMass
-from femubench.plugins.effects.attached_oscillator import AttachedOscillator
 from femubench.plugins.effects.grounding_spring import GroundingSpring
 from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.material import YoungsModulus
@@ -131,26 +128,6 @@ class TestPredictions:
         exact = float(row @ la.solve(stiff, row))
         found = view.flexibility().values.max()
         assert found == pytest.approx(exact, rel=1e-3)
-
-    def test_added_coordinates_and_matrices(self, symmetric: Model) -> None:
-        """An oscillator brings a mode of its own; a pair of matrices has nodes alone."""
-        effects = [AttachedOscillator(), AddedMass()]
-        problem = posed(symmetric, AddedMass().extend(symmetric, "A", [0.05]), effects)
-        part = part_of(problem, AttachedOscillator(), "A")
-        high = part.hypothesis.bounds[1][1]
-        heavy = fit(problem, (part,), np.array([0.3, high]))
-        assert heavy is not None
-        found = advised(symmetric, problem, [fitted(problem, AddedMass(), "A"), heavy])
-        assert found
-        assert all(np.isfinite(advice.separation) for advice in found)
-        names = tuple(f"n{i}" for i in range(int(symmetric.dofs.node.max()) + 1))
-        dofs = Dofs(symmetric.dofs.node, symmetric.dofs.direction, symmetric.dofs.xyz)
-        bare = Model(symmetric.mass, symmetric.stiffness, dofs, MatrixGeometry(names, dofs))
-        problem = posed(bare, AddedMass().extend(bare, "n0", [0.05]), [AddedMass()])
-        fits = [fitted(problem, AddedMass(), place) for place in ("n0", "n5")]
-        first = advised(bare, problem, fits)[0]
-        assert first.separation > 1.0
-        assert not any("weigh" in a.measurement for a in advised(bare, problem, fits))
 
 
 def test_distance_against_likelihood_ratios(symmetric: Model) -> None:

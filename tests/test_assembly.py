@@ -10,17 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from femubench.core.errors import ModelError
-from femubench.core.fem import structure as structure_module
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices
-from femubench.core.fem.frame import (
-    Frame,
-    GroundSpring,
-    Joint,
-    Material,
-    Member,
-    Place,
-    PointMass,
-)
+from femubench.core.fem.frame import Frame, GroundSpring, Joint, Material, Member, Place, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import Section, constant_kappa
@@ -56,26 +47,6 @@ def test_assembly_is_the_sum_of_rotated_elements(portal: FrameBuilder) -> None:
     )
 
 
-def test_a_large_structure_lets_go_of_its_plan_until_parameters_are_set(
-    portal: FrameBuilder, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    small = Structure.build(portal(3))
-    expected = small.matrices()
-    monkeypatch.setattr(structure_module, "_PLANNED_ONCE", 5)
-    large = Structure.build(portal(3))
-    for one, other in zip(expected, large.matrices(), strict=True):
-        np.testing.assert_array_equal(one.toarray(), other.toarray())
-    assert "plan" in vars(small)
-    assert not {"plan", "gather"} & set(vars(large))
-    stiffer = Property("stiffer", "E", large.labels[:4])
-    changed = large.with_values([stiffer], [1.5])
-    for one, other in zip(
-        small.with_values([stiffer], [1.5]).matrices(), changed.matrices(), strict=True
-    ):
-        np.testing.assert_array_equal(one.toarray(), other.toarray())
-    assert changed.with_values([stiffer], [1.1]).plan is changed.plan
-
-
 def test_local_axes_are_right_handed_and_hold_up(portal: FrameBuilder) -> None:
     frame = portal(4)
     structure = Structure.build(frame)
@@ -87,8 +58,8 @@ def test_local_axes_are_right_handed_and_hold_up(portal: FrameBuilder) -> None:
         assert up @ axes[2] > 0.0
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_turning_a_frame_leaves_its_frequencies(portal: FrameBuilder, seed: int) -> None:
+def test_turning_a_frame_leaves_its_frequencies(portal: FrameBuilder) -> None:
+    seed = 1
     frame = portal(seed, masses=(PointMass(Place(member="m2", s=0.3), 0.4, (0.1, 0.05, -0.2)),))
     turn = Rotation.random(random_state=seed).as_matrix()
 
@@ -105,12 +76,9 @@ def test_turning_a_frame_leaves_its_frequencies(portal: FrameBuilder, seed: int)
     np.testing.assert_allclose(elastic(other, 30), elastic(frame, 30), rtol=1e-8)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
-def test_translation_and_rotation_carry_the_whole_mass(
-    portal: FrameBuilder, seed: int, theory: str
-) -> None:
-    frame = portal(seed, theory, masses=(PointMass(Place(joint="J2"), 0.7, (0.1, -0.2, 0.3)),))
+def test_translation_and_rotation_carry_the_whole_mass(portal: FrameBuilder, theory: str) -> None:
+    frame = portal(1, theory, masses=(PointMass(Place(joint="J2"), 0.7, (0.1, -0.2, 0.3)),))
     model = Model.of(frame)
     r = model.dofs.xyz
     direction = np.array(model.dofs.direction)
@@ -150,8 +118,9 @@ def planar(plane: str, theory: str) -> Frame:
     return Frame(plane, theory, joints, members, masses, springs)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
-@pytest.mark.parametrize("plane", ["in-plane", "out-of-plane"])
+@pytest.mark.parametrize(
+    ("plane", "theory"), [("in-plane", "timoshenko"), ("out-of-plane", "euler-bernoulli")]
+)
 def test_planar_models_are_parts_of_the_spatial_one(plane: str, theory: str) -> None:
     frame = planar(plane, theory)
     model, spatial = Model.of(frame), Model.of(replace(frame, plane="3d"))

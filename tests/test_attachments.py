@@ -36,17 +36,6 @@ def elastic(frame: Frame, count: int = 8) -> FloatArray:
     return solve_modes(Model.of(frame)).elastic.natural_frequencies[:count]
 
 
-def test_a_spring_takes_no_notice_of_its_sign(ladder: FrameBuilder) -> None:
-    frames = [
-        replace(ladder(), springs=(GroundSpring(Place(joint="B"), d, 1e5),))
-        for d in ("z", "-z", "+z")
-    ]
-    first, *others = (elastic(frame) for frame in frames)
-    for other in others:
-        np.testing.assert_array_equal(other, first)
-    assert first[0] < elastic(ladder())[0] + 200.0
-
-
 def test_supports_remove_exactly_the_named_dofs(ladder: FrameBuilder) -> None:
     frame = ladder()
     free, held = Model.of(frame), Model.of(
@@ -78,13 +67,7 @@ def test_an_attachment_between_nodes_splits_its_element(ladder: FrameBuilder) ->
     assert np.count_nonzero(np.abs(change) > 1e-12) == 1
 
 
-def test_a_support_between_nodes_splits_its_element(ladder: FrameBuilder) -> None:
-    frame = replace(ladder(), supports=(Support(Place(member="EF", s=0.4), ("z",)),))
-    assert Model.of(frame).size == 83
-
-
-@pytest.mark.parametrize("beam", ["euler-bernoulli", "timoshenko"])
-@pytest.mark.parametrize("s", [0.3, 0.4, 0.93])
+@pytest.mark.parametrize(("beam", "s"), [("euler-bernoulli", 0.3), ("timoshenko", 0.93)])
 def test_what_is_put_on_a_model_gives_the_modes_of_the_frame_that_has_it(
     ladder: FrameBuilder, beam: str, s: float
 ) -> None:
@@ -133,7 +116,7 @@ def test_a_mass_between_nodes_gives_the_frequencies_of_a_beam_with_a_mass() -> N
         assert determinant(0.9999 * f) * determinant(1.0001 * f) < 0.0
 
 
-@pytest.mark.parametrize("distance", [1e-8, 1e-6, 1e-5, 1e-4, 1e-3])
+@pytest.mark.parametrize("distance", [1e-8, 1e-4])
 def test_an_attachment_close_to_a_node_spoils_nothing(
     ladder: FrameBuilder, distance: float
 ) -> None:
@@ -168,41 +151,13 @@ def test_a_mass_on_a_rigid_arm_is_a_mass_with_an_offset(ladder: FrameBuilder) ->
     np.testing.assert_array_equal(elastic(at_end), elastic(at_joint))
 
 
-def test_a_mass_on_a_rigid_end_is_a_mass_with_an_offset(hframe: FrameBuilder) -> None:
-    base = hframe(accelerometers=False, rigid_ends=(RigidEnd("T1", "horizontal", 0.02, 0.02),))
-    on_end = replace(base, masses=(PointMass(Place(member="horizontal", s=0.01 / 0.74), 0.3),))
-    offset = replace(base, masses=(PointMass(Place(joint="T1"), 0.3, (0.01, 0.0, 0.0)),))
-    np.testing.assert_allclose(elastic(on_end), elastic(offset), rtol=1e-10)
-
-
-def test_stiff_joint_springs_are_no_springs(ladder: FrameBuilder) -> None:
-    stiff = JointSpring("A", "AB", {"rx": 1e9, "ry": 1e9})
-    np.testing.assert_allclose(
-        elastic(replace(ladder(), joint_springs=(stiff,))), elastic(ladder()), rtol=1e-4
-    )
-
-
-def test_soft_joint_springs_are_hinges(ladder: FrameBuilder) -> None:
-    # A bending hinge at both ends of the middle rung leaves it torsion and shear alone.
-    soft = tuple(JointSpring(j, "BE", {"ry": 1e-3}) for j in "BE")
-    hinged = elastic(replace(ladder(), joint_springs=soft))
-    harder = tuple(JointSpring(j, "BE", {"ry": 1.0}) for j in "BE")
-    assert (hinged <= elastic(ladder()) + 1e-6).all()
-    np.testing.assert_allclose(hinged, elastic(replace(ladder(), joint_springs=harder)), rtol=1e-3)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"joint_springs": (JointSpring("A", "nothing", {"ry": 1.0}),)}, "no member end"),
-        ({"joint_springs": (JointSpring("E", "AB", {"ry": 1.0}),)}, "no member end"),
         ({"rigid_ends": (RigidEnd("A", "BE", 0.01),)}, "no member end"),
-        ({"rigid_ends": (RigidEnd("A", "AB", 0.09),)}, "longer than its element"),
         ({"rigid_ends": (RigidEnd("A", "AB", 0.0, 0.09),)}, "longer than its element"),
         ({"joint_springs": (JointSpring("A", "AB", {"ry": 1.0}, 0.08),)}, "past its end element"),
-        ({"masses": (PointMass(Place(member="AB", s=1.2), 0.1),)}, "not within 0..1"),
         ({"masses": (PointMass(Place(member="ZZ", s=0.2), 0.1),)}, "no member"),
-        ({"masses": (PointMass(Place(joint="ZZ"), 0.1),)}, "no joint"),
         (
             {"joint_springs": (ARM,), "supports": (Support(Place(member="AB", s=0.03), ("z",)),)},
             "on the arm",
@@ -216,13 +171,6 @@ def test_what_cannot_be_meshed_is_refused(
         Model.of(replace(ladder(), **change))
 
 
-def test_a_member_that_leaves_the_plane_is_refused(ladder: FrameBuilder) -> None:
-    frame = ladder()
-    joints = (*frame.joints[:-1], Joint("F", (0.5842, 0.2794, 0.01)))
-    with pytest.raises(ModelError, match="leaves the plane"):
-        Model.of(replace(frame, joints=joints))
-
-
 def test_a_rigid_length_beyond_the_element_is_refused(hframe: FrameBuilder) -> None:
     rigid = (RigidEnd("T1", "horizontal", 0.01),)
     structure = Structure.build(hframe(rigid_ends=rigid))
@@ -230,12 +178,3 @@ def test_a_rigid_length_beyond_the_element_is_refused(hframe: FrameBuilder) -> N
     assert structure.with_values([parameter], [-0.05]).properties.rigid_1.min() == -0.05
     with pytest.raises(ModelError, match="longer than its element"):
         structure.with_values([parameter], [0.06])
-
-
-def test_out_of_plane_a_mass_acts_along_z_alone(ladder: FrameBuilder) -> None:
-    base = ladder()
-    flat, high = (
-        elastic(replace(base, masses=(PointMass(Place(joint="A"), 0.3, (0.02, -0.05, z)),)))
-        for z in (0.0, 0.1)
-    )
-    np.testing.assert_allclose(high, flat, rtol=1e-12)

@@ -28,9 +28,7 @@ BROKEN = [
         "case.toml",
         ('name = "portal"', 'name = "portal', 0, "", "Illegal", "TOML"),
         ("[case]", "[case]\n[case]", 1, "", "Cannot declare", "TOML"),
-        ("[case]", "\x00", 0, "", "", "TOML"),
         ("title", "titel", 0, "case.titel", "is 'title' meant", "source"),
-        ("rho =", "roh =", 0, "model.materials.steel.roh", "unknown", "rho"),
         ("nu = 0.3\n", "", -2, "model.materials.steel.nu", "missing", "-1"),
         ('kind = "frame"', "", -1, "model.kind", "missing", "'matrices'"),
         ('"frame"', '"fem"', 0, "model.kind", "'fem'", "'frame'"),
@@ -39,17 +37,12 @@ BROKEN = [
         ("[case]", "[kase]", 0, "kase", "'case' meant", "measurement"),
         ("210e9", "-210e9", 0, "model.materials.steel.E", "-210", "> 0"),
         ("0.3\n", "0.5\n", 0, "model.materials.steel.nu", "0.5", "< 0.5"),
-        ("7850.0", "-7850", 0, "model.materials.steel.rho", "-7850", "> 0"),
         ("7850.0", "nan", 0, "model.materials.steel.rho", "nan", "> 0"),
         ("7850.0", "'7850'", 0, "model.materials.steel.rho", "'7850'", "> 0"),
-        ("7850.0", "true", 0, "model.materials.steel.rho", "true", "> 0"),
         ("1.5, 0.0, 1.2", "1.5, 0.0, inf", 0, "model.joints[2].xyz[2]", "inf", "m"),
         ("1.5, 0.0, 1.2", "1.5, 1.2", 0, "model.joints[2].xyz", "number", "m"),
         ("elements = 6", "elements = 0", 0, "model.members[1].elements", "0", "from 1 to 1000000"),
-        ("elements = 6", "elements = 99999999", 0, "model.members[1].elements", "", "to 1000000"),
         ("mass = 0.2", "mass = -0.2", 0, "model.masses[0].mass", "-0.2", ">= 0"),
-        ("2.0e4", "-2.0e4", 0, "model.springs[0].stiffness", "-2", ">= 0"),
-        ("shape_std = 0.02", "shape_std = 0", 0, "measurement.shape_std", "0", "> 0"),
         ("0.003", "0.02", 0, "model.sections.beam.wall", "0.02", "< 0.02"),
         ("rectangular-", "oval-", 0, "model.sections.beam.shape", "oval", "tube"),
         ("wall = 0.003", "", -4, "model.sections.beam.wall", "missing", "height"),
@@ -79,7 +72,6 @@ BROKEN = [
         "in-plane",
         "case.toml",
         ('name = "C"', 'name = "B"', 0, "model.joints[2].name", "twice", "own"),
-        ('name = "right"', 'name = "left"', 0, "model.members[2].name", "twice", "own"),
         ('name = "C"', 'name = "C@1"', 0, "model.joints[2].name", "C@1", "without @"),
         ('section = "beam"', 'section = "ibeam"', 0, "model.members[1].section", "ibeam", "beam"),
         ("elements = 6", "up = [0, 0, 1]", 0, "model.members[1].up", "in-plane", "3d"),
@@ -101,7 +93,6 @@ BROKEN = [
         ('at = "B"', 'at = "Z"', 0, "model.masses[0].at", "'Z'", "joint"),
         ("s = 0.3", "s = 1.3", 0, "model.masses[1].at", "0..1", "0.25"),
         ('"right@0.5"', '"right@half"', 0, "model.springs[0].at", "half", "0.25"),
-        ('"right@0.5"', '"wrong@0.5"', 0, "model.springs[0].at", "wrong", "member"),
         ('"-x"', '"y"', 0, "model.springs[0].direction", "'y'", "x, z, ry"),
     ),
     *in_file(
@@ -113,7 +104,6 @@ BROKEN = [
         "in-plane",
         "case.toml",
         ('["x", "z"]', '["x", "rz"]', 0, "model.supports[1].fixed", "'rz'", "x, z, ry"),
-        ('["x", "z"]', "[]", 0, "model.supports[1].fixed", "entries", "list"),
         ("{ry = 3e5,", "{rz = 3e5,", 0, "model.joint_springs[0].stiffness", "'rz'", "ry"),
         ('joint = "C"', 'joint = "A"', 0, "model.joint_springs[0].joint", "'A'", "D, C"),
         ("arm = 0.02", "arm = 0.9", -4, "model.joint_springs[0]", "arm", ""),
@@ -121,14 +111,11 @@ BROKEN = [
         ("-0.01", "0.9", -3, "model.rigid_ends[0]", "rigid end", ""),
         ('"modes.csv"', '"mode.csv"', 0, "measurement.modes", "no file", "a file in"),
         ('"modes.csv"', '"../modes.csv"', 0, "measurement.modes", "out of", "inside"),
-        ('"modes.csv"', '"/etc/passwd"', 0, "measurement.modes", "out of", "inside"),
         ('"modes.csv"', '"case.toml"', 0, "measurement.modes", "kind of file", ".csv"),
         ("used = [1, 2]", "used = [1, 3]", 0, "measurement.used[1]", "no data", "1, 2, 4, 7"),
-        ("used = [1, 2]", "used = [1, 1]", 0, "measurement.used[1]", "twice", "once"),
         ("used = [1, 2]", "used = []", 0, "measurement.used", "entries", "one at least"),
         ("held_out = [4]", "held_out = [2]", 0, "measurement.held_out[0]", "twice", "once"),
         ("[5.0, 400.0]", "[400.0, 5.0]", 0, "measurement.band", "empty", "low < high"),
-        ("std = 0.05", "std = 0", 0, "measurement.mass.std", "0", "> 0"),
         ('{at = "C", mass', '{at = "K", mass', 0, "modification[0].masses[0].at", "'K'", "joint"),
     ),
     *in_file(
@@ -140,7 +127,6 @@ BROKEN = [
         ("1.1,z", "1.1,y", 0, "direction", "'y'", "x, z, ry"),
         ("1.1,z", "1.1,up", 0, "direction", "'up'", "one of x"),
         ("0.75,", "nan,", 0, "x", "nan", "number"),
-        ("0.75,", ",", 0, "x", "empty", "number"),
         ("label,x", "name,x", 0, "label", "missing column", "name"),
         ("girder,", "girder,girder,", 0, "", "6 cells", "5"),
     ),
@@ -156,25 +142,16 @@ BROKEN = [
         ("2,80.0", "1,80.0", 0, "mode", "twice", "own"),
         ("2,80.0", "two,80.0", 0, "mode", "'two'", "whole"),
         ("2,80.0", "2,-80.0", 0, "frequency", "'-80.0'", "> 0"),
-        ("2,80.0", "2,inf", 0, "frequency", "inf", "number"),
         ("2,80.0", "2,1e999", 0, "frequency", "too large", "finite"),
         ("2,80.0", "2,", 0, "frequency", "empty", "> 0"),
-        ("2,80.0", "2,8+1j", 0, "frequency", "8+1j", "> 0"),
         ("21.5,0.05", "21.5,-0.05", 0, "frequency_std", "'-0.05'", ">= 0"),
         ("0.004", "1.5", 0, "damping", "1.5", "ratio"),
-        ("0.02,", "nan,", 0, "girder", "nan", "number"),
         ("0.02,", "o.o2,", 0, "girder", "o.o2", "number"),
         (",turn", ",twist", 0, "twist", "unknown column", "mode"),
-        (",turn", ",girder", 0, "girder", "twice", "once"),
         (",turn", ",", 0, "", "no name", "name"),
         ("0.8,0.001", "0.8,-0.001", 0, "girder_std", "'-0.001'", ">= 0"),
         ("0.1,,-2.0,0.5", "0,,0,0", 0, "mode", "zero", "shape"),
         ("2,80.0", '"2,80.0', 2, "", "quotation", "commas"),
-    ),
-    *in_file(
-        "in-plane",
-        "modified.csv",
-        ("70.5", "-70.5", 0, "frequency", "-70.5", "> 0"),
     ),
 ]  # fmt: skip
 
@@ -217,7 +194,7 @@ def test_monstrous_toml(tmp_path: Path, new: str, what: str) -> None:
     assert what in message(folder).what
 
 
-@pytest.mark.parametrize("file", ["case.toml", "sensors.csv", "modes.csv", "modified.csv"])
+@pytest.mark.parametrize("file", ["case.toml", "modified.csv"])
 def test_missing_file(tmp_path: Path, file: str) -> None:
     shutil.copytree(CASES / "in-plane", tmp_path / "case")
     (tmp_path / "case" / file).unlink()
@@ -229,7 +206,7 @@ def test_missing_folder(tmp_path: Path) -> None:
     assert "case.toml" in str(error.expected)
 
 
-@pytest.mark.parametrize("file", ["case.toml", "sensors.csv", "modes.csv"])
+@pytest.mark.parametrize("file", ["case.toml", "modes.csv"])
 def test_bytes_that_are_no_text(tmp_path: Path, file: str) -> None:
     shutil.copytree(CASES / "in-plane", tmp_path / "case")
     with (tmp_path / "case" / file).open("ab") as stream:
@@ -309,15 +286,7 @@ PIECES = st.sampled_from(
 EDITS = st.lists(st.tuples(st.integers(0, 5000), st.integers(0, 12), PIECES | st.text(max_size=4)))
 
 
-@pytest.mark.parametrize(
-    ("case", "file"),
-    [
-        ("in-plane", "case.toml"),
-        ("3d", "case.toml"),
-        ("in-plane", "modes.csv"),
-        ("3d", "sensors.csv"),
-    ],
-)
+@pytest.mark.parametrize(("case", "file"), [("in-plane", "case.toml"), ("3d", "sensors.csv")])
 def test_only_input_errors_come_out(case: str, file: str) -> None:
     original = (CASES / case / file).read_text()
 

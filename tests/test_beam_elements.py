@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
-import scipy.linalg as la
 from scipy.optimize import brentq
 
 from femubench.core.fem.beam import (
@@ -19,7 +17,7 @@ from femubench.core.fem.beam import (
 )
 from femubench.core.fem.frame import Frame, Joint, Material, Member, Place, Support
 from femubench.core.fem.model import Model
-from femubench.core.fem.sections import Section, constant_kappa, rectangular_tube
+from femubench.core.fem.sections import Section, constant_kappa
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.typing import FloatArray
 
@@ -101,10 +99,8 @@ def arm(first: float, second: float) -> FloatArray:
     return T
 
 
-@pytest.mark.parametrize("shear", [{}, SHEAR])
 @pytest.mark.parametrize(
-    ("first", "second"),
-    [(0.1, 0.0), (0.0, 0.1), (0.05, 0.2), (-0.1, 0.0), (0.0, -1.0), (-0.2, 0.1)],
+    ("first", "second", "shear"), [(0.05, 0.2, SHEAR), (0.0, -1.0, {}), (-0.2, 0.1, SHEAR)]
 )
 def test_partly_rigid_element_is_the_transformed_shorter_one(
     first: float, second: float, shear: dict[str, float]
@@ -119,7 +115,7 @@ def test_partly_rigid_element_is_the_transformed_shorter_one(
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("a", [0.02, 0.3, -0.0283, -0.5])
+@pytest.mark.parametrize("a", [0.3, -0.0283])
 def test_partly_rigid_element_is_the_printed_equation(a: float) -> None:
     # Horton et al. (1999), equation (5); its dofs are w and dw/dx, ours w and ry = -dw/dx.
     L, EI = LENGTH, VALUES["EIy"]
@@ -145,18 +141,6 @@ def test_partly_rigid_element_is_the_printed_equation(a: float) -> None:
     np.testing.assert_allclose(mirrored, expected, atol=tolerance, rtol=0)
 
 
-def test_shape_functions_of_a_partly_rigid_element_move_with_its_nodes() -> None:
-    p = one(rigid_1=0.1, rigid_2=0.2)
-    np.testing.assert_allclose(shape_functions(p, 0, 0.0), np.eye(12)[:6], atol=1e-14)
-    np.testing.assert_allclose(shape_functions(p, 0, 1.0), np.eye(12)[6:], atol=1e-14)
-    inside = shape_functions(p, 0, 0.05 / LENGTH)
-    np.testing.assert_allclose(inside[2, [2, 4]], [1.0, -0.05], atol=1e-14)
-    np.testing.assert_allclose(inside[1, [1, 5]], [1.0, 0.05], atol=1e-14)
-    edge = shape_functions(p, 0, 0.1 / LENGTH)
-    beyond = shape_functions(p, 0, 0.1 / LENGTH + 1e-9)
-    np.testing.assert_allclose(beyond, edge, atol=1e-7)
-
-
 def test_rigid_motion_costs_no_energy_and_carries_the_whole_mass() -> None:
     p = one(**SHEAR, **ROTARY, rigid_1=-0.1, rigid_2=0.05, shear_shape=1.0)
     x = np.array([0.0, LENGTH])
@@ -172,16 +156,6 @@ def test_rigid_motion_costs_no_energy_and_carries_the_whole_mass() -> None:
     expected = [total, total, total, VALUES["rhoJp"] * LENGTH]
     expected += [total * LENGTH**2 / 3 + ROTARY[name] * LENGTH for name in ("rhoIy", "rhoIz")]
     np.testing.assert_allclose(np.diag(inertia), expected, rtol=1e-12)
-
-
-def test_timoshenko_tends_to_euler_bernoulli_linearly_in_the_flexibility() -> None:
-    def difference(scale: float) -> float:
-        p = one(flex_y=scale * 5e-8, flex_z=scale * 3e-7, shear_shape=1.0)
-        k = stiffness_matrices(p)[0] - stiffness_matrices(one())[0]
-        return float(np.abs(k).max())
-
-    assert difference(1e-6) / difference(1e-5) == pytest.approx(0.1, rel=1e-3)
-    assert difference(1e-12) < 1e-11 * np.abs(stiffness_matrices(one())).max()
 
 
 # ---- beams against the roots of their frequency equations ----------------------------------
@@ -284,49 +258,6 @@ def test_timoshenko_beam_meets_its_frequency_equation(bending_mass: str) -> None
     np.testing.assert_allclose(rates([np.abs(f / exact - 1.0) for f in found]), 2.0, atol=0.03)
     extrapolated = (4.0 * found[2] - found[1]) / 3.0
     np.testing.assert_allclose(extrapolated, exact, rtol=2e-7)
-
-
-def free_frequencies(section: Section, length: float, count: int) -> FloatArray:
-    """Return the frequencies of a free Timoshenko beam in Hz, from its equations of first order.
-
-    Deflection, rotation, moment and shear force at one end follow from those at the other by a
-    matrix exponential; a free beam has a motion without moment and force at both ends.
-    """
-    assert section.kappa is not None
-    GA = section.kappa(MATERIAL.nu)[1] * MATERIAL.G * section.A
-    EI, rhoA, rhoI = MATERIAL.E * section.Iy, MATERIAL.rho * section.A, MATERIAL.rho * section.Iy
-
-    def remaining(hertz: float) -> float:
-        square = (2.0 * np.pi * hertz) ** 2
-        slopes = [[0, 1, 0, 1 / GA], [0, 0, 1 / EI, 0], [0, -rhoI * square, 0, -1]]
-        along = la.expm(length * np.array([*slopes, [-rhoA * square, 0, 0, 0]]))
-        return float(np.linalg.det(along[2:, :2]))
-
-    hertz = np.linspace(100.0, 15e3, 600)
-    values = np.array([remaining(f) for f in hertz])
-    brackets = np.flatnonzero(values[1:] * values[:-1] < 0.0)[:count]
-    return np.array([brentq(remaining, hertz[i], hertz[i + 1], xtol=1e-9) for i in brackets])
-
-
-def test_a_short_free_tube_converges_to_timoshenko_s_theory_by_default() -> None:
-    tube, length = rectangular_tube(0.0254, 0.0254, 0.00238), 0.29
-    joints = (Joint("A", (0.0, 0.0, 0.0)), Joint("B", (length, 0.0, 0.0)))
-
-    def found(elements: int, **options: Any) -> FloatArray:
-        member = Member("m", ("A", "B"), elements, tube, MATERIAL)
-        frame = Frame("in-plane", "timoshenko", joints, (member,), **options)
-        modes = solve_modes(Model.of(frame))
-        across = np.array([d == "z" for d in Model.of(frame).dofs.direction])
-        bending = np.abs(modes.shapes[across]).max(axis=0) > 1e-3 * np.abs(modes.shapes).max(axis=0)
-        return np.asarray(modes.natural_frequencies[bending & ~modes.rigid][:4])
-
-    exact = free_frequencies(tube, length, 4)
-    errors = [np.abs(found(n) / exact - 1.0) for n in (16, 32, 64)]
-    np.testing.assert_allclose(rates(errors), 2.0, atol=0.05)
-    assert errors[-1].max() < 2e-3
-    cubic = found(64, bending_mass="cubic") / exact - 1.0
-    assert -0.005 < cubic[0] < -0.002
-    assert cubic[3] < -0.05
 
 
 def test_thin_timoshenko_beam_is_an_euler_bernoulli_beam() -> None:

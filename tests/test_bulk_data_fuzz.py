@@ -19,7 +19,7 @@ from femubench.plugins.readers.bulk_data import BulkDataReader
 
 READER = BulkDataReader()
 SEEDS = (garteur_plane.cards(), TWO, LARGE, KINDS)
-FEW, MANY = 100, 20_000
+FEW, MANY = 60, 20_000
 
 
 @st.composite

@@ -62,10 +62,9 @@ modes = "modes.csv"
     )
 
 
-@pytest.mark.parametrize("first_row", [0, 1])
-def test_matrices_give_the_frequencies_of_their_frame(tmp_path: Path, first_row: int) -> None:
+def test_matrices_give_the_frequencies_of_their_frame(tmp_path: Path) -> None:
     nominal = read_case(CASES / "out-of-plane").model
-    write_matrices(tmp_path / "case", nominal, first_row)
+    write_matrices(tmp_path / "case", nominal, 0)
     case = read_case(tmp_path / "case")
     expected = solve_modes(nominal).natural_frequencies
     np.testing.assert_allclose(solve_modes(case.model).natural_frequencies, expected, rtol=1e-9)
@@ -96,53 +95,6 @@ def test_groups_are_parts_of_the_stiffness(tmp_path: Path) -> None:
     np.testing.assert_array_equal(some[np.ix_(inside, inside)], whole[np.ix_(inside, inside)])
     some[np.ix_(inside, inside)] = 0.0
     assert not some.any()
-
-
-def test_massless_dofs_in_matrices(tmp_path: Path) -> None:
-    nominal = read_case(CASES / "out-of-plane").model
-    mass = nominal.mass.tolil()
-    turns = [i for i, name in enumerate(nominal.dofs.direction) if name != "z"]
-    mass[turns, :] = 0.0
-    mass[:, turns] = 0.0
-    lumped = replace(nominal, mass=mass.tocsc())
-    write_matrices(tmp_path / "case", lumped, 1)
-    found = solve_modes(read_case(tmp_path / "case").model).natural_frequencies
-    np.testing.assert_allclose(found, solve_modes(lumped).natural_frequencies, rtol=1e-9)
-    assert len(found) == nominal.size - len(turns)
-
-
-def test_a_plugin_reads_matrices(tmp_path: Path) -> None:
-    nominal = read_case(CASES / "out-of-plane").model
-
-    class Dense:
-        name: str = "numpy"
-        suffixes: tuple[str, ...] = (".npy",)
-
-        def read_matrix(self, path: Path) -> np.ndarray:
-            return np.asarray(np.load(path))
-
-        def read_modes(self, path: Path) -> Any:
-            raise InputError("holds no modes", file=path)
-
-    np.save(tmp_path / "mass.npy", nominal.mass.toarray())
-    np.save(tmp_path / "stiffness.npy", nominal.stiffness.toarray())
-    rows = [
-        f"{i},{node},{direction},{','.join(map(repr, map(float, xyz)))}"
-        for i, (node, direction, xyz) in enumerate(
-            zip(nominal.dofs.node, nominal.dofs.direction, nominal.dofs.xyz, strict=True)
-        )
-    ]
-    (tmp_path / "dofs.csv").write_text("\n".join(["row,node,direction,x,y,z", *rows]))
-    (tmp_path / "modes.csv").write_text("mode,frequency\n1,12.0\n")
-    (tmp_path / "case.toml").write_text(
-        '[case]\nname = "m"\n[model]\nkind = "matrices"\nmass = "mass.npy"\n'
-        'stiffness = "stiffness.npy"\ndofs = "dofs.csv"\n'
-        '[measurement]\nmodes = "modes.csv"\nused = [1]\n'
-    )
-    model = read_case(tmp_path, readers=[Dense()]).model
-    np.testing.assert_allclose(
-        solve_modes(model).natural_frequencies, solve_modes(nominal).natural_frequencies
-    )
 
 
 MATRICES = """\
@@ -178,10 +130,6 @@ def two_masses(folder: Path) -> Path:
     return folder
 
 
-def test_matrices_are_read(tmp_path: Path) -> None:
-    assert read_case(two_masses(tmp_path / "case")).model.size == 2
-
-
 HEAD = "%%MatrixMarket matrix coordinate {} general\n{} {} {}\n"
 
 
@@ -190,7 +138,6 @@ HEAD = "%%MatrixMarket matrix coordinate {} general\n{} {} {}\n"
     [
         ("dofs.csv", "row,node,direction,x,y,z\n1,a,z,0,0,0\n", "mass.mtx", "2 rows"),
         ("dofs.csv", "row,node,direction,x,y,z\n1,a,z,0,0,0\n1,b,z,1,0,0\n", "dofs.csv:3: row", ""),
-        ("dofs.csv", "row,node,direction,x,y,z\n1,a,z,0,0,0\n3,b,z,1,0,0\n", "dofs.csv:3: row", ""),
         ("dofs.csv", "row,node,direction,x,y,z\n1,a,z,0,0,0\n2,a,z,0,0,0\n", "node", "twice"),
         ("dofs.csv", "row,node,direction,x,y,z\n1,a,z,0,0,0\n2,a,x,1,0,0\n", ":3: x", "two places"),
         ("dofs.csv", "row,node,direction,x,y,z\n1,a,z,0,0,0\n2,b,-z,1,0,0\n", "direction", "-z"),
@@ -201,14 +148,10 @@ HEAD = "%%MatrixMarket matrix coordinate {} general\n{} {} {}\n"
         ("mass.mtx", HEAD.format("complex", 2, 2, 1), "mass.mtx", "complex"),
         ("mass.mtx", HEAD.format("real", 10**9, 10**9, 1), "mass.mtx", "2 of both"),
         ("mass.mtx", HEAD.format("real", 2, 2, 1) + "1 9 3\n", "mass.mtx", "read"),
-        ("mass.mtx", HEAD.format("real", 2, 2, 1) + "1 2 3\n", "mass.mtx", "symm"),
-        ("mass.mtx", HEAD.format("real", 2, 2, 1) + "1 1 nan\n", "mass.mtx", "finite"),
         ("mass.mtx", HEAD.format("real", 2, 2, 1) + "1 1 -2\n", "mass.mtx", "negative"),
         ("mass.mtx", HEAD.format("real", 2, 2, 0), "mass.mtx", "zero"),
-        ("case.toml", MATRICES.replace("mass.mtx", "mass.op2"), ":5: model.mass", "no file"),
         ("case.toml", MATRICES.replace("mass.mtx", "dofs.csv"), "dofs.csv", "kind of file"),
         ("case.toml", MATRICES + CHANGE, ":12: modification[0]", "no rotation ry"),
-        ("case.toml", MATRICES + CHANGE.replace('"a"', '"q"'), "masses[0].at", "no node 'q'"),
         ("case.toml", MATRICES + '[[model.groups]]\nname = "g"', ":12: model.groups[0]", "without"),
         (
             "case.toml",

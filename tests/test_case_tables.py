@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +17,6 @@ from femubench.core.errors import InputError
 from femubench.core.fem.frame import Frame, Joint, Material, Member, Place, PointMass
 from femubench.core.fem.mesh import Mesh, build_mesh
 from femubench.core.fem.sections import rectangular_tube
-from femubench.core.fem.structure import Structure
 
 CASES = Path(__file__).parent / "cases"
 JOINTS = "name,x,y,z\nfoot,0,0,0\nknee,0.0,0,0.5\ntip,0.4,0.3,0.6\n"
@@ -56,22 +54,13 @@ def test_tables_say_the_same_as_keys(tmp_path: Path) -> None:
     assert case.digest != other.digest
 
 
-def test_a_table_is_part_of_the_digest(tmp_path: Path) -> None:
-    one = read_case(tabled(tmp_path / "a"))
-    two = read_case(tabled(tmp_path / "b", members=MEMBERS.replace("tip,5", "tip,6")))
-    assert one.digest != two.digest
-
-
 @pytest.mark.parametrize(
     ("joints", "members", "stated"),
     [
         (JOINTS.replace("0.4,", "nan,"), MEMBERS, "joints.csv:4: x: 'nan' is not allowed"),
         (JOINTS.splitlines()[0] + "\n", MEMBERS, "joints.csv: no rows"),
-        (JOINTS, MEMBERS.splitlines()[0] + "\n", "members.csv: no rows"),
-        (JOINTS.replace("0.6", ""), MEMBERS, "joints.csv:4: z: '' is not allowed"),
         (JOINTS.replace("tip", "knee"), MEMBERS, "joints.csv:4: name: 'knee' is listed twice"),
         (JOINTS, MEMBERS.replace("tip,5", "top,5"), "members.csv:3: end_2: member 'arm' ends"),
-        (JOINTS, MEMBERS.replace("tip,5", "tip,x"), "members.csv:3: elements: 'x' is not"),
         (JOINTS, MEMBERS.replace("numbers", "round"), "members.csv:3: section: there is no"),
         (JOINTS, MEMBERS.replace("0,1,0", "0,1,"), "members.csv:2: up_z: '' is not allowed"),
         (JOINTS, MEMBERS.replace("end_2", "last"), "members.csv:1: end_2: missing column"),
@@ -132,20 +121,3 @@ def test_members_meshed_together_are_those_meshed_one_by_one() -> None:
     one, other = build_mesh(frame), build_mesh(replace(frame, masses=masses))
     for first, second in zip(mesh_arrays(one), mesh_arrays(other), strict=True):
         assert np.array_equal(first, second)
-
-
-def test_elements_some_thousand_at_a_time_give_what_single_ones_give() -> None:
-    frame = plane_frame(5000, elements=0)
-    structure = Structure.build(frame)
-    assert len(structure.mesh.ends) > 2 * 4096
-    mass, stiffness = structure.matrices()
-    assert abs(stiffness - stiffness.T).max() == 0.0
-    shift = (np.array(structure.kinematics.direction) == "z").astype(float)
-    assert shift @ (mass @ shift) == pytest.approx(structure.total_mass, rel=1e-12)
-    assert np.abs(stiffness @ shift).max() < 1e-9 * stiffness.diagonal().max()
-
-
-def test_what_is_kept_to_look_points_up_does_not_travel() -> None:
-    model = read_case(CASES / "3d").model
-    model.observe(read_case(CASES / "3d").measurement.sensors)
-    assert b"KDTree" not in pickle.dumps(model)

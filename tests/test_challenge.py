@@ -13,10 +13,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from blind_sweep import bars_table, run_task, tasks
 from click.testing import CliRunner
 
-from femubench import Case, Diagnosis, InputError, Model, read_case
+from femubench import InputError, Model, read_case
 from femubench.core.challenge.answer import Answer, AnswerCause, read_answer
 from femubench.core.challenge.draw import draw_case, registered_effects
 from femubench.core.challenge.measuring import QUALITY, chi2, see
@@ -24,22 +23,14 @@ from femubench.core.challenge.outside import OUTSIDE
 from femubench.core.challenge.score import judge_answer
 from femubench.core.challenge.sealed import SEALED_FILE, read_sealed, seal, unseal
 from femubench.core.challenge.structures import STRUCTURES, structure_named
-from femubench.core.challenge.truth import (
-    KINDS,
-    DataKind,
-    HiddenCause,
-    Truth,
-    fine_places,
-    finer,
-    scatter_elements,
-)
+from femubench.core.challenge.truth import KINDS, DataKind, HiddenCause, Truth, finer
 from femubench.core.challenge.truth_file import KnownCase, TrueCause
 from femubench.core.challenge.visibility import delta_chi2
 from femubench.core.cli.main import bench
 from femubench.core.errors import FemubenchError, ModelError
 from femubench.core.fem.frame import Place
 from femubench.core.library.cases import read_cases
-from femubench.core.library.challenge import any_hidden, challenge, score_challenge
+from femubench.core.library.challenge import challenge, score_challenge
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.effect import FrameEffect, Parameter, Site, Size
@@ -94,6 +85,8 @@ class Absurd(ToyModulus):
         return (Parameter("change", "", 5.0, lower=0.0, one_sided=True),)
 
 
+# A stiffness, a body at a place, a spring, and one that no structure takes; all others at night.
+FEW = ("local-stiffness-loss", "added-mass", "joint-rotation", "gravity-stiffness")
 TOYS = {toy.name: toy for toy in (ToyMass(), ToyModulus())}
 
 
@@ -128,9 +121,7 @@ def test_structures_are_meshed_well_enough_for_their_data(name: str) -> None:
     specimen.model.attach(*specimen.change)
 
 
-def test_the_ladder_is_the_prototypes() -> None:
-    assert LADDER.model.size == 81
-    assert len(LADDER.sensors) == 13
+def test_an_unknown_structure_is_named() -> None:
     with pytest.raises(InputError, match="no structure 'chair'"):
         structure_named("chair")
 
@@ -161,20 +152,6 @@ def test_the_same_seed_gives_the_same_case_and_another_seed_another() -> None:
     assert one.case.name != other.case.name
 
 
-def test_half_of_the_cases_with_shapes_are_weighed_and_none_without() -> None:
-    def masses(kind: DataKind, count: int) -> list[tuple[float, float] | None]:
-        cases = [draw_case(seed, kind, hidden="none").case for seed in range(count)]
-        return [case.measurement.total_mass for case in cases]
-
-    known = masses("A", 14)
-    assert 3 <= sum(mass is not None for mass in known) <= 11
-    assert not any(masses("C", 4))
-    expected = see(LADDER.model, LADDER).mass
-    for mass in filter(None, known):
-        assert abs(mass[0] - expected) < 5.0 * mass[1]
-        assert mass[1] == pytest.approx(0.002 * mass[0])
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_noise_is_as_large_as_it_is_stated(kind: DataKind) -> None:
     """Clean cases against the finer model that gave them: chi-square per datum is one."""
@@ -188,25 +165,10 @@ def test_the_noise_is_as_large_as_it_is_stated(kind: DataKind) -> None:
     assert sum(totals) / count == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / count) + 0.03)
 
 
-def test_a_place_of_the_nominal_mesh_is_two_elements_of_the_finer_one() -> None:
-    assert fine_places("front-left/3") == ("front-left/5", "front-left/6")
-    assert fine_places("front-left@J5") == ("front-left@J5",)
-    assert fine_places("all") == ("all",)
-
-
-@pytest.mark.parametrize("loss", [0.1, 0.5, 0.7])
-def test_the_loss_in_half_an_element_is_as_flexible_as_that_in_the_whole(loss: float) -> None:
+def test_the_loss_in_half_an_element_is_as_flexible_as_that_in_the_whole() -> None:
+    loss = 0.7
     (half,) = LocalStiffnessLoss().in_half((loss,))
     assert 0.5 * (1.0 + 1.0 / (1.0 - half)) == pytest.approx(1.0 / (1.0 - loss))
-
-
-def test_scatter_moves_the_frequencies_by_its_size_and_every_element_of_the_nominal_mesh() -> None:
-    frame = scatter_elements(finer(LADDER.frame), 0.005, np.random.default_rng(1))
-    assert len(frame.factors) == 2 * 28
-    assert {len(factor.at) for factor in frame.factors} == {2}
-    clean, moved = (see(Model.of(f), LADDER) for f in (finer(LADDER.frame), frame))
-    ratio = moved.frequencies[:6] / clean.frequencies[:6] - 1.0
-    assert 1e-4 < np.abs(ratio).max() < 0.005
 
 
 def test_an_absurd_truth_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -232,7 +194,7 @@ def test_an_effect_that_cannot_be_hidden_is_named() -> None:
         draw_case(1, "A", hidden="none", scatter=float("nan"))
 
 
-@pytest.mark.parametrize("name", OUTSIDE)
+@pytest.mark.parametrize("name", list(OUTSIDE)[::3])
 def test_causes_outside_the_catalogue_show(name: str) -> None:
     blind = draw_case(2, "A", hidden="outside", effect=name, effects=TOYS)
     clean = see(Model.of(finer(LADDER.frame)), LADDER)
@@ -257,7 +219,13 @@ def test_a_pair_is_two_effects_that_both_show() -> None:
     assert min(delta_chi2(blind.case, blind.truth, TOYS)) > 10.0
 
 
-@pytest.mark.parametrize("effect", sorted(registered_effects()))
+@pytest.mark.parametrize(
+    "effect",
+    [
+        name if name in FEW else pytest.param(name, marks=pytest.mark.nightly)
+        for name in sorted(registered_effects())
+    ],
+)
 def test_every_effect_can_be_hidden_and_putting_it_back_explains_the_data(effect: str) -> None:
     """On the first structure that takes it, of three draws the best falls to the noise."""
     effects = registered_effects()
@@ -325,17 +293,6 @@ def test_a_seal_that_unpacks_to_very_much_is_refused() -> None:
 # --- answers ----------------------------------------------------------------------------------
 
 
-def test_an_answer_is_read_from_the_json_of_a_diagnosis(tmp_path: Path) -> None:
-    parameters = [{"name": "mass", "value": 0.1, "std": None, "unit": "kg"}]
-    cause = {"effect": "added-mass", "place": "J1", "parameters": parameters, "probability": 0.99}
-    content = {"verdict": "named", "causes": [cause], "rivals": [], "adequacy_p": 0.4}
-    path = tmp_path / "answer.json"
-    path.write_text(json.dumps(content), encoding="utf-8")
-    said = read_answer(path)
-    assert said.causes[0].parts == (("added-mass", "J1"),)
-    assert said.probability == 0.99
-
-
 @pytest.mark.parametrize(
     ("content", "match"),
     [
@@ -345,14 +302,8 @@ def test_an_answer_is_read_from_the_json_of_a_diagnosis(tmp_path: Path) -> None:
         (b"{}", "verdict"),
         (b'{"verdict": "perhaps"}', "verdict"),
         (b'{"verdict": "named", "causes": [{"effect": 3}]}', r"causes\.0\.effect"),
-        (
-            b'{"verdict": "named", "causes": [{"effect": "a", "probability": NaN}]}',
-            "probability",
-        ),
-        (
-            b'{"verdict": "named", "causes": [{"effect": "a", "probability": 7}]}',
-            "probability",
-        ),
+        (b'{"verdict": "named", "causes": [{"effect": "a", "probability": NaN}]}', "probability"),
+        (b'{"verdict": "named", "causes": [{"effect": "a", "probability": 7}]}', "probability"),
         (b'{"verdict": "named", "causes": [{"effect": "a\\nb"}]}', "effect"),
         (b'{"verdict": "none", "causes": ' + b"[" * 5000 + b"]" * 5000 + b"}", "recursion|causes"),
         (b'{"verdict": "none"}' + b" " * 2**22, "too large"),
@@ -393,7 +344,6 @@ MASS, SPRING = ("added-mass", "J1"), ("grounding-spring", "J3")
         (answer("named", ("added-mass", "J3")), 40.0, True, False),
         (answer("named", SPRING), 40.0, False, False),
         (answer("named", MASS, SPRING), 40.0, False, False),
-        (answer("named"), 5.0, False, False),
         (answer("ambiguous", SPRING, MASS), 40.0, True, True),
         (answer("ambiguous", SPRING, ("joint-mass", "L")), 40.0, False, False),
         (answer("ambiguous", ("added-mass + joint-mass", "J1 + L")), 40.0, False, False),
@@ -569,10 +519,7 @@ def outside(tmp_path: Path) -> Path:
     room = tmp_path / "truths"
     frame = read_cases("frame-solid", load_plugins())[0].folder
     loose = TrueCause("a loose joint", "joint-rotation", "J1", ("joint-offset@J1",), 4e3, "N m/rad")
-    for name, structure, causes in (
-        ("a", frame.name, (loose,)),
-        ("b", "ours", ()),
-    ):
+    for name, structure, causes in (("a", frame.name, (loose,)), ("b", "ours", ())):
         (room / name).mkdir(parents=True)
         kind = "defect" if causes else "clean"
         stated = KnownCase(name, structure, kind, 1, causes, 50.0, 40.0)
@@ -607,14 +554,6 @@ def test_truths_from_outside_are_posed_and_scored(outside: Path, tmp_path: Path)
     assert scored("unknown", "joint-rotation", "J1") == (False, False, False)
 
 
-def test_a_truth_on_no_known_structure_is_refused(outside: Path, tmp_path: Path) -> None:
-    shutil.rmtree(outside / "structures")
-    shutil.rmtree(outside / "a")
-    with pytest.raises(InputError, match=r"b/truth\.toml: structure: no structure 'ours'"):
-        challenge(tmp_path / "case", 1, truths=outside)
-    assert not (tmp_path / "case").exists()
-
-
 def test_every_truth_of_a_folder_is_drawn_by_some_seed(outside: Path, tmp_path: Path) -> None:
     found = {
         str(read_sealed(challenge(tmp_path / f"{seed}", seed, truths=outside).truth)[0])
@@ -640,32 +579,3 @@ def test_the_command_poses_truths_from_outside(outside: Path, tmp_path: Path) ->
     ):
         done = run(bench, [*words, str(tmp_path / "other")])
         assert (done.exit_code, expected in done.output) == (2, True), done.output
-
-
-def test_figures_of_a_sweep() -> None:
-    listed = tasks()
-    assert len(listed) >= 600
-    assert len({task.seed for task in listed}) == len(listed)
-    assert sum(task.hidden == "none" for task in listed) >= 200
-    record = {"group": "clean A", "right": False, "alarm": True, "probability": 0.995}
-    rows = {row["figure"]: row for row in bars_table([record, {**record, "alarm": False}])}
-    assert rows["Clean: false alarms"]["measured"] == "50.0 %"
-    assert rows["Clean: false alarms"]["reached"] == "no"
-    assert rows["Stated P >= 0.99: wrong"]["cases"] == "2"
-    assert rows["B: name right"]["reached"] == "no"
-
-
-def test_an_error_of_the_diagnosis_is_a_wrong_answer() -> None:
-    def broken(case: Case) -> Diagnosis:
-        raise ModelError("no modes")
-
-    record = run_task(tasks(limit=1)[0], broken)
-    assert (record["verdict"], record["right"]) == ("error", False)
-    assert json.loads(json.dumps(record)) == record
-
-
-def test_any_hides_all_sorts() -> None:
-    drawn = [any_hidden(seed) for seed in range(200)]
-    counts = {word: drawn.count(word) for word in ("one", "none", "pair", "outside")}
-    assert min(counts.values()) >= 12
-    assert counts["one"] > 90

@@ -12,11 +12,8 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 
-from femubench import InputError, plot
+from femubench import plot
 from femubench.core.plot.chart import KINDS, ends_of
-
-RATIO = plot.Axis("ratio", log=True)
-NAMED = plot.Axis("strategy")
 
 
 def chart(kind: Any, **more: Any) -> plot.Chart:
@@ -61,17 +58,6 @@ def test_what_is_not_known_is_not_drawn() -> None:
     assert np.allclose(grid, [[1.0, 2.0], [np.nan, 4.0]], equal_nan=True)
 
 
-def test_one_far_off_does_not_flatten_the_rest() -> None:
-    values = [1.0, 1.1, 1.2, 1.3, 1.4, 900.0]
-    names = [f"s{k}" for k in range(6)]
-    ax = plot.Chart(
-        "interval", "T", plot.Axis("x"), NAMED, (plot.Series("s", values, names),)
-    ).draw()
-    assert ax.get_xlim()[1] < 2.0
-    assert "▶ 900" in [text.get_text() for text in ax.texts]
-    assert dots(ax)[-1] == [ax.get_xlim()[1], 5.0]
-
-
 def test_ends_are_those_of_the_values_where_none_is_far_off() -> None:
     linear, log = plot.Axis("x"), plot.Axis("x", log=True)
     assert ends_of([1.0, 2.0, 3.0], linear, pad=0.0, few=1) == (1.0, 3.0)
@@ -83,21 +69,3 @@ def test_ends_are_those_of_the_values_where_none_is_far_off() -> None:
     assert ends_of([math.nan, None, math.inf, 3.0, 4.0], linear, pad=0.0, few=1) == (3.0, 4.0)
     # The spread of the rest is nothing to compare with.
     assert ends_of([1.0] * 9 + [50.0], linear, pad=0.0, few=1) == (1.0, 50.0)
-
-
-def test_what_cannot_be_drawn_is_refused() -> None:
-    with pytest.raises(InputError, match="no kind of chart: 'pie'"):
-        plot.Chart("pie", "T", RATIO, NAMED)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="one has 2 x and 1 y"):
-        plot.Series("one", [1.0, 2.0], [1.0])
-    with pytest.raises(InputError, match="one has 2 x and 1 high"):
-        plot.Series("one", [1.0, 2.0], [1.0, 2.0], high=[1.0])
-    with pytest.raises(InputError, match="cells without names"):
-        plot.Chart("cells", "T", RATIO, NAMED, values=[[1.0]], value=RATIO)
-
-
-def test_json_has_no_number_that_is_none() -> None:
-    series = plot.Series("s", np.array([1.0, math.inf]), np.array([math.nan, 2.0]))  # type: ignore[arg-type]
-    found = plot.Chart("line", "T", plot.Axis("x"), plot.Axis("y"), (series,)).to_json()
-    assert found["series"][0]["x"] == [1.0, None]
-    assert found["series"][0]["y"] == [None, 2.0]

@@ -166,7 +166,7 @@ class TestDescriptors:
     def count() -> int:
         return psutil.Process().num_fds()
 
-    @pytest.mark.parametrize("after", range(4))
+    @pytest.mark.parametrize("after", [0, 3])
     def test_where_there_are_no_more_pipes(
         self, start: Any, after: int, monkeypatch: pytest.MonkeyPatch
     ) -> None:

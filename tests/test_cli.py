@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,69 +17,15 @@ import click
 import pytest
 from click.testing import CliRunner, Result
 
-import femubench
-from femubench.core.cli import progress
 from femubench.core.cli.main import VERBS, bench
 from femubench.core.errors import OutputError
 from femubench.core.files import write_atomically
-from femubench.core.pace import Advance
 from femubench.core.run.store import Store
 from femubench.core.schema.quantities import parse_size, parse_timeouts, say_duration
 from tests.toys.store_edits import edit, records
 
 MODULE = "femubench.core.cli.{}"  # of a verb
-CASE = """\
-[case]
-name = "{name}"
-title = "A cantilever"
-source = "made up"
-
-[model]
-kind = "frame"
-plane = "in-plane"
-beam = "euler-bernoulli"
-
-[model.materials.steel]
-E = 210e9
-nu = 0.3
-rho = 7850.0
-
-[model.sections.bar]
-A = 1e-4
-Iy = 1e-9
-Iz = 1e-9
-J = 1e-9
-Jp = 2e-9
-kappa = 0.83
-
-[[model.joints]]
-name = "A"
-xyz = [0.0, 0.0, 0.0]
-
-[[model.joints]]
-name = "B"
-xyz = [1.0, 0.0, 0.0]
-
-[[model.members]]
-name = "bar"
-ends = ["A", "B"]
-elements = 4
-section = "bar"
-material = "steel"
-
-[[model.supports]]
-at = "A"
-fixed = ["x", "z", "ry"]
-
-[measurement]
-sensors = "sensors.csv"
-modes = "modes.csv"
-shape_std = 0.01
-used = [1]
-held_out = [2]
-"""
-SENSORS = "label,x,y,z,direction\nmid,0.5,0,0,z\ntip,1,0,0,z\n"
-MODES = "mode,frequency,frequency_std,mid,tip\n1,9.0,0.01,0.34,1\n2,57.0,0.05,-0.71,1\n"
+CASE = Path(__file__).parent / "cases" / "in-plane"
 
 PLUGIN = """
 import time
@@ -126,12 +72,16 @@ def put_distribution(folder: Path, name: str, source: str) -> None:
     (info / "entry_points.txt").write_text(f"[femubench]\n{name} = {name}\n", encoding="utf-8")
 
 
-def put_case(folder: Path, *, name: str = "rod", **files: str) -> Path:
-    folder.mkdir(parents=True)
-    content = {"case_toml": CASE.format(name=name), "sensors_csv": SENSORS, "modes_csv": MODES}
-    for file, text in {**content, **files}.items():
-        (folder / file.replace("_", ".")).write_text(text, encoding="utf-8")
+def put_case(folder: Path, *, name: str = "rod") -> Path:
+    shutil.copytree(CASE, folder)
+    change(folder / "case.toml", 'name = "portal"', f'name = "{name}"')
     return folder
+
+
+def change(file: Path, old: str, new: str) -> None:
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -193,21 +143,8 @@ class TestHelp:
         assert not set(map(MODULE.format, VERBS)) & set(loaded)
         assert len(loaded) < len(numpy)
 
-    @pytest.mark.parametrize(
-        ("words", "offered", "imported"),
-        [
-            ("bench ", set(VERBS), set()),
-            ("bench re", {"report", "reproduce"}, set()),
-            ("bench init --h", {"--help"}, {MODULE.format("init")}),
-        ],
-    )
-    def test_completion_imports_no_other_verb(
-        self,
-        words: str,
-        offered: set[str],
-        imported: set[str],
-        monkeypatch: pytest.MonkeyPatch,
-    ) -> None:
+    def test_completion_imports_no_other_verb(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        words = "bench init --h"
         monkeypatch.setenv("_BENCH_COMPLETE", "bash_complete")
         monkeypatch.setenv("COMP_WORDS", words)
         monkeypatch.setenv("COMP_CWORD", str(words.count(" ")))
@@ -220,26 +157,15 @@ class TestHelp:
             print(" ".join(sys.modules))
             """
         ).splitlines()
-        assert {answer.removeprefix("plain,") for answer in answers} == offered
-        assert set(map(MODULE.format, VERBS)) & set(loaded.split()) == imported
+        assert {answer.removeprefix("plain,") for answer in answers} == {"--help"}
+        assert set(map(MODULE.format, VERBS)) & set(loaded.split()) == {MODULE.format("init")}
 
-    def test_one_line_a_verb(self, invoke: Invoke) -> None:
-        result = invoke("--help")
-        assert result.exit_code == 0
+    def test_verbs_say_of_themselves_what_the_list_says(self) -> None:
         for verb, line in VERBS.items():
-            assert f"{verb} " in result.stdout
-            assert line in " ".join(result.stdout.split())
-
-    @pytest.mark.parametrize("verb", VERBS)
-    def test_verb_says_of_itself_what_the_list_says(self, verb: str) -> None:
-        command = bench.get_command(click.Context(bench), verb)
-        assert command is not None
-        assert command.name == verb
-        assert command.get_short_help_str(limit=200) == VERBS[verb]
-
-    def test_version(self, invoke: Invoke) -> None:
-        result = invoke("--version")
-        assert (result.exit_code, result.stdout.split()[-1]) == (0, femubench.__version__)
+            command = bench.get_command(click.Context(bench), verb)
+            assert command is not None
+            assert command.name == verb
+            assert command.get_short_help_str(limit=200) == line
 
     def test_every_option_is_documented(self) -> None:
         text = (Path(__file__).parents[1] / "docs" / "commands.md").read_text(encoding="utf-8")
@@ -262,14 +188,13 @@ class TestWrongInput:
                 ["case", "-s", "test-nothin"],
                 "no strategy 'test-nothin'; did you mean 'test-nothing'",
             ),
-            (["frmae"], "no case 'frmae'; did you mean 'frame'"),
             (["some/where"], "some/where: folder does not exist"),
             (["empty"], "empty/case.toml: missing file"),
             (["case", "--json", "no/such.json"], "no: folder does not exist"),
             (["case", "--report", "report.docx"], "no report format has the suffix '.docx'"),
             (["case", "--json", "x.json", "--report", "x.json"], "is to hold two outputs"),
             (["case", "twin"], "the name 'rod' is also that of case"),
-            (["case", "bad"], "bad/sensors.csv:3"),
+            (["case", "bad"], "bad/sensors.csv:4"),
         ],
     )
     def test_is_one_line(
@@ -277,7 +202,8 @@ class TestWrongInput:
     ) -> None:
         put_case(tmp_path / "case")
         put_case(tmp_path / "twin")
-        put_case(tmp_path / "bad", name="bad", sensors_csv=SENSORS.replace("tip,1", "tip,7"))
+        put_case(tmp_path / "bad", name="bad")
+        change(tmp_path / "bad" / "sensors.csv", "0.75,0,1.1", "0.75,0,7.1")
         (tmp_path / "empty").mkdir()
         before = sorted(tmp_path.rglob("*"))
         result = invoke("run", *words)
@@ -288,29 +214,12 @@ class TestWrongInput:
         assert expected in line
         assert sorted(tmp_path.rglob("*")) == before
 
-    @pytest.mark.parametrize(
-        "words",
-        [
-            ["run", "--timeout", "soon"],
-            ["run", "--seeds", "0"],
-            ["run", "-j", "0"],
-            ["runn"],
-            ["--x"],
-        ],
-    )
+    @pytest.mark.parametrize("words", [["run", "--timeout", "soon"], ["run", "-j", "0"], ["--x"]])
     def test_usage(self, invoke: Invoke, words: list[str]) -> None:
         result = invoke(*words)
         assert result.exit_code == 2
         assert len(result.stderr.splitlines()) == 1
         assert result.stderr.startswith("bench: ")
-
-    def test_no_verb_shows_the_help(self, invoke: Invoke) -> None:
-        result = invoke()
-        assert "bench --help" in result.output or "Commands:" in result.output
-        assert len(result.output.splitlines()) > 5
-
-    def test_nearest_verb(self, invoke: Invoke) -> None:
-        assert "Did you mean report?" in invoke("reprt").stderr
 
     def test_folder_that_may_not_be_written_to(self, invoke: Invoke, tmp_path: Path) -> None:
         put_case(tmp_path / "case")
@@ -378,10 +287,6 @@ class TestGoingOn:
             assert result.exit_code == 2
             assert f"request of run r: {field}" in result.stderr
 
-    def test_resume_with_nothing_stored_is_a_run(self, invoke: Invoke, tmp_path: Path) -> None:
-        case = put_case(tmp_path / "case")
-        assert invoke("run", case, "-s", "test-nothing", "--resume").exit_code == 0
-
     def test_a_locked_run_says_what_differs(self, invoke: Invoke, tmp_path: Path) -> None:
         case = put_case(tmp_path / "case")
         assert invoke("run", case, "-s", "test-nothing").exit_code == 0
@@ -390,8 +295,7 @@ class TestGoingOn:
         assert same.exit_code == 0
         assert f"environment: 0 differences from run {report.stem}" in same.stdout
         assert f"results: 0 differences from run {report.stem}" in same.stdout
-        table = (case / "modes.csv").read_text()
-        (case / "modes.csv").write_text(table.replace("9.0", "9.5", 1))
+        change(case / "modes.csv", "21.5", "21.9")
         other = invoke("run", "--locked", report.stem)
         assert other.exit_code == 1
         text = " ".join(other.stdout.split())
@@ -418,16 +322,7 @@ class TestGoingOn:
 def done(site: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
     folder = tmp_path_factory.mktemp("run")
     case = put_case(folder / "case")
-    words = [
-        "run",
-        case,
-        "--store",
-        folder / "store",
-        "--seeds",
-        2,
-        "--json",
-        folder / "r.json",
-    ]
+    words = ["run", case, "--store", folder / "store", "--seeds", 2, "--json", folder / "r.json"]
     words += ["--csv", folder / "r.csv", "-j", 2, "--timeout", "1m", "--nominal", "drawn"]
     for strategy in ("test-nothing", "test-fails", "test-picky"):
         words += ["-s", strategy]
@@ -439,25 +334,6 @@ class TestRun:
         _, result = done
         assert result.exit_code == 1
         assert result.stderr == ""
-
-    def test_header_tells_what_decides_on_the_outcome(self, done: tuple[Path, Result]) -> None:
-        header = " ".join(done[1].stdout.partition("\n\n")[0].split())
-        assert header == (
-            f"femubench {femubench.__version__}: 1 case from the models as drawn, 3 strategies, "
-            "seeds 1-2 (noise added), 6 jobs, 2 workers, timeout 1m"
-        )
-
-    def test_screen(self, done: tuple[Path, Result]) -> None:
-        lines = done[1].stdout.splitlines()
-        assert (
-            max(len(line) for line in lines if not line.startswith(("html: ", "markdown: "))) <= 80
-        )
-        found = [re.match(r"[ *]*(\d)  (test-\w+) +-?\d", line) for line in lines]
-        ranks = {match[2]: match[1] for match in found if match}
-        # Without a model of their own all are left with the one that they were given.
-        assert ranks == {"test-picky": "1", "test-nothing": "1", "test-fails": "1"}
-        assert re.search(r" test-fails +1, 2 +failed ", done[1].stdout)
-        assert "residual 3e-2, allowed" in done[1].stdout
 
     def test_files(self, done: tuple[Path, Result]) -> None:
         folder, result = done
@@ -563,25 +439,6 @@ class TestRun:
 
 
 class TestPluginsAndScenarios:
-    def test_broken_plugin_is_one_line(
-        self, invoke: Invoke, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.syspath_prepend(tmp_path)
-        put_distribution(tmp_path, "cli_broken", "import a_module_that_nobody_has\n")
-        put_distribution(tmp_path, "cli_typo", PLUGIN.replace("_strategies()", "_strategis()"))
-        result = invoke("plugins", "list")
-        assert result.exit_code == 0
-        assert "strategies: test-nothing" in result.stdout
-        lines = result.stderr.splitlines()
-        first, second = [line for line in lines if "cli_" in line]
-        assert first.startswith("bench: plugin 'cli_broken' (cli_broken 1.0): ModuleNotFoundError")
-        assert "did you mean 'femubench_strategies'" in second
-        assert "--traceback" in lines[-1]
-        for words in (("plugins", "list", "--traceback"), ("--traceback", "scenarios", "list")):
-            shown = invoke(*words)
-            assert shown.exit_code == 0
-            assert 'cli_broken.py", line 1' in shown.stderr
-
     def test_a_run_goes_on_without_broken_plugins_unless_it_is_strict(
         self, invoke: Invoke, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -605,18 +462,6 @@ class TestPluginsAndScenarios:
         assert strict.stderr.splitlines()[:-1] == result.stderr.splitlines()
         assert strict.stderr.splitlines()[-1].endswith("faults in plugins, see above")
 
-    def test_builtins_are_plugins_and_none_is_broken(self, invoke: Invoke) -> None:
-        result = invoke("plugins", "list")
-        assert result.stderr == ""
-        offered = (
-            "strategies: unchanged",
-            "reporters: terminal",
-            "scenarios: frame",
-            "papers: frame",
-        )
-        for kind in offered:
-            assert kind in " ".join(result.stdout.split())
-
     def test_scenarios_list_and_show(self, invoke: Invoke) -> None:
         listed = invoke("scenarios", "list")
         assert listed.exit_code == 0
@@ -627,31 +472,18 @@ class TestPluginsAndScenarios:
         wrong = invoke("scenarios", "show", "hfrme")
         assert (wrong.exit_code, "'hframe'" in wrong.stderr) == (2, True)
 
-    def test_show_takes_a_folder(self, invoke: Invoke, tmp_path: Path) -> None:
-        put_case(tmp_path / "case")
-        shown = invoke("scenarios", "show", "case").stdout
-        assert "12 degrees of freedom" in shown
-        assert "in-plane, 1 member, 2 joints" in shown
-        assert "mode 1 at 9 Hz" in shown
-
 
 def parse_duration(text: str) -> float:
     return parse_timeouts([text])[""]
 
 
-@pytest.mark.parametrize(
-    ("text", "seconds"),
-    [("90", 90.0), ("90s", 90.0), ("10m", 600.0), ("1h", 3600.0), ("1.5h", 5400.0), (".5", 0.5)],
-)
-def test_durations(text: str, seconds: float) -> None:
-    assert parse_duration(text) == seconds
-    assert parse_duration(say_duration(seconds)) == seconds
-
-
-@pytest.mark.parametrize("text", ["", "0", "-1", "1d", "m", "1m30s", "inf", "nan", "٣", "1e3"])
-def test_no_durations(text: str) -> None:
-    with pytest.raises(ValueError, match="no duration > 0"):
-        parse_duration(text)
+def test_durations() -> None:
+    for text, seconds in (("90", 90.0), ("90s", 90.0), ("10m", 600.0), ("1.5h", 5400.0)):
+        assert parse_duration(text) == seconds
+        assert parse_duration(say_duration(seconds)) == seconds
+    for text in ("", "0", "-1", "1d", "m", "1m30s", "inf", "nan", "٣", "1e3"):
+        with pytest.raises(ValueError, match="no duration > 0"):
+            parse_duration(text)
 
 
 def test_durations_of_single_strategies() -> None:
@@ -662,32 +494,12 @@ def test_durations_of_single_strategies() -> None:
             parse_timeouts(words)
 
 
-@pytest.mark.parametrize(
-    ("text", "size"),
-    [("512M", 2**29), ("4G", 2**32), ("4GiB", 2**32), ("1.5gb", 3 * 2**29), ("33554432", 2**25)],
-)
-def test_sizes(text: str, size: int) -> None:
-    assert parse_size(text) == size
-
-
-@pytest.mark.parametrize("text", ["", "0", "1k", "-4G", "4P", "much", "inf"])
-def test_no_sizes(text: str) -> None:
-    with pytest.raises(ValueError, match="no size >= 16M"):
-        parse_size(text)
-
-
-def test_progress_only_where_someone_watches(monkeypatch: pytest.MonkeyPatch) -> None:
-    with progress.progress() as stated:
-        assert stated is None
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    with progress.progress(quiet=True) as stated:
-        assert stated is None
-    with progress.waiting("looking"), progress.waiting("not", quiet=True):
-        pass
-    with progress.progress("[red]case") as stated:
-        assert stated is not None
-        stated(Advance(0, 0))
-        stated(Advance(1, 2, "[red]strategy", 3.0, 1.0))
+def test_sizes() -> None:
+    for text, size in (("512M", 2**29), ("4GiB", 2**32), ("1.5gb", 3 * 2**29), ("33554432", 2**25)):
+        assert parse_size(text) == size
+    for text in ("", "0", "1k", "-4G", "4P", "much", "inf"):
+        with pytest.raises(ValueError, match="no size >= 16M"):
+            parse_size(text)
 
 
 def test_files_are_replaced_in_one_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

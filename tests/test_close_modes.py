@@ -42,13 +42,6 @@ def test_a_mixed_pair_is_turned_back(shapes: np.ndarray, known: int) -> None:
     assert pair_modes(given, measured, frequencies, aligned).mac.min() > 0.999
 
 
-def test_distinct_modes_are_left_alone(shapes: np.ndarray) -> None:
-    model = mixed(shapes)
-    frequencies = np.array([100.0, 101.0, 150.0, 200.0])
-    aligned = align_close_modes(frequencies, model, shapes, 0.004)
-    np.testing.assert_array_equal(aligned, model)
-
-
 def test_a_space_that_does_not_hold_the_measured_shape_gains_nothing(shapes: np.ndarray) -> None:
     other = np.linalg.qr(np.random.default_rng(4).standard_normal((20, 1)))[0]
     aligned = align_close_modes(np.array([100.0, 100.1]), shapes[:, :2], other, 0.01)

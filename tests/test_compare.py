@@ -16,7 +16,6 @@ from run_edits import called, failed, moved, renamed, scaled
 from femubench.core.cli.main import bench
 from femubench.core.errors import InputError
 from femubench.core.run.runner import run_jobs
-from femubench.core.run.store import Store
 from femubench.core.schema.records import run_from_json, run_to_json
 from femubench.core.score.comparison import METRICS, Against, Threshold, compare_runs
 from femubench.core.score.ranking import rank_results
@@ -266,11 +265,8 @@ def test_only_jobs_of_both_are_compared(data: Data) -> None:
         ([], 1),
         (["--fail", "loss>0.6"], 0),
         (["--fail", "loss>0.6", "--fail", " used > 1.2 "], 1),
-        (["--fail", "higher>1.2"], 1),
-        (["--fail", "modified>1.2"], 1),
         (["--fail", "failures>0"], 0),
         (["--fail", "seconds>0.9"], 1),
-        (["--fail", "seconds>1"], 0),
         (["-s", "unchanged"], 0),
         (["-s", "softer"], 1),
     ],
@@ -286,9 +282,7 @@ def test_thresholds_decide_the_exit_code(
     ("options", "message"),
     [
         (["--fail", "rank>1"], "'rank>1' is no threshold"),
-        (["--fail", "gain<1"], "METRIC>NUMBER"),
         (["--fail", "gain>1e999"], "METRIC>NUMBER"),
-        (["--fail", "gain>1e"], "METRIC>NUMBER"),
         (["-s", "softr"], "no strategy 'softr'; did you mean 'softer'"),
         (["-f", "pdf"], "'pdf'"),
     ],
@@ -312,29 +306,6 @@ def test_wrong_files(data: Data, tmp_path: Path) -> None:
     assert called_with(tmp_path, data, strange).exit_code == 0
 
 
-def test_runs_of_a_store_by_their_first_letters(tmp_path: Path) -> None:
-    store, case = Store(tmp_path / "store"), toys.tiny_case()
-    for _ in range(2):
-        run_jobs([case], [toys.Softer()], jobs=1, store=store)
-    a, b = store.runs()
-    options = ["--store", str(tmp_path / "store"), "--format", "json"]
-    answer = CliRunner().invoke(bench, ["compare", a, b, *options])
-    assert answer.exit_code == 0
-    found = json.loads(answer.output)
-    assert (found["schema"], found["before"], found["after"]) == (4, a, b)
-    assert found["evidence"][0]["verdict"] == "same"
-
-
-@pytest.mark.parametrize("form", ["terminal", "markdown", "html", "json"])
-def test_a_file_in_every_format(data: Data, tmp_path: Path, form: str) -> None:
-    path = tmp_path / "out"
-    answer = called_with(tmp_path, data, failed(data, "softer"), "-f", form, "-o", str(path))
-    assert answer.exit_code == 1
-    assert answer.output == f"{form}: {path}\n"
-    assert "softer" in path.read_text()
-    assert called_with(tmp_path, data, data, "-o", str(tmp_path / "no" / "x")).exit_code == 2
-
-
 def test_hostile_names_are_text(data: Data) -> None:
     a = renamed(data, "softer", HOSTILE)
     b = called(failed(a, HOSTILE), HOSTILE, cpu=HOSTILE)
@@ -350,20 +321,6 @@ def test_hostile_names_are_text(data: Data) -> None:
     assert "<script" not in comparison_markdown(found)
     tables = [line for line in comparison_markdown(found).splitlines() if line.startswith("| ")]
     assert len({re.sub(r"\\\|", "", line).count("|") for line in tables}) <= 3
-
-
-def test_the_screen_is_80_columns_wide(data: Data) -> None:
-    long = renamed(scaled(data, "softer", 1.5), "softer", "strategy-with-a-long-name:option=1")
-    found = compared(renamed(data, "softer", "strategy-with-a-long-name:option=1"), long)
-    assert max(map(len, comparison_text(found).splitlines())) <= 80
-
-
-def test_scenarios_stand_indented_below_their_strategy(data: Data) -> None:
-    lines = comparison_text(compared(data, scaled(data, "softer", 1.5))).splitlines()
-    place = next(k for k, line in enumerate(lines) if line.startswith("  softer  "))
-    place = next(k for k in range(len(lines)) if k > place and lines[k].startswith("  softer  "))
-    assert [line.split()[0] for line in lines[place + 1 : place + 3]] == ["corner", "other"]
-    assert all(line.startswith("    ") for line in lines[place + 1 : place + 3])
 
 
 def test_a_threshold_that_nothing_is_held_against_is_told(data: Data) -> None:

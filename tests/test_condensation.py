@@ -10,19 +10,9 @@ import pytest
 import scipy.linalg as la
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.frame import (
-    Frame,
-    JointSpring,
-    Place,
-    PointMass,
-)
+from femubench.core.fem.frame import Frame, JointSpring, Place, PointMass
 from femubench.core.fem.model import Model
-from femubench.core.modal.eigen import (
-    condense_massless,
-    dense_matrices,
-    solve_dense,
-    solve_modes,
-)
+from femubench.core.modal.eigen import condense_massless, dense_matrices, solve_dense, solve_modes
 from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]
@@ -51,9 +41,8 @@ def static_condensation(mass: FloatArray, stiffness: FloatArray) -> FloatArray:
 
 
 @pytest.mark.parametrize("aligned", [True, False])
-@pytest.mark.parametrize("seed", range(3))
-def test_condensation_is_exact(seed: int, aligned: bool) -> None:
-    mass, stiffness = random_pencil(seed, 20, 6, aligned)
+def test_condensation_is_exact(aligned: bool) -> None:
+    mass, stiffness = random_pencil(0, 20, 6, aligned)
     expected = static_condensation(mass, stiffness)
     K, M, expand = condense_massless(mass, stiffness)
     assert K.shape == (14, 14)
@@ -65,19 +54,6 @@ def test_condensation_is_exact(seed: int, aligned: bool) -> None:
         residual = stiffness @ vectors - mass @ vectors * expected
         assert np.abs(residual).max() < 1e-9 * np.abs(stiffness @ np.abs(vectors)).max()
         np.testing.assert_allclose(vectors.T @ mass @ vectors, np.eye(14), atol=1e-9)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_a_tiny_mass_tends_to_no_mass(seed: int) -> None:
-    mass, stiffness = random_pencil(seed, 12, 3, aligned=True)
-    exact, _ = solve_dense(mass, stiffness)
-    deviation = []
-    for tiny in (1e-3, 1e-4, 1e-5):
-        filled = mass + tiny * np.diag([1.0] * 3 + [0.0] * 9)
-        values = la.eigh(stiffness, filled, eigvals_only=True)[:5]
-        deviation.append(np.abs(values / exact[:5] - 1.0).max())
-    assert deviation[0] / deviation[1] == pytest.approx(10.0, rel=0.2)
-    assert deviation[2] < 1e-3
 
 
 def massless_frames(fitted_portal: FrameBuilder) -> list[Model]:

@@ -28,10 +28,10 @@ from femubench.core.library.cases import read_cases
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.score.scoring import frequency_error, score_model
-from femubench.reports.diagnosis import diagnosis_markdown, diagnosis_text
+from femubench.reports.diagnosis import diagnosis_text
 
 Invoke = Callable[..., Result]
-OnAdvance = tuple[str, Result, dict[str, Any], Path]
+OnAdvance = tuple[Result, dict[str, Any], Path]
 
 EFFECTS = """
 from femubench import hookimpl
@@ -150,42 +150,24 @@ class TestAsking:
         assert invoke("case", "--no-faults").exit_code == 0
         assert search.faults == [None, None, ()]
 
-    def test_built_in_case_and_no_tolerance(self, invoke: Invoke, search: Search) -> None:
-        assert invoke("hframe", "--tolerance", "0").exit_code == 0
-        assert (search.calls[0][0].name, search.calls[0][0].tolerance) == ("hframe", 0.0)
-
-    def test_tolerance_of_the_case(self, invoke: Invoke, search: Search, tmp_path: Path) -> None:
-        with (tmp_path / "case" / "case.toml").open("a") as stream:
-            stream.write("\n[diagnosis]\ntolerance = 0.01\n")
-        assert invoke("case").exit_code == 0
-        assert search.calls[0][0].tolerance == 0.01
-
 
 class TestWrongInput:
     @pytest.mark.parametrize(
         ("words", "expected"),
         [
             (["cas"], "no case 'cas'"),
-            (["some/where"], "some/where: folder does not exist"),
             (["design-change"], "'design-change' stands for"),
             (["case", "--effects", "test-mos"], "no effect 'test-mos'; did you mean 'test-moss'"),
             (["case", "--effects", ""], "no effect ''"),
             (["case", "--tolerance", "0.3"], "0.3 is no number >= 0 and <= 0.2"),
             (["case", "--tolerance", "nan"], "nan is no number >= 0 and <= 0.2"),
-            (["case", "--tolerance=-1e-9"], "is no number >= 0 and <= 0.2"),
             (["case", "--budget=-1"], "-1.0 is no number >= 0"),
-            (["case", "--budget", "nan"], "nan is no number >= 0"),
-            (["case", "--json", "no/such.json"], "no: folder does not exist"),
-            (["case", "--json", "case"], "is a directory"),
             (
                 ["case", "--output", "case"],
                 "case: is not empty (expected a new or an empty folder)",
             ),
             (["case", "--output", "case/case.toml"], "is a file"),
             (["case", "--output", "case/case.toml/x"], "case/case.toml: cannot be written to"),
-            (["case", "--format", "html"], "'html' is not one of"),
-            ([], "Missing argument 'CASE'"),
-            (["case", "case"], "unexpected extra argument"),
         ],
     )
     def test_is_one_line_and_asks_nothing(
@@ -210,11 +192,8 @@ class TestWrongInput:
     @pytest.mark.parametrize(
         ("text", "key"),
         [
-            ("tolerance = -0.001", "diagnosis.tolerance"),
             ("tolerance = 0.21", "diagnosis.tolerance"),
-            ("tolerance = true", "diagnosis.tolerance"),
             ("tolerance = nan", "diagnosis.tolerance"),
-            ('tolerance = "1"', "diagnosis.tolerance"),
             ("tolerence = 0.1", "diagnosis.tolerence"),
         ],
     )
@@ -234,12 +213,6 @@ class TestTelling:
         assert (result.exit_code, result.stderr) == (0, "")
         assert result.stdout == screen(toys.made())
 
-    def test_markdown(self, invoke: Invoke, search: Search) -> None:
-        from femubench.core.diagnosis.serial import diagnosis_to_json
-
-        text = diagnosis_markdown(diagnosis_to_json(toys.made()))
-        assert invoke("case", "--format", "markdown").stdout == f"{text}\n"
-
     def test_json_file(self, invoke: Invoke, search: Search) -> None:
         result = invoke("case", "--json", "found.json")
         assert result.stdout == screen(toys.made())
@@ -254,14 +227,9 @@ class TestTelling:
             assert data["case"] == "toy"
         assert not Path("-").exists()
 
-    def test_quiet(self, invoke: Invoke, search: Search) -> None:
-        result = invoke("case", "-q", "--json", "found.json")
-        assert result.output == ""
-        assert Path("found.json").exists()
-
 
 class TestExtending:
-    @pytest.mark.parametrize("verdict", ["named", "ambiguous", "not-confirmed"])
+    @pytest.mark.parametrize("verdict", ["named", "not-confirmed"])
     def test_writes_the_extended_case(self, invoke: Invoke, search: Search, verdict: Any) -> None:
         search.found = toys.made(verdict)
         result = invoke("case", "-o", "new/out", "--json", "found.json", "--tolerance", "0.01")
@@ -275,22 +243,14 @@ class TestExtending:
         assert result.stdout == screen(search.found, Path("new/out"))
         assert json.loads(Path("found.json").read_text())["written"] == "new/out"
 
-    @pytest.mark.parametrize("verdict", ["none", "unknown"])
-    def test_writes_nothing_without_a_cause(
-        self, invoke: Invoke, search: Search, verdict: Any
-    ) -> None:
-        search.found = toys.made(verdict)
+    def test_writes_nothing_without_a_cause(self, invoke: Invoke, search: Search) -> None:
+        search.found = toys.made("unknown")
         result = invoke("case", "--output", "out", "--json", "found.json")
         assert result.exit_code == 0
-        assert result.stderr == f"bench: the verdict is {verdict!r}: nothing was written to out\n"
+        assert result.stderr == "bench: the verdict is 'unknown': nothing was written to out\n"
         assert search.written == []
         assert not Path("out").exists()
         assert json.loads(Path("found.json").read_text())["written"] is None
-
-    def test_empty_folder_will_do(self, invoke: Invoke, search: Search) -> None:
-        Path("out").mkdir()
-        assert invoke("case", "--output", "out").exit_code == 0
-        assert invoke("case", "--output", "out").exit_code == 2
 
     @pytest.mark.parametrize(
         ("fault", "code"), [(InputError("a name that TOML lacks"), 2), (OSError("disk full"), 1)]
@@ -306,14 +266,14 @@ class TestExtending:
         assert json.loads(Path("found.json").read_text())["written"] is None
 
 
-@pytest.fixture(scope="module", params=["frame", "hframe"])
-def stated(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> OnAdvance:
-    folder = tmp_path_factory.mktemp(request.param)
-    words = [request.param, "--json", folder / "found.json", "--output", folder / "out"]
+@pytest.fixture(scope="module")
+def stated(tmp_path_factory: pytest.TempPathFactory) -> OnAdvance:
+    folder = tmp_path_factory.mktemp("frame")
+    words = ["frame", "--json", folder / "found.json", "--output", folder / "out"]
     result = CliRunner().invoke(bench, ["diagnose", *map(str, words)])
     assert result.exit_code == 0, result.output
     data = json.loads((folder / "found.json").read_text(), parse_constant=pytest.fail)
-    return request.param, result, data, folder / "out"
+    return result, data, folder / "out"
 
 
 class TestBuiltInCases:
@@ -321,8 +281,8 @@ class TestBuiltInCases:
 
     @pytest.mark.slow(10)
     def test_screen_and_json_agree(self, stated: OnAdvance) -> None:
-        name, result, data, _ = stated
-        assert data["case"] == name
+        result, data, _ = stated
+        assert data["case"] == "frame"
         assert diagnosis_from_json(data) == data
         assert result.stdout == f"{diagnosis_text(data)}\n"
         lines = diagnosis_text({**data, "written": None}).splitlines()
@@ -330,8 +290,8 @@ class TestBuiltInCases:
         assert "".join(data["sentence"].split()) in "".join(result.stdout.split())
 
     def test_finds_what_these_models_are_known_to_lack(self, stated: OnAdvance) -> None:
-        """Both nominal models are Euler-Bernoulli beams; the ladder's has J = Jp for a tube."""
-        name, _, data, _ = stated
+        """The nominal ladder is of Euler-Bernoulli beams, with J = Jp for a tube."""
+        _, data, _ = stated
         found = {cause["effect"] for cause in data["causes"]}
         assert "shear-deformation" in found
         assert data["nothing"] < 0.01
@@ -339,13 +299,12 @@ class TestBuiltInCases:
         before, after = data["gain"]["held_out_percent"]
         assert after < 0.5 * before
         looked = {look["effect"] for look in data["looks"]}
-        assert ("torsion-constant" in looked) == (name == "frame")
-        assert ("torsion-constant" in found) == (name == "frame")
+        assert "torsion-constant" in looked & found
 
     def test_residuals_are_those_of_the_nominal_model(self, stated: OnAdvance) -> None:
         """By hand: the frequencies of the model as drawn, mode by mode in their order."""
-        name, _, data, _ = stated
-        (case,) = read_cases([name], load_plugins())
+        _, data, _ = stated
+        (case,) = read_cases(["frame"], load_plugins())
         modes = solve_modes(case.model)
         predicted = modes.natural_frequencies[~modes.rigid]
         measured = case.measurement.select(case.used)
@@ -357,12 +316,7 @@ class TestBuiltInCases:
 
     def test_extended_case_is_what_was_found(self, stated: OnAdvance) -> None:
         """The folder read again predicts the held-out modes as the diagnosis says."""
-        _, result, data, out = stated
-        if data["verdict"] in ("none", "unknown"):
-            assert not out.exists()
-            assert data["written"] is None
-            assert "nothing was written" in result.stderr
-            return
+        _, data, out = stated
         assert data["written"] == str(out)
         case = read_case(out)
         assert data["sentence"] in " ".join(

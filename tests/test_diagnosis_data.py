@@ -102,13 +102,6 @@ def test_pairing_follows_shapes_where_frequencies_have_swapped() -> None:
     assert bare.pair(swapped, shapes[None, :, ::-1]).tolist() == [[0, 1]]
 
 
-def test_no_two_modes_share_a_partner() -> None:
-    data = toy([100.0, 101.0, 102.0], [[1.0] * 3, [1.0] * 3])
-    frequencies = np.array([[101.0, 150.0, 60.0]])
-    partner = data.pair(frequencies, np.ones((1, 2, 3)))[0]
-    assert sorted(partner.tolist()) == [0, 1, 2]
-
-
 def test_no_partner_is_far_away_as_long_as_another_is_left() -> None:
     """A shape may be as good as identical to a mode at five times the frequency."""
     shapes = np.array([[1.0], [0.5], [-0.7]])
@@ -131,28 +124,6 @@ def test_a_shape_that_is_hardly_better_does_not_outweigh_much_of_a_frequency(
     data = replace(toy([10.0], exact[:, None].tolist(), std=0.005), shape_label=label)
     found = data.pair(np.array([[10.0, 18.0]]), np.array(off).T[None])
     assert found.tolist() == [[partner]]
-
-
-def test_modes_that_an_effect_swaps_are_followed(ladder: FrameBuilder) -> None:
-    """Torsion and bending modes cross as the torsion constant grows."""
-    frame = ladder(accelerometer=False)
-    model = Model.of(frame)
-    (effect,) = effects_named("torsion-constant")
-    true = effect.extend(model, "all", (1.0,))
-    problem = problem_of(model, measured(true, frame), (effect,))
-    nominal = state_at(problem, (), NOTHING)
-    order = nominal.partner[:5]
-    assert (np.diff(order) < 0).any(), "the effect swaps no modes"
-    seen = problem.data.measurement.shapes[:, :5]
-    paired = nominal.readings[:, :5]
-    mac = np.square((seen * paired).sum(axis=0)) / (
-        np.square(seen).sum(axis=0) * np.square(paired).sum(axis=0)
-    )
-    assert mac.min() > 0.8
-    part = part_at(problem, "torsion-constant", "all")
-    exact = state_at(problem, (part,), coordinates(part, (1.0,)))
-    assert np.abs(exact.raw).max() < 1e-4
-    assert (np.diff(exact.partner) > 0).all()
 
 
 def test_a_rigid_mode_that_a_spring_makes_elastic_is_paired(ladder: FrameBuilder) -> None:

@@ -12,13 +12,12 @@ import pytest
 from diagnosis_problems import case_of, catalogue, effects_named, measured
 
 from femubench import Diagnosis, Model, diagnose
-from femubench.core.challenge.answer import Answer
 from femubench.core.challenge.structures import structure_named
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
 from femubench.core.diagnosis.symmetry import mirror_places, symmetries
 from femubench.core.diagnosis.verdict import credible, places_of
 from femubench.core.inference.posterior import Posterior
-from femubench.fem import GroundSpring, Place, PointMass
+from femubench.fem import Place, PointMass
 
 FRAME = structure_named("ladder").frame
 MODEL = Model.of(FRAME)
@@ -54,12 +53,6 @@ def test_the_name_is_sure_and_the_place_is_one_of_four(blind: Diagnosis) -> None
     assert {cause.place, *cause.mirrors} == CORNERS
 
 
-def test_the_sentence_says_both_and_the_mirror_places(blind: Diagnosis) -> None:
-    assert "probability" in blind.sentence
-    assert "its place 25 %" in blind.sentence
-    assert "one of four mirror places" in blind.sentence
-
-
 def test_shapes_settle_the_place(seen: Diagnosis) -> None:
     (cause,) = seen.causes
     assert cause.place == "J3"
@@ -67,13 +60,6 @@ def test_shapes_settle_the_place(seen: Diagnosis) -> None:
     assert cause.places[0][0] == "J3"
     assert cause.mirrors == ()
     assert "mirror" not in seen.sentence
-
-
-def test_a_credible_set_is_the_smallest_of_95_percent(blind: Diagnosis) -> None:
-    (cause,) = blind.causes
-    shares = [p for _, p in cause.places]
-    assert shares == sorted(shares, reverse=True) or np.ptp(shares) < 1e-6
-    assert sum(shares[:-1]) < 0.95 or shares[-1] == pytest.approx(shares[-2], rel=1e-5)
 
 
 def test_advice_parts_places_as_it_parts_names(blind: Diagnosis, seen: Diagnosis) -> None:
@@ -94,12 +80,6 @@ def test_json_carries_name_and_place_apart(blind: Diagnosis) -> None:
         del cause[key]
     (old,) = diagnosis_from_json(data)["causes"]
     assert (old["place_probability"], old["places"]) == (None, [])
-
-
-def test_an_answer_claims_the_name_at_its_place(blind: Diagnosis) -> None:
-    claimed = Answer.of(blind).probability
-    (cause,) = blind.causes
-    assert claimed == pytest.approx(cause.probability * cause.place_probability)
 
 
 def at(probability: float, *causes: tuple[str, str]) -> Any:
@@ -170,21 +150,12 @@ def test_the_ladder_has_its_mirrors() -> None:
     )
 
 
-@pytest.mark.parametrize("what", ["mass", "spring", "support"])
+@pytest.mark.parametrize("what", ["mass", "support"])
 def test_what_stands_on_one_side_ends_the_symmetry(what: str) -> None:
     at = Place(joint="J3")
-    masses = (PointMass(at, 0.05),) if what == "mass" else ()
-    springs = (GroundSpring(at, "z", 1e3),) if what == "spring" else ()
-    model = MODEL.attach(masses, springs)
+    model = MODEL.attach((PointMass(at, 0.05),), ())
     if what == "support":
         from femubench.fem import Support
 
         model = Model.of(replace(FRAME, supports=(*FRAME.supports, Support(at, ("z",)))))
     assert mirror_places(model, "J3", ("J1", "J7", "J9")) == ()
-
-
-def test_an_asymmetric_ladder_has_no_mirror() -> None:
-    frame = structure_named("ladder-asymmetric").frame
-    assert symmetries(Model.of(frame)) == () or not mirror_places(
-        Model.of(frame), "J3", tuple(CORNERS - {"J3"})
-    )

@@ -81,11 +81,13 @@ def test_the_difference_is_named_where_the_drawing_is_wrong(damaged: tuple[Frame
     assert parameter.value == pytest.approx(0.5, abs=0.1)
 
 
-@pytest.mark.slow(20)
-def test_a_structure_as_it_was_lacks_nothing(damaged: tuple[Frame, Frame]) -> None:
+@pytest.mark.slow(5)
+@pytest.mark.parametrize(
+    "seed", [2, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (3, 4))]
+)
+def test_a_structure_as_it_was_lacks_nothing(damaged: tuple[Frame, Frame], seed: int) -> None:
     built, _ = damaged
-    verdicts = [diagnose(case_with(built, seed, built)).verdict for seed in range(2, 5)]
-    assert verdicts == ["none"] * len(verdicts)
+    assert diagnose(case_with(built, seed, built)).verdict == "none"
 
 
 @pytest.mark.nightly
@@ -204,34 +206,12 @@ class TestCaseFolder:
         np.testing.assert_array_equal(before.shapes, expected)
         assert np.isfinite(before.shape_std[1:3]).all()
 
-    def test_sensors_of_a_reference_elsewhere_leave_the_frequencies(
-        self, folder: Callable[[str], Path]
-    ) -> None:
-        path = folder('\n[reference]\nmodes = "then.csv"\nsensors = "before.csv"\n')
-        (path / "before.csv").write_text("label,x,y,z,direction\nelsewhere,0,0,0.25,x\n")
-        (path / "then.csv").write_text(
-            "mode,frequency,frequency_std,elsewhere\n1,21.6,.05,1\n2,8,.1,1\n"
-        )
-        before = read_case(path).reference
-        assert before is not None
-        assert np.isnan(before.shapes).all()
-
-    def test_model_error_is_considered_beside_a_reference(
-        self, folder: Callable[[str], Path]
-    ) -> None:
-        case = read_case(folder(self.TABLE))
-        assert case.error_width == 1.0
-        assert replace(case, reference=None).error_width == 0.0
-        assert replace(case, model_error=0.0).error_width == 0.0
-
     @pytest.mark.parametrize(
         ("lines", "says"),
         [
             ("[reference]\nused = [1]", "reference.modes"),
             ('[reference]\nmodes = "healthy.csv"', "healthy.csv"),
             ('[reference]\nmodes = "modes.csv"\nused = [77]', "mode 77 has no data in modes.csv"),
-            ('[reference]\nmodes = "modes.csv"\nused = [1, 1]', "listed twice"),
-            ('[reference]\nmodes = "modes.csv"\nsensor = "a"', "sensor"),
             ('[reference]\nmodes = "modes.csv"\nsensors = "none.csv"', "none.csv"),
             ("[diagnosis]\nmodel_error = -1.0", "model_error"),
             ("[diagnosis]\nbeam_share = 1.0", "beam_share"),

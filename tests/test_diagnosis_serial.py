@@ -19,7 +19,7 @@ import femubench
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
 from femubench.core.errors import InputError
-from femubench.core.schema.diagnosis import Evidence, Gain, Rival
+from femubench.core.schema.diagnosis import Gain
 from femubench.reports.cells import chance
 from femubench.reports.diagnosis import diagnosis_markdown, diagnosis_text, summary_lines
 
@@ -153,11 +153,6 @@ def words(found: Diagnosis) -> str:
 
 
 class TestTerminal:
-    def test_sentence_comes_first(self) -> None:
-        assert diagnosis_text(data_of(toys.made())).startswith(
-            "The T joints rotate, 94.2 % sure.\n"
-        )
-
     @pytest.mark.parametrize("verdict", VERDICTS)
     def test_fits_on_the_screen(self, verdict: Any) -> None:
         lines = diagnosis_text(data_of(toys.made(verdict))).splitlines()
@@ -193,30 +188,6 @@ class TestTerminal:
         assert -1 not in found, parts[found.index(-1)]
         assert found == sorted(found)
 
-    def test_name_and_place_have_probabilities_of_their_own(self) -> None:
-        places = (("type:T", 0.25), ("type:L", 0.25), ("J1", 0.25), ("J9", 0.25))
-        cause = replace(
-            toys.SOFT, place_probability=0.25, places=places, mirrors=("type:L", "J1", "J9")
-        )
-        stated = (
-            "probability 94.2 %; at this place 25.0 %; one of 4 mirror places; "
-            "else at type:L 25.0 %, J1 25.0 %, J9 25.0 %; the joints rotate"
-        )
-        assert stated in words(toys.made(causes=(cause,)))
-
-    def test_data_and_prior_are_told_apart(self) -> None:
-        rows = Evidence("nothing", 42.13, -7.25), Evidence("density at all", -0.05, 6.9)
-        found = toys.made(evidence=rows)
-        assert (
-            "Against no cause at all, the data add +42.1 to the logarithm of the odds, the prior "
-            "-7.2." in words(found)
-        )
-        assert "Against density at all, the data add -0.1" in words(found)
-        assert "the data add" not in words(toys.made())
-        data = data_of(found)
-        assert data["evidence"][1] == {"against": "density at all", "data": -0.05, "prior": 6.9}
-        assert diagnosis_from_json(data)["evidence"] == data["evidence"]
-
     def test_headings_tell_findings_from_guesses(self) -> None:
         assert "What is missing" in words(toys.made("named"))
         for verdict in ("unknown", "not-confirmed"):
@@ -228,33 +199,6 @@ class TestTerminal:
         assert "shear-deformation everywhere: probability 97.0 %; multiple 1, textbook" in group
         assert "Their sensitivities are 1.8 degrees apart" in group
         assert "joint-rotation" not in words(toys.made("none"))
-
-    def test_cross_validation_is_said(self) -> None:
-        stated = "used modes, each left out in turn"
-        cross = Gain((4.0, 0.5), cross_validated_percent=(5.0, 1.5))
-        assert stated not in words(toys.made())
-        rms = replace(cross, cross_validated_percent=(6.0, 2.5))
-        assert "used modes, each 6 % 2.5 % 5 % 1.5 %" in words(toys.made(gain=cross, gain_rms=rms))
-        assert "held-out" not in words(toys.made(gain=cross))
-
-    def test_where_it_was_written(self) -> None:
-        data = diagnosis_to_json(toys.made(), written=Path("out"))
-        assert diagnosis_text(data).endswith("The extended case is in out")
-
-    def test_lengthy_tables_end_with_a_count(self) -> None:
-        text = words(toys.made(rivals=toys.RIVALS * 10))
-        assert text.count("joint-offset") == 4
-        assert "... and 12 more in the report" in text
-
-    def test_nothing_to_tell(self) -> None:
-        """Empty tables leave no headings behind."""
-        empty: dict[str, Any] = dict.fromkeys(
-            ("rivals", "advice", "smallest_visible", "residuals", "looks", "locations", "notes"), ()
-        )
-        text = words(toys.made("none", **empty))
-        for heading in ("Rivals", "next", "smallest", "Plausibility checks", "Classical", "Notes"):
-            assert heading not in text
-        assert "Chi-square" in text
 
     def test_hostile_names(self) -> None:
         text = diagnosis_text(data_of(toys.nasty()))
@@ -271,12 +215,6 @@ class TestMarkdown:
         assert text.startswith("# Diagnosis of toy\n\nThe T joints rotate, 94.2 % sure.\n\n")
         rows_are_even(text)
 
-    def test_shows_what_the_screen_shows(self) -> None:
-        text = diagnosis_markdown(data_of(toys.made()))
-        assert "| 4: 226.8 Hz | +12.3 | -0.2 |" in text
-        assert "- **joint-rotation at type:T**: probability 94.2 %; the joints rotate;" in text
-        assert "| torsion-constant everywhere + added-mass at J3 | 0.2 % | 801.2 | – |" in text
-
     def test_hostile_names(self) -> None:
         """Nothing of a name is obeyed: no tag, no link, no emphasis, no new row or heading."""
         text = diagnosis_markdown(data_of(toys.nasty()))
@@ -292,13 +230,11 @@ class TestMarkdown:
         assert all(bold.match(line) for line in unescaped.splitlines())
         assert len(re.findall(r"^# ", text, re.MULTILINE)) == 1
 
-    @pytest.mark.parametrize(
-        "start", ["# heading", "- item", "+ item", "1. first", "1) first", "==="]
-    )
-    def test_sentence_is_no_structure(self, start: str) -> None:
-        text = diagnosis_markdown(data_of(toys.made(sentence=start)))
-        assert text.split("\n\n")[1].replace("\\", "") == start
-        assert not re.match(r"[#+=-]|\d+[.)]", text.split("\n\n")[1])
+    def test_sentence_is_no_structure(self) -> None:
+        for start in ("# heading", "- item", "1) first", "==="):
+            text = diagnosis_markdown(data_of(toys.made(sentence=start)))
+            assert text.split("\n\n")[1].replace("\\", "") == start
+            assert not re.match(r"[#+=-]|\d+[.)]", text.split("\n\n")[1])
 
 
 def rows_are_even(text: str) -> None:
@@ -310,28 +246,9 @@ def rows_are_even(text: str) -> None:
         assert len(counts) == 1
 
 
-def test_summary_names_sizes() -> None:
-    lines = summary_lines(data_of(toys.made()))
-    assert lines[0] == "The T joints rotate, 94.2 % sure."
-    assert "bending 31000 ± 1200 N m/rad" in lines[1]
-    assert all(line.isprintable() for line in summary_lines(data_of(toys.nasty())))
-
-
-@pytest.mark.parametrize(
-    ("probability", "text"),
-    [(None, "–"), (1.0, "> 99.9 %"), (0.9985, "99.9 %"), (0.5, "50.0 %"), (0.0, "< 0.1 %")],
-)
-def test_no_certainty_is_claimed(probability: float | None, text: str) -> None:
-    assert chance(probability) == text
-
-
-def test_shapes_take_no_columns_where_there_are_none() -> None:
-    bare = tuple(row for row in toys.residuals() if row.kind == "frequency")
-    text = diagnosis_text(data_of(replace(toys.made(), residuals=bare)))
-    residuals = text.partition("How well it fits")[2].partition("Chi-square")[0]
-    assert "Frequencies" in residuals
-    assert "shape" not in residuals
-    assert "mass" not in residuals
+def test_no_certainty_is_claimed() -> None:
+    for probability, text in ((None, "–"), (1.0, "> 99.9 %"), (0.5, "50.0 %"), (0.0, "< 0.1 %")):
+        assert chance(probability) == text
 
 
 @pytest.mark.parametrize(
@@ -339,10 +256,7 @@ def test_shapes_take_no_columns_where_there_are_none() -> None:
     [
         (104183.0, 51234.0, "104000 ± 51000"),
         (0.0039021, 0.00068, "0.00390 ± 0.00068"),
-        (-0.14, 0.0061, "-0.1400 ± 0.0061"),
         (2.5, None, "2.5"),
-        (2.5, 0.0, "2.5"),
-        (1e12, 3e10, "1e+12 ± 3e+10"),
         (1e-12, 3e-14, "1e-12 ± 3e-14"),
         (math.nan, 1.0, "–"),
     ],
@@ -352,8 +266,3 @@ def test_digits_follow_the_deviation(value: float, std: float | None, text: str)
     cause = replace(toys.SOFT, parameters=(parameter,))
     assert f"; k {text}" in summary_lines(data_of(toys.made(causes=(cause,))))[1]
     assert summary_lines(data_of(toys.made(causes=(cause,))))[1].endswith(text)
-
-
-def test_places_that_do_not_belong_to_effects_one_by_one() -> None:
-    rival = Rival("joint-offset + added-mass", "a + b + c", 3.0, 0.2)
-    assert "joint-offset + added-mass at a + b + c 20.0 %" in words(toys.made(rivals=(rival,)))

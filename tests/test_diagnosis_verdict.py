@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -27,10 +27,8 @@ from femubench.core.diagnosis.verdict import (
 from femubench.core.fit.residuals import Data
 from femubench.core.inference.posterior import Posterior
 from femubench.core.inference.search import adequacy
-from femubench.effect import Effect
 from femubench.fem import Frame, Joint, Material, Member, Place, Section, Support
 
-FrameBuilder = Callable[..., Frame]
 FRAME = structure_named("ladder").frame
 MODEL = Model.of(FRAME)
 Names = tuple[str, ...]
@@ -117,19 +115,6 @@ def test_both_tails_of_chi_square_are_told_with_their_numbers(data: Data) -> Non
     assert much["shapes"].more_p < 1e-12
     assert "so much with probability" in much["shapes"].warning
     assert "4 times too small" in much["shapes"].warning.replace("3.9", "4").replace("4.1", "4")
-
-
-def test_all_data_are_warned_of_where_no_kind_by_itself_is(data: Data) -> None:
-    residual = np.full(len(data), 0.74)
-    residual[: len(data.measurement)] = 0.3
-    state = left(residual, data)
-    state.x = np.zeros(0)
-    whole, *parts = scatter_rows(state)
-    assert whole.less_p < 1e-3 < min(row.less_p for row in parts)
-    assert "all data together is far too little" in whole.warning
-    assert not any(row.warning for row in parts)
-    state.x = np.zeros(len(data))
-    assert scatter_rows(state) == ()
 
 
 # --- decisions --------------------------------------------------------------------------------
@@ -261,16 +246,6 @@ def test_what_unseen_data_bear_out_stands_first() -> None:
     assert decision.angles == pytest.approx((0.0, 90.0))
 
 
-def test_rivals_that_the_data_do_not_exclude_are_one_group() -> None:
-    close = posterior(
-        explained(("a",), 0.7), explained(("b",), 0.29, direction=ACROSS), explained((), 0.01)
-    )
-    decision = decided(close, 0.5, True)
-    assert decision.verdict == "ambiguous"
-    assert decision.group == (("a",), ("b",))
-    assert decision.angles[1] == pytest.approx(90.0)
-
-
 def test_a_group_covers_nearly_all_that_is_not_nothing() -> None:
     """Whatever the angles: those are in the evidence."""
     for share, expected in ((0.9, "ambiguous"), (0.96, "named")):
@@ -315,13 +290,6 @@ def test_textbook_physics_that_the_data_hardly_notice_is_no_part_of_a_name() -> 
         alone = explained((), 1e-20, chi2=460.0, book=("b",))
         plain = explained((), 1e-24, chi2=400.0 + chi2)
         assert posterior(with_b, alone, plain).key(with_b) == (*("a",), *expected)
-
-
-def test_groups_are_probable_first_and_not_endless() -> None:
-    many = posterior(*(explained((name,), 0.1) for name in "abcdefghij"))
-    group, angles = inseparable(many)
-    assert len(group) == len(angles) == 6
-    assert angles[0] == 0.0
 
 
 def test_textbook_physics_in_all_that_is_left_is_named_whatever_is_beside_it() -> None:
@@ -412,33 +380,7 @@ def test_a_deviation_is_that_of_the_value_in_its_unit() -> None:
     assert size.std == pytest.approx(1.08 * 2.0 * 0.002 / np.sqrt(6.0), rel=0.05)
 
 
-def test_without_a_tolerance_the_same_data_count_for_more() -> None:
-    case = trial("member-stiffness", "rung-middle", 0.15)
-    loose = diagnosed(case, pairs=False)
-    strict = diagnosed(case, tolerance=0.0, pairs=False)
-    assert loose.causes[0].effect == strict.causes[0].effect == "member-stiffness"
-    assert strict.chi2[0] > loose.chi2[0]
-    (one,), (two,) = loose.causes[0].parameters, strict.causes[0].parameters
-    assert one.std is not None
-    assert two.std is not None
-    assert two.std < one.std
-    given = diagnosed(replace(case, tolerance=0.0), pairs=False)
-    assert given.chi2 == strict.chi2
-
-
-@pytest.mark.parametrize(("factor", "said"), [(1.0, False), (5.0, True)])
-def test_a_stated_scatter_that_is_far_too_large_is_said(factor: float, said: bool) -> None:
-    case = trial("member-mass", "rung-middle", 0.2)
-    m = case.measurement
-    loose = replace(m, frequency_std=factor * m.frequency_std, shape_std=factor * m.shape_std)
-    found = diagnosed(replace(case, measurement=loose), faults=False, pairs=False, tolerance=0.0)
-    notes = [row.warning for row in found.scatter if "times too large" in row.warning]
-    assert bool(notes) is said
-    if said:
-        assert "about 5" in notes[0] or "about 4" in notes[0]
-
-
-@pytest.mark.parametrize("size", [0.01, 0.03, 0.05])
+@pytest.mark.parametrize("size", [0.01, 0.05])
 def test_what_is_said_to_be_missing_is_in_the_extended_model(size: float) -> None:
     """Also where nothing is the likeliest single answer, and something likelier than nothing."""
     truth = catalogue()["member-mass"].extend(MODEL, "rung-middle", (size,))
@@ -466,9 +408,7 @@ def test_a_clean_model_lacks_nothing_and_says_what_it_would_have_seen(clean: Dia
     assert all(row.size > 0.0 for row in clean.smallest_visible)
 
 
-@pytest.mark.parametrize(
-    "effect", ["torsion-constant", "added-mass", "joint-rotation", "member-mass"]
-)
+@pytest.mark.parametrize("effect", ["added-mass", "joint-rotation"])
 def test_three_times_the_smallest_visible_size_is_found(clean: Diagnosis, effect: str) -> None:
     """For a spring a third of the stiffness; at the place where it would show best."""
     row = next(row for row in clean.smallest_visible if row.effect == effect)
@@ -519,25 +459,8 @@ def bare(measurement: Measurement) -> Measurement:
     return replace(measurement, sensors=NO_SENSORS, shapes=empty, shape_std=empty, total_mass=None)
 
 
-def test_a_used_frequency_needs_a_deviation() -> None:
-    case = trial("density", "all", 0.08)
-    std = case.measurement.frequency_std.copy()
-    std[2] = np.nan
-    spoiled = replace(case, measurement=replace(case.measurement, frequency_std=std))
-    with pytest.raises(InputError, match="not every used frequency has a standard deviation"):
-        diagnosed(spoiled)
-
-
-def test_a_held_out_frequency_needs_none() -> None:
-    case = trial("member-mass", "rung-middle", 0.2)
-    std = case.measurement.frequency_std.copy()
-    std[7] = np.nan
-    found = diagnosed(replace(case, measurement=replace(case.measurement, frequency_std=std)))
-    assert found.causes[0].effect == "member-mass"
-
-
-@pytest.mark.parametrize("count", [1, 2])
-def test_one_used_mode_is_diagnosed_as_far_as_it_goes(count: int) -> None:
+def test_one_used_mode_is_diagnosed_as_far_as_it_goes() -> None:
+    count = 1
     case = trial("member-mass", "rung-middle", 0.2)
     found = diagnosed(replace(case, used=case.used[:count]))
     assert found.data_count > 0
@@ -545,15 +468,6 @@ def test_one_used_mode_is_diagnosed_as_far_as_it_goes(count: int) -> None:
     lonely = replace(case, used=case.used[:count], held_out=(), modifications=())
     alone = diagnosed(replace(lonely, measurement=bare(case.measurement)))
     assert np.isfinite(alone.chi2).all()
-
-
-def test_frequencies_alone_will_do() -> None:
-    case = trial("torsion-constant", "all", 0.3)
-    found = diagnosed(replace(case, measurement=bare(case.measurement)))
-    assert found.verdict in ("named", "ambiguous")
-    assert "torsion-constant" in {cause.effect for cause in found.causes}
-    assert found.data_count == 6
-    assert {row.kind for row in found.residuals} == {"frequency"}
 
 
 @pytest.mark.slow(5)
@@ -573,20 +487,6 @@ def test_data_of_another_structure_are_no_reason_to_name_anything() -> None:
     assert found.adequacy_p < 1e-3
 
 
-def test_matrices_are_diagnosed_by_what_applies_to_them() -> None:
-    from femubench.core.case.nodes import MatrixGeometry
-
-    structure = MODEL.frame_structure
-    names = tuple(f"n{i}" for i in range(len(structure.mesh.xyz)))
-    geometry = MatrixGeometry(names, MODEL.dofs)
-    model = Model(MODEL.mass, MODEL.stiffness, MODEL.dofs, geometry)
-    case = trial("youngs-modulus", "all", 0.08, weighed=False)
-    found = diagnose(replace(case, model=model))
-    assert found.verdict in ("named", "ambiguous")
-    assert "youngs-modulus" in {cause.effect for cause in found.causes}
-    assert found.extended.size == MODEL.size
-
-
 def beam(elements: int, section: Section, *, clamped: bool = False) -> Frame:
     """Return a beam of 1 m in the x-z plane, held at one end or at both."""
     joints = Joint("A", (0.0, 0.0, 0.0), "E"), Joint("B", (1.0, 0.0, 0.0), "E")
@@ -600,8 +500,7 @@ WHOLE = Section(1e-4, 1e-9, 1e-9, 2e-9, 2e-9)
 PLANE = Section(1e-4, 1e-9, 0.0, 0.0, 0.0)  # A and Iy alone, which is all that a plane needs
 
 
-@pytest.mark.parametrize("used", [2, 4, 5])
-@pytest.mark.parametrize("shapes", [0, 3])
+@pytest.mark.parametrize(("used", "shapes"), [(2, 0), (5, 3)])
 def test_fewer_modes_in_the_model_than_in_the_data_are_one_clear_error(
     used: int, shapes: int
 ) -> None:
@@ -638,8 +537,8 @@ def test_a_mode_that_the_band_should_hold_and_does_not_is_said(missing: bool) ->
         assert "without a partner: mode 8" in said[0]
 
 
-@pytest.mark.parametrize("effects", [(), effects_named("amplitude-dependent-stiffness")])
-def test_without_effects_there_is_nothing_to_name(effects: tuple[Effect, ...]) -> None:
+def test_without_effects_there_is_nothing_to_name() -> None:
+    effects = effects_named("amplitude-dependent-stiffness")  # which needs a second level
     wrong = diagnose(trial("youngs-modulus", "all", 0.2), effects)
     assert wrong.verdict == "unknown"
     assert wrong.causes == ()

@@ -15,11 +15,9 @@ import numpy as np
 import pytest
 from distributions import install_metadata
 
-from femubench import Model, solve_modes
-from femubench.core.change.hypothesis import hypotheses_of
+from femubench import Model
 from femubench.core.conformance.checking import findings, subjects
 from femubench.core.plugin.loader import Plugins, load_plugins
-from femubench.effect import member_length
 from femubench.fem import Frame, Place, PointMass, Support
 from femubench.plugins.effects import femubench_effects
 
@@ -71,9 +69,12 @@ def test_every_effect_is_in_both_tables() -> None:
     assert set(rows_of(THERE)) == set(EFFECTS)
 
 
-@pytest.mark.parametrize("name", EFFECTS)
-def test_units_priors_and_keys_are_those_of_the_effect(name: str, models: list[Model]) -> None:
-    effect = EFFECTS[name]
+def test_units_priors_and_keys_are_those_of_the_effects(models: list[Model]) -> None:
+    for name, effect in EFFECTS.items():
+        check_row(name, effect, models)
+
+
+def check_row(name: str, effect: Any, models: list[Model]) -> None:
     _, where, unit, prior = rows_of(THERE)[name]
     scalings = set(re.findall(r"linear|exponential|compliance|factor", prior))
     written: set[str] = set()
@@ -110,32 +111,6 @@ def bedding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     del sys.modules["my_bedding"]
 
 
-def test_example_holds_what_lies_on_it(bedding: Any, ladder: FrameBuilder) -> None:
-    """Lifted as a body, the frame is held by the bedding's stiffness times the member's length."""
-    model = Model.of(ladder())
-    frame = model.frame_structure.frame
-    assert bedding.places(model) == tuple(member.name for member in frame.members)
-    assert bedding.frame(frame, "BE", [0.0]) == frame
-    extended = bedding.extend(model, "BE", [2e4])
-    assert extended.size == model.size
-    lift = np.array([direction == "z" for direction in model.dofs.direction], dtype=float)
-    held = lift @ (extended.stiffness @ lift)
-    np.testing.assert_allclose(held, 2e4 * member_length(frame, "BE"), rtol=1e-9)
-    assert solve_modes(extended).rigid.sum() == 1  # the turn about the member
-
-
 def test_example_keeps_the_rules(bedding: Any) -> None:
     (subject,) = subjects(bedding.name, Plugins(effects={bedding.name: bedding}))
     assert [f for f in findings(subject) if f.verdict.status in ("fail", "warn")] == []
-
-
-def test_example_is_a_hypothesis_like_any_other(bedding: Any, ladder: FrameBuilder) -> None:
-    model = Model.of(ladder())
-    hypotheses = hypotheses_of(model, [bedding])
-    assert [h.place for h in hypotheses] == list(bedding.places(model))
-    one, x = hypotheses[5], np.array([[0.7]])
-    change = np.zeros((model.size, model.size))
-    for factor, term in zip(one.factors(x)[0], one.change.terms, strict=True):
-        change += factor * term.operator.apply(np.eye(model.size))
-    exact = bedding.extend(model, one.place, one.values(x)[0]).stiffness - model.stiffness
-    np.testing.assert_allclose(change, exact.toarray(), atol=1e-9 * np.abs(change).max())

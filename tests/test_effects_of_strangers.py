@@ -59,20 +59,13 @@ def found(blind: BlindCase) -> Diagnosis:
 def test_it_keeps_the_rules() -> None:
     plugins = load_plugins()
     assert plugins.broken == ()
-    for name in (Skin.name, Bare.name, Plain.name):
+    for name in (Skin.name, Bare.name):
         (subject,) = subjects(name, plugins)
         faults = [f for f in findings(subject) if f.verdict.status in ("fail", "warn")]
         assert faults == []
 
 
-FAMILY = (
-    *("global", "local", "spring", "offset", "bayesian", "bayesian-sampling", "sparse"),
-    *("eigensensitivity", "cma-es", "multi-start", "strain-energy", "cross-model"),
-)
-
-
-@pytest.mark.parametrize("name", FAMILY)
-def test_it_is_a_parameter_of_every_strategy_that_fits_changes(name: str) -> None:
+def test_it_is_a_parameter_of_strategies_that_fit_changes() -> None:
     case = femubench.cases["frame"]
     real = Skin().extend(case.model, "all", [0.2])
     modes = femubench.solve_modes(real).elastic.take(np.arange(3))
@@ -85,19 +78,14 @@ def test_it_is_a_parameter_of_every_strategy_that_fits_changes(name: str) -> Non
         shapes=shapes,
         shape_std=np.full(shapes.shape, 0.01 * np.abs(shapes).max()),
     )
-    strategy = femubench.strategies[name](changes="newcomers/stiff-skin")
-    if name == "bayesian-sampling":  # which knows that models are off by themselves
-        strategy = femubench.strategies[name](
-            changes="newcomers/stiff-skin", discrepancy_median=1e-4, discrepancy_spread=0.1
-        )
+    strategy = femubench.strategies["bayesian"](changes="newcomers/stiff-skin")
     result = strategy.update(case.model, exact, np.random.default_rng(0))
     (skin,) = result.parameters
-    # The cross-model system is linear in the change but for its expansion of shapes.
-    assert skin.after == pytest.approx(0.2, abs=0.03 if name == "cross-model" else 0.004)
+    assert skin.after == pytest.approx(0.2, abs=0.004)
     assert (skin.name, skin.before, skin.places) == ("stiff-skin all", 0.0, ("all",))
     found = femubench.solve_modes(result.model).elastic.natural_frequencies[:6]
     truth = femubench.solve_modes(real).elastic.natural_frequencies[:6]
-    assert found == pytest.approx(truth, rel=0.01 if name == "cross-model" else 2e-3)
+    assert found == pytest.approx(truth, rel=2e-3)
 
 
 def test_an_effect_that_nobody_has_is_one_line() -> None:
@@ -109,11 +97,6 @@ def test_it_is_drawn_from_its_own_range() -> None:
     sizes = [draw_case(seed, "C", effect=Skin.name).truth.causes[0].values[0] for seed in range(8)]
     assert all(0.2 <= size <= 0.3 for size in sizes)
     assert len(set(sizes)) == 8
-
-
-def test_without_a_range_it_is_drawn_from_its_prior() -> None:
-    sizes = [draw_case(seed, "C", effect=Bare.name).truth.causes[0].values[0] for seed in range(8)]
-    assert all(0.05 <= size <= 0.2 for size in sizes)
 
 
 def test_it_is_named_with_its_clause_caution_and_size_in_percent(

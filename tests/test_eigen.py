@@ -9,15 +9,7 @@ import numpy as np
 import pytest
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.frame import (
-    Frame,
-    GroundSpring,
-    Joint,
-    Material,
-    Member,
-    Place,
-    PointMass,
-)
+from femubench.core.fem.frame import Frame, Joint, Material, Member
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.sections import round_tube
 from femubench.core.modal.eigen import (
@@ -55,7 +47,7 @@ def test_negative_eigenvalues_keep_their_sign(ladder: FrameBuilder) -> None:
     )
 
 
-@pytest.mark.parametrize("factor", [-1e-9, -1.0, -1.0 - 1e-12, -1.0 + 1e-12, -30.0, -1e4, -1e7])
+@pytest.mark.parametrize("factor", [-1e-9, -1.0, -1.0 + 1e-12, -1e7])
 def test_a_negative_eigenvalue_of_any_size_spoils_no_other(
     ladder: FrameBuilder, factor: float
 ) -> None:
@@ -79,17 +71,6 @@ def test_indefinite_mass_is_refused(ladder: FrameBuilder) -> None:
         solve_modes(replace(model, mass_change=LowRank(shapes, np.array([[-2.0]]))))
 
 
-def test_indefinite_mass_beside_indefinite_stiffness_is_refused(ladder: FrameBuilder) -> None:
-    model = Model.of(ladder())
-    modes = solve_modes(model)
-    shapes = np.asarray(model.mass @ modes.shapes[:, 3:5])
-    drop = LowRank(shapes, np.diag([0.0, -1e9]))
-    with pytest.raises(ModelError, match="mass matrix is not positive"):
-        solve_modes(
-            replace(model, stiffness_change=drop, mass_change=LowRank(shapes, np.diag([-2.0, 0.0])))
-        )
-
-
 def test_matrices_that_are_not_finite_are_refused(ladder: FrameBuilder) -> None:
     model = Model.of(ladder())
     bad = model.stiffness.copy()
@@ -109,44 +90,6 @@ def test_repeated_eigenvalues_give_orthonormal_shapes() -> None:
     np.testing.assert_allclose(pairs[:, 0], pairs[:, 1], rtol=1e-9)
     gram = modes.shapes.T @ model.mass.toarray() @ modes.shapes
     np.testing.assert_allclose(gram, np.eye(len(modes)), atol=1e-8)
-
-
-def test_the_same_model_gives_the_same_bits_twice(fitted_portal: FrameBuilder) -> None:
-    first, second = (solve_modes(Model.of(fitted_portal(1))) for _ in range(2))
-    np.testing.assert_array_equal(first.eigenvalues, second.eigenvalues)
-    np.testing.assert_array_equal(first.shapes, second.shapes)
-
-
-def test_count_takes_the_lowest(ladder: FrameBuilder) -> None:
-    model = Model.of(ladder())
-    few, all_modes = solve_modes(model, 7), solve_modes(model)
-    assert len(few) == 7
-    np.testing.assert_array_equal(few.eigenvalues, all_modes.eigenvalues[:7])
-    assert len(all_modes) == 81
-
-
-def test_a_mass_lowers_and_a_spring_raises_every_frequency(asymmetric_ladder: FrameBuilder) -> None:
-    frame = asymmetric_ladder()
-    plain = solve_modes(Model.of(frame)).eigenvalues
-    at = Place(joint="E")
-    heavier = replace(frame, masses=(*frame.masses, PointMass(at, 0.5, (0.01, 0.02, 0.0))))
-    stiffer = replace(frame, springs=(GroundSpring(at, "z", 1e5),))
-    slack = 1e-6 * plain[3] + 1e-8 * plain
-    assert (solve_modes(Model.of(heavier)).eigenvalues <= plain + slack).all()
-    raised = solve_modes(Model.of(stiffer)).eigenvalues
-    assert (raised >= plain - slack).all()
-    assert (raised[:-1] <= (plain + slack)[1:]).all()  # Rayleigh's interlacing
-
-
-def test_evaluations_are_counted_in_nested_blocks(ladder: FrameBuilder) -> None:
-    model = Model.of(ladder())
-    with count_evaluations() as outer:
-        with count_evaluations() as inner:
-            solve_modes(model)
-        solve_modes(model)
-        solve_modes(model)
-    solve_modes(model)
-    assert (inner.count, outer.count) == (1, 3)
 
 
 def test_what_is_known_of_a_large_model_is_not_solved_again(ladder: FrameBuilder) -> None:

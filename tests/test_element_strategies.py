@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,6 @@ from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.update.element_families import (
-    end_swap_signs,
     free_terms,
     generic_family,
     half_turn,
@@ -123,6 +123,11 @@ def run(strategy: Any, model: Any = NOMINAL, measurement: Any = TEST) -> Any:
     return strategy.update(model, measurement, np.random.default_rng(0))
 
 
+@cache
+def on_the_ladder(strategy: Any) -> Any:
+    return run(strategy)
+
+
 def frequencies(model: Any) -> Any:
     return solve_modes(model).natural_frequencies
 
@@ -192,7 +197,7 @@ def stiffness_by_place(model: Any, family: Any, x: Any) -> Any:
     return family.change_model(model, x).stiffness.toarray()[np.ix_(order, order)]
 
 
-@pytest.mark.parametrize("plane", ["out-of-plane", "in-plane", "3d"])
+@pytest.mark.parametrize("plane", ["out-of-plane", "3d"])
 def test_tied_cores_do_not_depend_on_the_direction_a_member_is_drawn_in(plane: Any) -> None:
     # The joint element touches its joint by end 1 in one frame, by end 2 in the other: the tied
     # core must be turned with it, and the plain one must not notice.
@@ -208,34 +213,7 @@ def test_tied_cores_do_not_depend_on_the_direction_a_member_is_drawn_in(plane: A
     assert matrices[1] == pytest.approx(matrices[0], abs=1e-12 * np.abs(matrices[0]).max())
 
 
-def test_a_joint_core_that_is_not_turned_gives_another_structure() -> None:
-    signs = end_swap_signs("out-of-plane", active("out-of-plane"))
-    assert signs[0] * signs[1] == -1.0  # k12
-    assert signs[1] * signs[2] == -1.0  # k23
-    assert signs[0] * signs[2] == 1.0  # k13
-
-
 # --- families ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("plane", "counts"),
-    [
-        ("out-of-plane", (56, 112, 140, 16)),
-        ("in-plane", (56, 112, 140, 16)),
-        ("3d", (28 * 4, 28 * 8, 14 * 21 + 14 * 9, 2 * 21 + 9)),
-    ],
-)
-def test_number_of_parameters_on_the_ladder(plane: Any, counts: Any) -> None:
-    structure = Structure.build(ladder(plane))
-    found = (
-        physical_family(structure),
-        nobari_family(structure),
-        generic_family(structure),
-        generic_family(structure, tied=True),
-    )
-    assert tuple(len(family) for family in found) == counts
-    assert all(len(set(family.names)) == len(family) for family in found)
 
 
 def test_symmetry_classes_set_the_number_of_parameters() -> None:
@@ -253,8 +231,7 @@ ENDS = (
 )
 
 
-@pytest.mark.parametrize("plane", ["out-of-plane", "in-plane", "3d"])
-@pytest.mark.parametrize("beam", ["euler-bernoulli", "timoshenko"])
+@pytest.mark.parametrize(("plane", "beam"), [("in-plane", "euler-bernoulli"), ("3d", "timoshenko")])
 def test_nominal_elements_are_made_of_their_strain_modes(plane: Any, beam: Any) -> None:
     structure = Structure.build(ladder(plane, beam, rigid_ends=ENDS))
     vectors = scale_strain_vectors(structure, np.arange(28))
@@ -270,7 +247,7 @@ def all_families(structure: Any) -> Any:
     yield generic_family(structure, tied=True)
 
 
-@pytest.mark.parametrize("plane", ["out-of-plane", "in-plane", "3d"])
+@pytest.mark.parametrize("plane", ["out-of-plane", "3d"])
 def test_families_with_cores_keep_rigid_modes_for_any_parameters(plane: Any) -> None:
     model = Model.of(ladder(plane, rigid_ends=ENDS))
     rigid = rigid_modes_of(model)
@@ -279,17 +256,6 @@ def test_families_with_cores_keep_rigid_modes_for_any_parameters(plane: Any) -> 
         changed = family.change_model(model, RNG.standard_normal(len(family)))
         scale = np.abs(changed.stiffness) @ np.abs(rigid)
         assert np.abs(changed.stiffness @ rigid).max() < 1e-12 * scale.max()
-
-
-def test_cores_tell_the_definiteness_of_the_elements() -> None:
-    structure = NOMINAL.frame_structure
-    for family in all_families(structure):
-        x = 0.3 * RNG.standard_normal(len(family))
-        elements = stiffness_matrices(structure.properties) + family.change(x)
-        moving = np.flatnonzero(structure.active_local)
-        lowest = la.eigvalsh(elements[0][np.ix_(moving, moving)])[0]
-        core = np.linalg.eigvalsh(family.relative_cores(x))[0, 0]
-        assert np.sign(round(lowest, 3)) == (-1.0 if core < 0.0 else 0.0)
 
 
 def test_physical_factor_equals_the_parameter_of_the_structure() -> None:
@@ -357,8 +323,10 @@ def exact_modes(truth: Any, count: Any) -> Any:
                       modes.shapes[:, modes.rigid], modes, elastic)  # fmt: skip
 
 
-@pytest.mark.parametrize("orthogonality", [True, False])
-@pytest.mark.parametrize("name", ["physical", "nobari", "generic", "adjusted"])
+@pytest.mark.parametrize(
+    ("name", "orthogonality"),
+    [("physical", True), ("nobari", True), ("generic", False), ("adjusted", True)],
+)
 def test_a_truth_of_the_family_is_found_from_shapes_at_all_dofs(
     name: Any, orthogonality: Any
 ) -> None:
@@ -382,47 +350,6 @@ def test_a_truth_of_the_family_is_found_from_shapes_at_all_dofs(
     assert found.x == pytest.approx(x, abs=1e-8)
 
 
-def test_perturbed_bending_factors_come_back() -> None:
-    truth_structure = NOMINAL.frame_structure.with_values(
-        [Property("a", "EI", ("side10/4",)), Property("b", "EI", ("rung2/1",))], [0.6, 1.3]
-    )
-    family = physical_family(NOMINAL.frame_structure)
-    modes = exact_modes(Model.of(truth_structure), 3)
-    a, b, _ = equations(NOMINAL, family, modes, orthogonality=True)
-    x = solve_least_change(a, b, family, None).x
-    expected = np.zeros(len(family))
-    expected[family.names.index("EI side10/4")] = -0.4
-    expected[family.names.index("EI rung2/1")] = 0.3
-    assert x == pytest.approx(expected, abs=1e-8)
-
-
-def test_rows_are_the_equations_of_motion_and_the_orthogonality() -> None:
-    modes = exact_modes(TRUTH_ON_NOMINAL, 3)
-    family = generic_family(NOMINAL.frame_structure)
-    with_rows, right, _ = equations(NOMINAL, family, modes, orthogonality=True)
-    without, _, _ = equations(NOMINAL, family, modes, orthogonality=False)
-    assert with_rows.shape == (249, 140)  # the paper's count
-    assert without.shape == (243, 140)
-    x = 0.1 * RNG.standard_normal(140)
-    changed = family.change_model(NOMINAL, x).stiffness - NOMINAL.stiffness
-    scale = np.array([1.0 if d == "z" else 1.0 / family.structure.properties.length.mean()
-                      for d in NOMINAL.dofs.direction])  # fmt: skip
-    direct = (scale[:, None] * (changed @ modes.shapes)).T.ravel()
-    assert without @ x == pytest.approx(direct, rel=1e-9, abs=1e-9 * np.abs(direct).max())
-    # Every further row is a weight times the gap of one orthogonality condition.
-    energy = modes.shapes.T @ changed @ modes.shapes
-    gap = energy - np.diag(modes.eigenvalues) + modes.shapes.T @ NOMINAL.stiffness @ modes.shapes
-    pairs = [(i, j) for j in range(3) for i in range(j + 1)]
-    relative = [gap[i, j] / np.sqrt(modes.eigenvalues[i] * modes.eigenvalues[j]) for i, j in pairs]
-    weights = (with_rows @ x - right)[243:] / np.array(relative)
-    diagonal = np.array([i == j for i, j in pairs])
-    assert weights[diagonal] == pytest.approx(weights[diagonal][0])
-    assert weights[~diagonal] == pytest.approx(weights[~diagonal][0])
-
-
-TRUTH_ON_NOMINAL = Model.of(ladder(beam="timoshenko", tube=TUBE, E=71e9))
-
-
 def test_few_equations_give_the_smallest_change() -> None:
     family = nobari_family(NOMINAL.frame_structure)
     matrix = sp.csr_array(RNG.standard_normal((30, len(family))))
@@ -438,12 +365,6 @@ def test_few_equations_give_the_smallest_change() -> None:
 
 def small_family() -> Any:
     return generic_family(one_member(False, "out-of-plane").frame_structure, tied=True)
-
-
-def test_a_solution_with_positive_cores_is_left_alone() -> None:
-    family = small_family()
-    x = 0.1 * RNG.standard_normal(len(family))
-    assert nearest_positive(family, np.eye(len(family)), x) is x
 
 
 def test_bounded_factors_solve_the_convex_problem() -> None:
@@ -483,7 +404,7 @@ ALL = (Physical(), Nobari(), NobariRigid(), GenericLS(), GenericAdjusted())
 @pytest.mark.parametrize("strategy", ALL, ids=lambda s: s.name)
 def test_results_on_the_ladder(strategy: Any) -> None:
     before = NOMINAL.stiffness.copy()
-    result = run(strategy)
+    result = on_the_ladder(strategy)
     counts = {"physical": 56, "nobari": 112, "nobari-rigid": 56, "generic-ls": 140,
               "generic-adjusted": 16}  # fmt: skip
     assert result.parameter_count == counts[strategy.name]
@@ -501,21 +422,20 @@ def test_ladder_frequencies_beyond_the_used_ones() -> None:
                 "generic-adjusted": (907.8, 1040.6)}  # fmt: skip
     for strategy in ALL:
         if strategy.name in expected:
-            higher = frequencies(run(strategy).model)[6:8]
+            higher = frequencies(on_the_ladder(strategy).model)[6:8]
             assert higher == pytest.approx(expected[strategy.name], rel=7e-3)
 
 
 def test_nobari_loses_rigid_modes_as_the_paper_found() -> None:
-    modes = solve_modes(run(Nobari()).model)
+    modes = solve_modes(on_the_ladder(Nobari()).model)
     lowest = modes.natural_frequencies[:3]
     assert lowest[0] == pytest.approx(-106.8, rel=0.05)
     assert abs(lowest[1]) < 1.0
     assert lowest[2] > 30.0
 
 
-@pytest.mark.parametrize("case", ["symmetric", "asymmetric"])
-def test_nobari_with_rigid_modes_is_physical_updating(case: Any) -> None:
-    model, test = (NOMINAL, TEST) if case == "symmetric" else asymmetric()
+def test_nobari_with_rigid_modes_is_physical_updating() -> None:
+    model, test = asymmetric()
     physical, rigid = run(Physical(), model, test), run(NobariRigid(), model, test)
     assert frequencies(rigid.model) == pytest.approx(
         frequencies(physical.model), rel=1e-6, abs=1e-3
@@ -530,38 +450,18 @@ def asymmetric() -> Any:
     return Model.of(ladder(halves=halves)), measured(Model.of(truth), at_13_points(halves))
 
 
-def in_plane() -> Any:
-    points = at_13_points()
-    xyz = points.xyz[:, [0, 2, 1]]
-    sensors = Sensors(
-        tuple(f"{d}{i}" for d in "xz" for i in range(13)),
-        np.vstack([xyz, xyz]),
-        ("x",) * 13 + ("z",) * 13,
-    )
-    truth = Model.of(ladder("in-plane", "timoshenko", tube=TUBE, n=8, E=66e9))
-    return Model.of(ladder("in-plane")), measured(truth, sensors)
-
-
-def test_nobari_with_rigid_modes_has_a_little_more_freedom_in_plane() -> None:
-    # The rigid-body modes of the whole leave one combination of elements free a closed loop.
-    model, test = in_plane()
-    physical, rigid = run(Physical(), model, test), run(NobariRigid(), model, test)
-    assert physical.parameter_count == 56
-    assert rigid.parameter_count == 58
-    assert rigid.history[0]["residual"] < physical.history[0]["residual"]
-    assert rigid.diagnostics["rigid_force"] < 1e-12
-
-
-@pytest.mark.parametrize("strategy", ALL, ids=lambda s: s.name)
-def test_asymmetric_frame(strategy: Any) -> None:
+def test_asymmetric_frame() -> None:
+    strategy = GenericAdjusted()
     model, test = asymmetric()
     result = run(strategy, model, test)
     assert frequencies(result.model)[3:6] == pytest.approx(test.frequencies, rel=5e-3)
 
 
-@pytest.mark.parametrize("strategy", [Physical(), GenericLS(), GenericAdjusted()],
-                         ids=lambda s: s.name)  # fmt: skip
-@pytest.mark.parametrize("orthogonality", [True, False])
+@pytest.mark.parametrize(
+    ("strategy", "orthogonality"),
+    [(Physical(), True), (GenericLS(), False), (GenericAdjusted(), True)],
+    ids=lambda s: getattr(s, "name", str(s)),
+)
 def test_stiffness_stays_positive_and_free_with_noisy_shapes(
     strategy: Any, orthogonality: Any
 ) -> None:
@@ -594,12 +494,6 @@ def test_without_orthogonality_rows_the_used_frequencies_are_missed() -> None:
     assert abs(found[4] - PRINTED[1]) > 5.0
 
 
-def test_two_modes_leave_some_parameters_to_the_least_change() -> None:
-    result = run(GenericLS(), measurement=TEST.select((1, 2)))
-    assert result.diagnostics["rank"] < 140
-    assert frequencies(result.model)[3:5] == pytest.approx(PRINTED[:2], rel=2e-3)
-
-
 def test_missing_readings_drop_their_sensors() -> None:
     shapes = TEST.shapes.copy()
     shapes[3, 0] = shapes[8, 2] = np.nan
@@ -630,15 +524,3 @@ def test_a_joint_type_called_plain_is_a_set_of_its_own() -> None:
     joints = tuple(replace(j, type="plain") if j.type == "T" else j for j in frame.joints)
     family = generic_family(Structure.build(replace(frame, joints=joints)), tied=True)
     assert len(family) == 16
-
-
-def test_estimates_carry_names_and_values() -> None:
-    result = run(GenericAdjusted())
-    named = {p.name: p for p in result.parameters}
-    assert set(named) >= {"k11 L", "k23 L", "k22 T", "k13 plain"}
-    assert "k12 plain" not in named
-    assert named["k11 L"].before == 1.0
-    assert named["k12 L"].before == 0.0
-    physical = {p.name: p for p in run(Physical()).parameters}["EI side00/1"]
-    assert physical.unit == "N m2"
-    assert physical.before == pytest.approx(68.367e9 * TUBE.Iy)

@@ -78,7 +78,6 @@ def pressed() -> None:
 
 
 CAUSES = {
-    "lost": (lost, UNFINISHED, "bench: the scheduler was lost"),
     "broken": (broken, UNFINISHED, "bench: a fault of ours"),
     "full": (full, UNFINISHED, "bench: [Errno 28] No space left on device: 'results.jsonl'"),
     "pressed": (pressed, INTERRUPTED, "bench: interrupted"),
@@ -108,12 +107,6 @@ def test_the_board_so_far_and_the_command_that_goes_on(
     kept = ("case", "strategy", "nominal", "status", "blocks", "gain", "rank")
     found = [[getattr(one, name) for name in kept] for one in store.load().results]
     assert found == [[getattr(one, name) for name in kept] for one in whole]
-
-
-def test_quiet_runs_tell_no_board(monkeypatch: pytest.MonkeyPatch) -> None:
-    result = run_until(lost, 1, monkeypatch, *RUN, "--quiet")
-    assert (result.exit_code, result.stdout) == (UNFINISHED, "")
-    assert result.stderr.splitlines()[0] == "bench: the scheduler was lost"
 
 
 def test_what_ends_before_the_run_begins_is_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -60,21 +60,6 @@ def peaks(hz: list[float], level: list[float]) -> list[float]:
     return [hz[i] for i in inner if level[i - 1] < level[i] > level[i + 1]]
 
 
-def test_a_drawing_is_the_structure_and_what_was_measured(cases: dict[str, Case]) -> None:
-    found = case_drawing(cases["hframe"])
-    assert found is not None
-    assert (found["plane"], len(found["nodes"]), len(found["elements"])) == ("in-plane", 65, 64)
-    assert [joint["type"] for joint in found["joints"]].count("T") == 2
-    assert sum(mass["kg"] for mass in found["masses"]) == pytest.approx(0.1024)
-    assert [mode["block"] for mode in found["measured"]] == ["used"] * 5 + ["higher"] * 2
-    assert all(
-        max(abs(x) for x in mode["shape"] if x is not None) == 1.0 for mode in found["measured"]
-    )
-    assert found["drive"] in {sensor["label"] for sensor in found["sensors"]}
-    for i, j in found["elements"]:
-        assert np.linalg.norm(np.subtract(found["nodes"][i], found["nodes"][j])) < 0.06
-
-
 def test_a_factor_on_elements_is_the_change_of_these_elements(cases: dict[str, Case]) -> None:
     case = cases["hframe"]
     result = updated(case, "global")
@@ -156,18 +141,6 @@ def test_modes_mac_and_receptances_are_those_of_the_model(cases: dict[str, Case]
     assert set(found["receptance"]) == {"", "mass and spring at 6"}
 
 
-def test_the_measured_receptance_peaks_at_the_measured_frequencies(
-    cases: dict[str, Case],
-) -> None:
-    case = cases["frame"]
-    found = list_receptances(case)
-    step = found["hz"][1] - found["hz"][0]
-    tops = peaks(found["hz"], found["measured"][""])
-    for frequency in case.measurement.frequencies[:3]:
-        assert min(abs(top - frequency) for top in tops) <= step
-    assert "nominal model" in found["note"]
-
-
 def test_what_is_too_large_is_not_drawn(
     cases: dict[str, Case], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -222,9 +195,7 @@ class TestFiles:
         assert again.notes == []
         assert again.of("f" * 16) is None
 
-    @pytest.mark.parametrize(
-        "text", ["", "{", "[]", '{"modes": 3}', '{"modes": [], "mac": {"rows": ["x"]}}', "\0"]
-    )
+    @pytest.mark.parametrize("text", ["", '{"modes": [], "mac": {"rows": ["x"]}}', "\0"])
     def test_what_is_broken_is_left_out_and_told(self, text: str, tmp_path: Path) -> None:
         (tmp_path / FOLDER).mkdir()
         (tmp_path / FOLDER / f"{KEY}.json").write_text(text)
@@ -237,10 +208,8 @@ class TestFiles:
         ("key", "value"),
         [
             ("elements", [[0, 10_000]] * 28),
-            ("nodes", [[0.0, 0.0]] * 27),
             ("element_labels", []),
             ("joints", [{"name": "1", "node": -1}]),
-            ("sensors", []),
         ],
     )
     def test_a_drawing_that_contradicts_itself_is_left_out(
@@ -251,17 +220,16 @@ class TestFiles:
         assert exhibits.case(KEY * 4) is None
         assert len(exhibits.notes) == 1
 
-    @pytest.mark.parametrize("part", ["values", "labels"])
     def test_a_difference_that_contradicts_itself_is_left_out(
-        self, part: str, cases: dict[str, Case], tmp_path: Path
+        self, cases: dict[str, Case], tmp_path: Path
     ) -> None:
         found = shown(cases["frame"], "baruch")
-        found["difference"][part] = found["difference"][part][:-4]
+        found["difference"]["values"] = found["difference"]["values"][:-4]
         exhibits = Exhibits(tmp_path)
         exhibits.put(KEY, found)
         assert exhibits.of(KEY) is None
 
-    @pytest.mark.parametrize("key", ["../../etc/passwd", "case-../x", "", "A" * 16, "a/b"])
+    @pytest.mark.parametrize("key", ["../../etc/passwd", "case-../x", ""])
     def test_names_are_keys_and_nothing_else(self, key: str, tmp_path: Path) -> None:
         exhibits = Exhibits(tmp_path / "store")
         exhibits.put(key, {})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from femubench.core.errors import NotApplicable
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
+from femubench.core.modal.correlation import mac
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.expansion import (
     expand_by_dynamics,
@@ -61,10 +61,9 @@ def mixed(seed: int, analytical: FloatArray) -> tuple[FloatArray, FloatArray]:
     return analytical @ rotation.T, rotation
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_rotation_recovers_an_exact_mix(seed: int) -> None:
-    analytical = np.random.default_rng(seed).standard_normal((13, 4))
-    measured, rotation = mixed(seed, analytical)
+def test_rotation_recovers_an_exact_mix() -> None:
+    analytical = np.random.default_rng(0).standard_normal((13, 4))
+    measured, rotation = mixed(0, analytical)
     found = procrustes_rotation(measured, analytical)
     np.testing.assert_allclose(found, rotation, atol=1e-12)
     np.testing.assert_allclose(measured @ found, analytical, atol=1e-12)
@@ -72,9 +71,8 @@ def test_rotation_recovers_an_exact_mix(seed: int) -> None:
     assert np.linalg.norm(measured @ found.T - analytical) > 0.1
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_no_orthogonal_matrix_does_better(seed: int) -> None:
-    rng = np.random.default_rng(seed)
+def test_no_orthogonal_matrix_does_better() -> None:
+    rng = np.random.default_rng(0)
     analytical, measured = rng.standard_normal((2, 13, 3))
     best = procrustes_rotation(measured, analytical)
     np.testing.assert_allclose(best.T @ best, np.eye(3), atol=1e-13)
@@ -96,28 +94,6 @@ def test_expansion_by_rotation_returns_the_full_shapes_of_an_exact_mix(nominal: 
         nominal.observe(thirteen_points(nominal)) @ shapes, aligned, atol=1e-9
     )
     assert np.abs(np.abs(found) - np.abs(rotation)).max() < 1e-9
-
-
-def test_rotated_shapes_are_orthogonal_and_fit_better(nominal: Model, truth: Model) -> None:
-    sensors, full = at_sensors(nominal)
-    measured, _ = at_sensors(truth)
-    shapes, rotation = expand_by_rotation(measured, sensors, full)
-    assert np.abs(rotation - np.eye(3)).max() > 1e-3  # no symmetric luck
-    np.testing.assert_allclose(shapes.T @ nominal.mass @ shapes, np.eye(3), atol=1e-10)
-    aligned = same_length(measured, sensors)
-    before = np.linalg.norm(aligned - sensors)
-    after = np.linalg.norm(aligned @ rotation - sensors)
-    transposed = np.linalg.norm(aligned @ rotation.T - sensors)
-    assert after < before < transposed
-    expanded = nominal.observe(thirteen_points(nominal)) @ shapes
-    assert np.linalg.norm(expanded - aligned) == pytest.approx(after, rel=1e-9)
-
-
-def test_scale_and_sign_are_those_of_the_analytical_shapes(nominal: Model) -> None:
-    sensors, _ = at_sensors(nominal)
-    np.testing.assert_allclose(
-        same_length(sensors * [-3.0, 0.2, -7e4], sensors), sensors, rtol=1e-12
-    )
 
 
 def test_serep_is_exact_in_the_span(nominal: Model) -> None:
@@ -173,23 +149,14 @@ def test_sensors_with_a_gap_are_left_out() -> None:
         find_measured_rows(np.array([[1.0, np.nan], [np.nan, 2.0], [1.0, 1.0]]))
 
 
-def test_asymmetry_is_seen_in_every_shape(
-    ladder: FrameBuilder, asymmetric_ladder: FrameBuilder
+def test_expanded_shapes_come_nearer_to_the_truth_than_the_nominal_ones(
+    nominal: Model, truth: Model
 ) -> None:
-    """Tell that the asymmetric frame is no mirror image of itself, unlike the nominal one."""
-    mirror = [2, 1, 0, 5, 4, 3]  # A B C D E F turned end for end
-    for frame, symmetric in (
-        (ladder(accelerometer=False), True),
-        (asymmetric_ladder(accelerometer=False), False),
-    ):
-        model = Model.of(frame)
-        corners = thirteen_points(model)
-        first = replace(
-            corners, labels=corners.labels[:6], xyz=corners.xyz[:6], directions=("z",) * 6
-        )
-        shapes = model.observe(first) @ solve_modes(model).elastic.shapes[:, :5]
-        even = np.minimum(
-            np.abs(shapes - shapes[mirror]).max(axis=0), np.abs(shapes + shapes[mirror]).max(axis=0)
-        )
-        lopsided = even / np.abs(shapes).max(axis=0)
-        assert (lopsided < 1e-8).all() if symmetric else (lopsided > 1e-3).all()
+    """One half side is 4 % longer and one joint softer: no method may be lucky."""
+    sensors, full = at_sensors(nominal)
+    measured, _ = at_sensors(truth)
+    shapes, _ = expand_by_rotation(measured, sensors, full)
+    expanded = np.asarray(nominal.observe(thirteen_points(nominal)) @ shapes)
+    before, after = (np.diag(mac(measured, s)) for s in (sensors, expanded))
+    assert (after > before).sum() >= 2
+    assert after.mean() > before.mean()

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import replace
-from threading import Thread
 
 import numpy as np
 import pytest
@@ -26,7 +23,6 @@ from femubench.fem import (
     Support,
 )
 from femubench.modal import mac, rigid_modes_of
-from femubench.plugins.strategies import cma_es
 from femubench.plugins.strategies.cma_es import CmaEs
 from femubench.plugins.strategies.cross_model import CrossModel
 from femubench.plugins.strategies.eigensensitivity import Eigensensitivity
@@ -40,8 +36,6 @@ from femubench.update import (
     lasso,
     modal_space,
     parameterise,
-    physical_family,
-    tie_unknowns,
     tikhonov,
 )
 
@@ -163,43 +157,6 @@ def test_results_keep_rigid_motion_and_positive_stiffness_far_from_any_fit() -> 
         modes = solve_modes(found)
         assert modes.rigid.sum() == 6
         assert modes.elastic.eigenvalues[0] > 0.0
-
-
-def test_searches_repeat_with_the_seed_and_leave_the_random_state_alone() -> None:
-    model, measurement = planted(frame_of_five(), "m-BC", 3)
-    state = repr(np.random.get_state())  # noqa: NPY002
-    for strategy in (MultiStart(starts=2), CmaEs(evaluations=100)):
-        first = factors_of(strategy, model, measurement)
-        assert factors_of(strategy, model, measurement) == first
-    assert repr(np.random.get_state()) == state  # noqa: NPY002
-
-
-def test_a_search_in_a_worker_loads_no_plots() -> None:
-    code = """
-import os, sys
-from femubench.plugins.strategies import cma_es
-os.environ["FEMUBENCH_WORKERS"] = "some run"
-before = list(sys.meta_path)
-assert cma_es._cma().CMAEvolutionStrategy([0.0, 0.0], 1.0, {"verbose": -9}).ask()
-assert sys.meta_path == before
-print("matplotlib" in sys.modules)
-"""
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False
-    )
-    assert (done.stdout, done.stderr) == ("False\n", "")
-
-
-def test_a_package_is_hidden_from_one_thread_alone() -> None:
-    hidden, found = cma_es._Hidden("matplotlib"), []
-    for name in ("matplotlib", "matplotlib.pyplot"):
-        with pytest.raises(ImportError, match="left out"):
-            hidden.find_spec(name)
-    hidden.find_spec("matplotlib_inline")
-    other = Thread(target=lambda: found.append(hidden.find_spec("matplotlib")))  # type: ignore[func-returns-value]
-    other.start()
-    other.join()
-    assert found == [None]
 
 
 def test_slopes_are_those_of_differences_and_few_shapes_give_the_same_frequencies() -> None:
@@ -357,29 +314,3 @@ def test_groups_of_matrices_have_factors_too() -> None:
         Eigensensitivity(changes="groups").update(model, measurement, np.random.default_rng(0))
     with pytest.raises(NotApplicable, match="changes=members needs a frame of members"):
         Eigensensitivity(changes="members").update(matrices, measurement, RNG)
-
-
-@pytest.mark.parametrize("name", ["local", "bayesian", "nobari-rigid"])
-def test_older_strategies_change_the_same_sets(name: str) -> None:
-    case = femubench.cases["frame"]
-    measured = case.used_measurement()
-    strategy = femubench.strategies[name]
-    counts = {
-        word: strategy(changes=word).update(case.model, measured, None).parameter_count
-        for word in ("sections", "members", "own")
-    }
-    kinds = 2 if name == "nobari-rigid" else 1
-    assert (counts["sections"], counts["members"]) == (kinds, 7 * kinds)
-    assert counts["own"] == strategy.update(case.model, measured, None).parameter_count
-    with pytest.raises(NotApplicable, match=r"changes=sets needs `\[\[model.sets\]\]`"):
-        strategy(changes="sets").update(case.model, measured, None)
-
-
-def test_tied_elements_change_alike_and_others_not_at_all() -> None:
-    structure = Structure.build(frame_of_five())
-    family = tie_unknowns(physical_family(structure), {"two": ("m-AB/1", "m-CD/2")})
-    assert family.names == ("EIy two", "GJ two", "EA two", "EIz two")
-    change = family.change(np.array([1.0, 0.0, 0.0, 0.0]))
-    labels = np.array(structure.labels)
-    touched = np.abs(change).max(axis=(1, 2)) > 0.0
-    assert set(labels[touched]) == {"m-AB/1", "m-CD/2"}

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
-from threadpoolctl import ThreadpoolController
 
 from femubench import fem
 from femubench.core.fem.frame import (
@@ -26,13 +25,12 @@ from femubench.core.fem.frame import (
 )
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.sections import round_tube
-from femubench.core.modal import factorisation, sparse_eigen, superlu_pivots
+from femubench.core.modal import sparse_eigen, superlu_pivots
 from femubench.core.modal.eigen import dense_matrices, solve_dense
 from femubench.core.modal.factorisation import LU, Cholesky, cholmod_obstacle
 from femubench.core.modal.inertia import negative_after, signs_hold
 from femubench.core.modal.sparse_eigen import ShiftedModel, lowest_eigenpairs
 from femubench.core.modal.superlu_pivots import pivots
-from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]
 TUBE, ALUMINIUM = round_tube(0.02, 0.002), Material(70e9, 0.3, 2700.0)
@@ -79,20 +77,16 @@ def equal_beams(count: int) -> Frame:
 
 
 def structures(ladder: FrameBuilder, portal: FrameBuilder) -> Iterator[tuple[str, Model]]:
-    """Yield free, held, suspended, hinged and repeated structures of 200 to 2000 dofs."""
+    """Yield free, suspended, hinged and repeated structures of 200 to 2000 dofs."""
     frame = ladder(elements=30)
-    held = Support(Place(joint="A"), ("z", "rx", "ry"))
     soft = tuple(GroundSpring(Place(joint=j), "z", 100.0) for j in "AC")
     heavy = (PointMass(Place(joint="A"), 200.0),)
     hinge = (JointSpring("J1", "m0", {"rx": 3e3, "ry": 2e3, "rz": 1e3}, 0.02),)
     yield "free ladder", Model.of(frame)
-    yield "held ladder", Model.of(replace(frame, supports=(held,)))
     yield "suspended ladder", Model.of(replace(frame, springs=soft))
     yield "ladder with a heavy mass", Model.of(replace(frame, masses=heavy))
     yield "portal with springs", Model.of(portal(1, joint_springs=hinge))
-    yield "grid", Model.of(lattice((9, 8, 1), 3))
     yield "lattice", Model.of(lattice((4, 4, 4)))
-    yield "long lattice", Model.of(lattice((16, 2, 2)))
     yield "equal beams", Model.of(equal_beams(4))
 
 
@@ -159,7 +153,7 @@ def test_no_mode_of_a_cluster_is_missed() -> None:
 
 
 @pytest.mark.usefixtures("back_end")
-@pytest.mark.parametrize("about", [1, 8, 60])
+@pytest.mark.parametrize("about", [1, 60])
 def test_the_count_is_right_close_to_eigenvalues(portal: FrameBuilder, about: int) -> None:
     model = Model.of(portal(1))
     plain, _ = solve_dense(*dense_matrices(model))
@@ -208,7 +202,7 @@ def vanishing_pivots(seed: int) -> tuple[Model, float]:
     return fem.matrix_model(sp.eye_array(n), stiffness, range(n), ["x"] * n), 1.0
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_signs_of_grown_pivots_are_not_believed(
     seed: int, back_end: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -270,67 +264,6 @@ def test_pivots_of_another_layout_are_copied(monkeypatch: pytest.MonkeyPatch) ->
             assert superlu_pivots._supernodes(factor) is None
             np.testing.assert_array_equal(pivots(factor), factor.U.diagonal())
     assert superlu_pivots._supernodes(factor) is not None
-
-
-def test_threads_of_numpy_are_as_they_were_after_cholmod(
-    ladder: FrameBuilder, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    use(monkeypatch, "CHOLMOD")
-    model = Model.of(ladder(elements=30))
-    pools = ThreadpoolController().select(user_api="blas")
-    with pools.limit(limits=2):
-        own, seen = pools.lib_controllers[0], []
-        own.set_num_threads(1)
-        before = [pool.num_threads for pool in pools.lib_controllers]
-        solve = Cholesky.solve.__wrapped__  # type: ignore[attr-defined]
-
-        def watched(factor: Cholesky, right: FloatArray) -> FloatArray:
-            seen.append({pool.num_threads for pool in pools.lib_controllers})
-            return np.asarray(solve(factor, right))
-
-        monkeypatch.setattr(Cholesky, "solve", factorisation._threads_of_numpy()(watched))
-        cholmod_obstacle.cache_clear()
-        lowest_eigenpairs(model, 12)
-        assert [pool.num_threads for pool in pools.lib_controllers] == before
-    assert set(before) == {1, 2}
-    assert seen
-    assert all(threads == {1} for threads in seen)
-
-
-@pytest.mark.parametrize(
-    ("path", "slow"),
-    [
-        ("/usr/lib/x86_64-linux-gnu/blas/libblas.so.3.11.0", True),
-        ("/opt/lib/librefblas.so", True),
-        ("/usr/lib/x86_64-linux-gnu/openblas-pthread/libblas.so.3", False),
-        ("/opt/conda/lib/libopenblasp-r0.3.21.so", False),
-        ("/opt/intel/mkl/lib/libblas.so", False),
-        ("/usr/lib/x86_64-linux-gnu/libcholmod.so.3", False),
-    ],
-)
-def test_reference_blas_is_told_by_its_file(
-    path: str, slow: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pytest.importorskip("sksparse")
-    monkeypatch.setattr(factorisation, "_loaded_libraries", lambda: ["/usr/lib/libc.so.6", path])
-    cholmod_obstacle.cache_clear()
-    try:
-        stated = factorisation.solver_note()
-        assert bool(stated) == slow
-        assert (path in factorisation.solver_name()) == slow
-    finally:
-        cholmod_obstacle.cache_clear()
-
-
-def test_smooth_fields_are_no_softer_than_the_first_mode(ladder: FrameBuilder) -> None:
-    for frame in (ladder(elements=8), lattice((3, 3, 3), 1), equal_beams(2)):
-        model = Model.of(frame)
-        rigid = sparse_eigen.rigid_modes_of(model)
-        bound = sparse_eigen.softest_smooth_field(model, rigid, model.mass_times(rigid))
-        eigenvalues, _ = solve_dense(*dense_matrices(model))
-        first = eigenvalues[rigid.shape[1]]
-        assert bound is not None
-        assert 0.999 * first < bound < 1e4 * first
 
 
 def test_bending_alone_is_a_smooth_field() -> None:

@@ -12,11 +12,9 @@ from scipy.optimize import brentq
 from femubench.core.errors import ModelError
 from femubench.core.fem.beam import (
     BeamProperties,
-    coupling_matrices,
     eccentric_mass_parts,
     mass_matrices,
     shape_functions,
-    stiffness_matrices,
 )
 from femubench.core.fem.frame import (
     Brace,
@@ -24,9 +22,7 @@ from femubench.core.fem.frame import (
     Eccentricity,
     Factor,
     Frame,
-    GroundSpring,
     Joint,
-    JointSpring,
     Material,
     Member,
     Oscillator,
@@ -92,8 +88,9 @@ def edited(frame: Frame, *, material: Any = None, section: Any = None) -> Frame:
 
 
 class TestFactors:
-    @pytest.mark.parametrize("plane", ["in-plane", "out-of-plane", "3d"])
-    @pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
+    @pytest.mark.parametrize(
+        ("plane", "theory"), [("in-plane", "timoshenko"), ("3d", "euler-bernoulli")]
+    )
     def test_factors_are_edited_materials_and_sections(self, plane: str, theory: Any) -> None:
         plain = replace(beam(plane, 3), beam=theory)
         stiff = replace(plain, factors=(Factor("E", ("all",), 0.7),))
@@ -118,15 +115,6 @@ class TestFactors:
             for one, two in zip(given.matrices(), wanted.matrices(), strict=True):
                 assert abs(one - two).max() < 1e-13 * abs(two).max()
 
-    def test_updating_starts_from_the_factors(self) -> None:
-        frame = beam("3d", 4, factors=(Factor("E", ("m/2",), 0.5),))
-        parameter = Property("E", "E", ("m/2",))
-        updated = Structure.build(frame).with_values([parameter], [2.0])
-        plain = Structure.build(beam("3d", 4))
-        assert abs(updated.matrices()[1] - plain.matrices()[1]).max() < 1e-3
-        again = updated.rebuilt(replace(frame, masses=(PointMass(MIDDLE, 0.1),)))
-        assert pytest.approx(plain.properties.EA, rel=1e-15) == again.properties.EA
-
     @pytest.mark.parametrize(
         ("factor", "words"),
         [
@@ -143,7 +131,7 @@ class TestFactors:
         with pytest.raises(ModelError, match=words):
             Structure.build(beam("3d", 4, factors=(factor,)))
 
-    @pytest.mark.parametrize("plane", ["in-plane", "out-of-plane", "3d"])
+    @pytest.mark.parametrize("plane", ["in-plane", "3d"])
     def test_a_multiple_of_the_rotary_inertia_is_a_factor_on_it(self, plane: str) -> None:
         plain = replace(beam(plane, 3), beam="timoshenko")
         more = replace(plain, rotary_inertia=1.4)
@@ -167,8 +155,7 @@ def properties(**changes: float) -> BeamProperties:
 
 
 class TestEccentricMass:
-    @pytest.mark.parametrize("shape", [0.0, 0.4, 1.0])
-    @pytest.mark.parametrize("rigid", [0.0, 0.06])
+    @pytest.mark.parametrize(("shape", "rigid"), [(0.0, 0.0), (0.4, 0.06)])
     def test_it_is_the_inertia_of_the_line_of_mass_centres(
         self, shape: float, rigid: float
     ) -> None:
@@ -192,49 +179,6 @@ class TestEccentricMass:
         total = y * parts["y"] + z * parts["z"] + y * y * parts["yy"] + z * z * parts["zz"]
         assert total + y * z * parts["yz"] == pytest.approx(change, abs=1e-15)
 
-    def test_complex_steps_go_through(self) -> None:
-        p = properties(shear_shape=1.0, ecc_y=0.02, ecc_z=-0.03)
-        for name in ("rhoA", "ecc_y", "ecc_z", "EIy", "rigid_mass_1"):
-            value = getattr(p, name)
-            slope = mass_matrices(replace(p, **{name: value + 1e-30j})).imag / 1e-30
-            step = 1e-6 * max(1.0, float(value[0]))
-            ends = [mass_matrices(replace(p, **{name: value + s})) for s in (-step, step)]
-            numeric = (ends[1] - ends[0]) / (2.0 * step)
-            assert np.abs(slope - numeric).max() <= 1e-6 * np.abs(slope).max() + 1e-9
-
-    @pytest.mark.parametrize(
-        ("plane", "offset", "fixed"),
-        [
-            ("out-of-plane", (0.0, 0.03, 0.0), ("z", "rx", "ry")),
-            ("in-plane", (0.0, 0.0, 0.03), ("x", "z", "ry")),
-            ("3d", (0.0, 0.03, -0.02), ("x", "y", "z", "rx", "ry", "rz")),
-        ],
-    )
-    def test_many_offset_masses_converge_to_it(
-        self, plane: str, offset: Any, fixed: tuple[str, ...]
-    ) -> None:
-        supports = (Support(Place(joint="A"), fixed),)
-        section = replace(SECTION, Jp=1e-12)
-        place = Eccentricity("m", offset[1], offset[2])
-        exact = frequencies(beam(plane, 100, supports, section=section, eccentricities=(place,)), 5)
-
-        def lumped(count: int) -> FloatArray:
-            stations = (np.arange(count) + 0.5) / count
-            masses = tuple(
-                PointMass(Place(member="m", s=float(s)), RHO_A * LENGTH / count, offset)
-                for s in stations
-            )
-            light = replace(STEEL, rho=STEEL.rho * 1e-8)
-            return frequencies(
-                beam(plane, 1, supports, section=section, material=light, masses=masses), 5
-            )
-
-        errors = [np.abs(lumped(count) / exact - 1.0) for count in (16, 32)]
-        assert errors[1].max() < 4e-3
-        assert errors[0].max() / errors[1].max() == pytest.approx(4.0, rel=0.15)
-        centred = frequencies(beam(plane, 100, supports, section=section), 5)
-        assert np.abs(exact / centred - 1.0).max() > 5e-3
-
     def test_the_mass_stays_and_the_moment_of_inertia_grows_by_steiner(self) -> None:
         frame = beam("3d", 3, eccentricities=(Eccentricity("m", 0.02, 0.01),))
         model = Model.of(frame)
@@ -247,12 +191,6 @@ class TestEccentricMass:
         assert inertia[1, 1] == pytest.approx(steiner * LENGTH, rel=1e-12)
         assert inertia[0, 1] == pytest.approx(-0.01 * RHO_A * LENGTH, rel=1e-12)
 
-    def test_an_offset_that_the_plane_does_not_see_changes_nothing(self) -> None:
-        shifted = (Eccentricity("m", z=0.01),)
-        same(beam("out-of-plane", 2, eccentricities=shifted), beam("out-of-plane", 2))
-        shifted = (Eccentricity("m", y=0.01),)
-        same(beam("in-plane", 2, eccentricities=shifted), beam("in-plane", 2))
-
 
 class TestCoupling:
     def tip(self, coefficient: float, elements: int) -> dict[str, float]:
@@ -264,7 +202,7 @@ class TestCoupling:
         motion = np.linalg.solve(model.stiffness.toarray(), force)
         return {d: float(motion[i]) for d, i in tip.items()}
 
-    @pytest.mark.parametrize("c", [-0.6, 0.2, 0.9])
+    @pytest.mark.parametrize("c", [-0.6, 0.9])
     def test_a_tip_force_twists_a_cantilever(self, c: float) -> None:
         """By hand: no torque, so that t = -c sqrt(EI/GJ) k and EI (1 - c^2) k = moment."""
         twist = c * LENGTH**2 / (2.0 * np.sqrt(EI * GJ) * (1.0 - c**2))
@@ -276,23 +214,13 @@ class TestCoupling:
         assert errors[0] == pytest.approx(c**2 / 4.0, rel=1e-9)
         assert errors[1] / errors[2] == pytest.approx(4.0, rel=1e-6)
 
-    def test_it_follows_the_rigidities(self) -> None:
-        frame = beam("3d", 3, couplings=(Coupling("m", 0.4),))
-        places = ("m/1", "m/2", "m/3")
-        structure = Structure.build(frame)
-        stiffer = structure.with_values([Property("E", "E", places)], [1.7]).matrices()[1]
-        assert abs(stiffer - 1.7 * structure.matrices()[1]).max() < 1e-13 * abs(stiffer).max()
-        p = properties(coupling=0.4)
-        change = stiffness_matrices(p) - stiffness_matrices(replace(p, coupling=np.zeros(2)))
-        assert change == pytest.approx(0.4 * coupling_matrices(p), abs=1e-6)
-
     @pytest.mark.parametrize("c", [-0.99, 0.99])
     def test_a_free_beam_keeps_six_rigid_modes_and_a_positive_energy(self, c: float) -> None:
         modes = solve_modes(Model.of(beam("3d", 4, couplings=(Coupling("m", c),))))
         assert list(np.flatnonzero(modes.rigid)) == list(range(6))
         assert (modes.eigenvalues[6:] > 0.0).all()
 
-    @pytest.mark.parametrize("quantity", ["E", "EI", "GJ", "rhoA", "density"])
+    @pytest.mark.parametrize("quantity", ["EI", "GJ", "rhoA"])
     def test_sensitivities_know_of_coupling_and_eccentricity(self, quantity: str) -> None:
         extra = {
             "couplings": (Coupling("m", 0.3),),
@@ -383,8 +311,9 @@ def tuned(mass: float, frequency: float) -> FloatArray:
 
 
 class TestOscillators:
-    @pytest.mark.parametrize(("share", "tuning"), [(0.05, 1.0), (0.3, 0.6), (0.02, 2.2)])
-    @pytest.mark.parametrize("elements", [19, 20])
+    @pytest.mark.parametrize(
+        ("share", "tuning", "elements"), [(0.05, 1.0, 20), (0.3, 0.6, 19), (0.02, 2.2, 20)]
+    )
     def test_a_tuned_mass_has_the_exact_frequencies(
         self, share: float, tuning: float, elements: int
     ) -> None:
@@ -399,76 +328,12 @@ class TestOscillators:
         hung_too = Model.of(beam("in-plane", 20, PINS, oscillators=hung))
         assert hung_too.size == count + 1
 
-    def test_two_masses_on_a_rigid_bar(self) -> None:
-        """By hand: a body on a ground spring with two oscillators on it, all in z."""
-        body, m, f, k = 4.0, (0.3, 0.5), (9.0, 14.0), 2e4
-        stiff = Material(1e14, 0.3, 1e-3)
-        place = Place(joint="A")
-        supports = (Support(place, ("x", "ry")),)
-        frame = beam(
-            "in-plane",
-            1,
-            supports,
-            material=stiff,
-            masses=(PointMass(place, body),),
-            springs=(GroundSpring(place, "z", k),),
-            oscillators=tuple(Oscillator(place, "z", *pair) for pair in zip(m, f, strict=True)),
-        )
-        springs = [a * (2 * np.pi * b) ** 2 for a, b in zip(m, f, strict=True)]
-        stiffness = np.diag([k + sum(springs), *springs])
-        stiffness[0, 1:] = stiffness[1:, 0] = [-s for s in springs]
-        root = np.sqrt([body, *m])
-        exact = np.linalg.eigvalsh(stiffness / np.outer(root, root))
-        found = solve_modes(Model.of(frame)).eigenvalues[:3]
-        assert found == pytest.approx(exact, rel=1e-5)
-
-    def test_it_rides_rigidly_in_the_other_directions(self) -> None:
-        fixed = (Support(Place(joint="A"), ("x", "y", "z", "rx", "ry", "rz")),)
-        tip = Place(joint="B")
-        soft = beam("3d", 4, fixed, oscillators=(Oscillator(tip, "y", 0.7, 0.01),))
-        found = frequencies(soft)
-        assert found[0] == pytest.approx(0.01, rel=1e-4)
-        # What moves in x and z does not know that the mass is loose in y.
-        across = (Support(Place(joint="A"), ("x", "z", "ry")),)
-        planar = frequencies(beam("in-plane", 4, across, masses=(PointMass(tip, 0.7),)), 6)
-        nearest = [np.abs(found / frequency - 1.0).min() for frequency in planar]
-        assert max(nearest) < 1e-9
-
-    @pytest.mark.parametrize("plane", ["in-plane", "out-of-plane", "3d"])
+    @pytest.mark.parametrize("plane", ["out-of-plane", "3d"])
     def test_a_stiff_one_is_a_mass(self, plane: str) -> None:
         place = Place(member="m", s=0.37)
         hung = beam(plane, 4, oscillators=(Oscillator(place, "z", 0.5, 3e5),))
         lumped = beam(plane, 4, masses=(PointMass(place, 0.5),))
         assert frequencies(hung, 4) == pytest.approx(frequencies(lumped, 4), rel=1e-5)
-
-    def test_free_frames_keep_their_rigid_modes(self, fitted_portal: Any, ladder: Any) -> None:
-        hung = (
-            Oscillator(Place(joint="A"), "z", 0.1, 90.0),
-            Oscillator(Place(joint="A"), "z", 0.2, 40.0),
-            Oscillator(Place(member="BE", s=0.3), "z", 0.1, 300.0),
-        )
-        modes = solve_modes(Model.of(replace(ladder(), oscillators=hung)))
-        assert list(np.flatnonzero(modes.rigid)) == [0, 1, 2]
-        plain = Structure.build(ladder())
-        assert len(modes) == plain.kinematics.transform.shape[1] + 3 + 3  # a split adds a node
-        for direction in "xyz":
-            places = (Place(joint="J1"), Place(member="m2", s=0.6), Place(member="m1", s=0.005))
-            many = tuple(Oscillator(place, direction, 0.2, 30.0) for place in places)
-            spatial = solve_modes(Model.of(replace(fitted_portal(1), oscillators=many)))
-            assert list(np.flatnonzero(spatial.rigid)) == list(range(6))
-            largest = np.abs(spatial.eigenvalues[:6]).max()
-            assert largest < 1e-8 * spatial.eigenvalues[6]
-
-    def test_they_may_hang_where_nothing_can_be_split(self, ladder: Any) -> None:
-        arm = JointSpring("B", "BE", {"rx": 1e3, "ry": 1e3}, 0.01)
-        for s in (0.01, 1.0 / 4 + 1e-6):
-            place = Place(member="BE", s=s)
-            frame = replace(ladder(accelerometer=False), joint_springs=(arm,))
-            nodes = len(Structure.build(frame).mesh.xyz)
-            hung = replace(frame, oscillators=(Oscillator(place, "z", 0.1, 1e5),))
-            lumped = replace(frame, masses=(PointMass(place, 0.1),))
-            assert len(Structure.build(hung).mesh.xyz) == nodes + 1
-            assert frequencies(hung, 5) == pytest.approx(frequencies(lumped, 5), rel=1e-4)
 
     def test_attachments_find_the_dofs_again(self, ladder: Any) -> None:
         hung = (Oscillator(Place(member="AB", s=0.4), "z", 0.1, 90.0),)

@@ -26,8 +26,7 @@ POINTS = Sensors(
 FREQUENCIES = np.array([20.0, 150.0, 255.0, 400.0, 580.0, 1000.0, 3000.0])
 
 
-@pytest.mark.parametrize("held", [False, True])
-@pytest.mark.parametrize("damping", [0.0, 0.01, "each"])
+@pytest.mark.parametrize(("held", "damping"), [(True, 0.0), (False, "each")])
 def test_receptance_is_the_inverse_dynamic_stiffness(
     ladder: FrameBuilder, held: bool, damping: float | str
 ) -> None:
@@ -51,16 +50,6 @@ def test_receptance_is_the_inverse_dynamic_stiffness(
         np.testing.assert_allclose(
             found[f], expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max()
         )
-
-
-def test_a_held_structure_tends_to_its_static_flexibility(ladder: FrameBuilder) -> None:
-    frame = replace(ladder(), supports=(Support(Place(joint="A"), ("z", "rx", "ry")),))
-    model = Model.of(frame)
-    rows = model.observe(POINTS)
-    static = rows @ np.linalg.solve(model.stiffness.toarray(), rows.toarray().T)
-    found = receptance(solve_modes(model), rows, rows, np.array([0.0]), 0.02)[0]
-    np.testing.assert_allclose(found.real, static, rtol=1e-7, atol=1e-9 * np.abs(static).max())
-    assert np.abs(found.imag).max() == 0.0
 
 
 def test_a_free_structure_tends_to_a_rigid_body(ladder: FrameBuilder) -> None:
@@ -97,12 +86,3 @@ def test_missing_damping_counts_as_none(ladder: FrameBuilder) -> None:
     some = np.full(len(modes), np.nan)
     found = receptance(modes, rows, rows, FREQUENCIES, some)
     np.testing.assert_array_equal(found, receptance(modes, rows, rows, FREQUENCIES))
-
-
-def test_the_peak_has_the_height_that_damping_gives_it(ladder: FrameBuilder) -> None:
-    model = Model.of(ladder())
-    modes, rows = solve_modes(model), model.observe(POINTS)[:1]
-    frequency = modes.natural_frequencies[3]
-    found = receptance(modes, rows, rows, np.array([frequency]), 1e-4)[0, 0, 0]
-    reading = float((rows @ modes.shapes[:, 3])[0])
-    assert abs(found) == pytest.approx(reading**2 / (2e-4 * modes.eigenvalues[3]), rel=1e-3)

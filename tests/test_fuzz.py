@@ -26,7 +26,7 @@ from femubench.core.run.upkeep import read_old_records
 from femubench.core.schema.records import read_run, result_to_json, run_from_json
 from femubench.results import Run
 
-FEW, MANY = 0.012, 1.0  # share of the inputs in the tests of every day
+FEW, MANY = 0.006, 1.0  # share of the inputs in the tests of every day
 INPUTS = {
     **{"toml": 24_000, "csv": 20_000, "mtx": 16_000, "universal": 14_000},
     **{"run": 8_000, "store": 6_000},

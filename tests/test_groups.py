@@ -119,19 +119,6 @@ def test_strategies_find_the_factors_of_groups(strategy: femubench.Strategy) -> 
         np.testing.assert_allclose(part.toarray(), found[name] * MODEL.groups[name].toarray())
 
 
-def test_groups_and_sets_of_a_frame_go_the_same_way() -> None:
-    data = measured(changed({"left": 0.8, "right": 1.1}), 4)
-    groups = {name: MODEL.groups[name] for name in ("left", "right")}
-    bare = replace(MODEL, groups=groups, mass_groups={})
-    for strategy in (Global, Bayesian, Eigensensitivity):
-        pair = (
-            strategy(changes=word).update(model, data, RNG)
-            for word, model in (("sets", Model.of(beam())), ("groups", bare))
-        )
-        one, other = ([p.after for p in result.parameters[:2]] for result in pair)
-        assert one == pytest.approx(other, rel=1e-6)
-
-
 def test_the_whole_stiffness_always_has_a_factor() -> None:
     bare = replace(MODEL, groups={}, mass_groups={})
     stiffer = measured(with_group_factors(bare, [Property("K", "E", ("all",))], [1.21]), 3)
@@ -287,15 +274,6 @@ def grouped_alone(model: Model) -> Model:
     dofs = Dofs(node.astype(np.int64), model.dofs.direction, model.dofs.xyz)
     words = tuple(names[n] if n < len(names) else f"n{n}" for n in used)
     return Model(model.mass, model.stiffness, dofs, MatrixGeometry(words, dofs))
-
-
-def test_sets_of_nodes_face_one_by_one() -> None:
-    frame = parted()
-    model = Model.of(frame)
-    effect = InterfaceSpring()
-    extended = effect.extend(model, "A+B-C+D:z", [2e3])
-    braces = extended.frame_structure.frame.braces
-    assert [(b.ends, b.direction) for b in braces] == [(("A", "C"), "z"), (("B", "D"), "z")]
 
 
 def test_a_factor_never_reaches_zero() -> None:

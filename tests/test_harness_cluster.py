@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 import re
 import signal
 import subprocess
@@ -126,22 +125,6 @@ def test_jobs_end_as_they_end_here(two: DaskWorkers) -> None:
         run_jobs(cases, strategies, timeout=1.0, jobs=2, executor=place) for place in (two, None)
     )
     assert stable(there.results) == stable(here.results)
-
-
-def test_a_case_goes_to_the_cluster_once_though_seeds_take_turns(
-    two: DaskWorkers, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    sent, submit = [], two._client.submit
-
-    def counted(function: Any, *words: Any, **options: Any) -> Any:
-        sent.append(function)
-        return submit(function, *words, **options)
-
-    monkeypatch.setattr(two._client, "submit", counted)
-    cases = [toys.tiny_case(), toys.tiny_case("other", 80.0e9)]
-    run = run_jobs(cases, [toys.Unchanged()], seeds=(1, 2), executor=two)
-    assert len(run.results) == 4
-    assert sent.count(pickle.loads) == 2
 
 
 def test_a_worker_that_is_not_like_this_machine_is_told_in_one_line(

@@ -127,15 +127,12 @@ def test_where_there_is_none_a_run_says_so_once(
     assert kept["meta"]["sandbox_reason"] == "this machine has none"
 
 
-@pytest.mark.parametrize("verb", ["run", "study"])
 def test_one_that_is_required_and_missing_is_wrong_input(
-    nowhere: None, verb: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    nowhere: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    study = '[axes]\ncases = ["frame"]\n[[strategies]]\nname = "unchanged"\n'
-    Path("study.toml").write_text(study)
-    given = ["frame", "-s", "unchanged"] if verb == "run" else ["study.toml"]
-    done = CliRunner().invoke(bench, [verb, *given, "--sandbox", "require"])
+    words = ["run", "frame", "-s", "unchanged", "--sandbox", "require"]
+    done = CliRunner().invoke(bench, words)
     assert (done.exit_code, done.stdout) == (2, "")
     assert done.stderr.count("\n") == 1
     assert "no sandbox: this machine has none" in done.stderr

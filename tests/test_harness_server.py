@@ -73,10 +73,6 @@ def test_a_server_that_starts_does_not_hear_ctrl_c() -> None:
     assert int(mask.split()[1], 16) == 0
 
 
-def test_whoever_imports_what_the_server_loads_hears_ctrl_c() -> None:
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
 def test_children_have_one_thread_and_their_parent_keeps_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

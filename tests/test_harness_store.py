@@ -9,7 +9,6 @@ import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +16,7 @@ import numpy as np
 import pytest
 
 from femubench.core.errors import InputError
-from femubench.core.run.frames import modes_frame, results_frame, run_from_json, run_to_json
-from femubench.core.run.provenance import git_commit, new_run_id, versions
+from femubench.core.run.frames import modes_frame, run_from_json, run_to_json
 from femubench.core.run.store import Store
 from femubench.core.run.upkeep import convert_old_files, find_store_faults
 from femubench.core.schema.paired_modes import PairedMode
@@ -108,7 +106,7 @@ def test_the_latest_run_is_the_default_and_others_go_by_id(tmp_path: Path) -> No
         store.load("x")
 
 
-@pytest.mark.parametrize("status", ["timeout", "failed", "crashed", "diverged"])
+@pytest.mark.parametrize("status", ["timeout", "diverged"])
 def test_a_later_failure_takes_no_result_away_and_a_later_result_counts(
     tmp_path: Path, status: Status
 ) -> None:
@@ -124,15 +122,6 @@ def test_a_later_failure_takes_no_result_away_and_a_later_result_counts(
     first, second, *rest = seen
     assert (first, second) == ((status, 0.0), (status, 1.0))
     assert rest == [("ok", 2.0), ("ok", 2.0), ("not-applicable", 4.0), ("not-applicable", 4.0)]
-
-
-def test_an_unfinished_run_is_loaded_as_far_as_it_went(tmp_path: Path) -> None:
-    store = Store(tmp_path)
-    store.begin(META)
-    store.append(META["run"], GOOD)
-    run = store.load()
-    assert run.meta["finished"] is None
-    assert [item.strategy for item in run.results] == ["softer"]
 
 
 def test_a_file_that_was_cut_short_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
@@ -180,9 +169,9 @@ store.end(META["run"], {"finished": "2026-01-01T00:00:09+00:00", "interrupted": 
 """
 
 
-@pytest.mark.parametrize("size", [9_000, 20_000, 60_123])
-def test_a_record_that_does_not_fit_on_the_disk_leaves_no_trace(size: int, tmp_path: Path) -> None:
+def test_a_record_that_does_not_fit_on_the_disk_leaves_no_trace(tmp_path: Path) -> None:
     """Files may have so many bytes and no more, as on a full disk; then there is room again."""
+    size = 60_123
     store = Store(tmp_path)
     store.begin(META)
     store.append(META["run"], GOOD)
@@ -289,12 +278,6 @@ def test_a_run_id_that_is_no_file_name_is_refused(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_empty_folder_has_no_runs(tmp_path: Path) -> None:
-    assert Store(tmp_path).runs() == ()
-    with pytest.raises(InputError, match="no results"):
-        Store(tmp_path).load()
-
-
 def test_many_writers_do_not_mix_their_records(tmp_path: Path) -> None:
     store = Store(tmp_path)
     store.begin(META)
@@ -348,16 +331,6 @@ def test_wrong_json_is_refused_with_its_place(change: dict[str, Any], key: str) 
         run_from_json({"results": []})
 
 
-def test_one_row_a_job() -> None:
-    frame = results_frame(Run(META, rank_results([GOOD, BAD], with_models())))
-    assert frame["strategy"].tolist() == ["softer", "failing"]
-    assert frame["used_percent"].tolist()[0] == 3.0
-    assert np.isnan(frame["used_percent"].tolist()[1])
-    assert frame["rank"].tolist() == [1, 1]  # both leave the user with the model that was given
-    assert frame["unphysical"].tolist() == [True, False]
-    assert len(results_frame(Run({}, ()))) == 0
-
-
 def test_one_row_a_mode() -> None:
     frame = modes_frame(Run(META, (GOOD, BAD)))
     assert frame["block"].tolist() == ["used", "used", "modified"]
@@ -366,24 +339,3 @@ def test_one_row_a_mode() -> None:
     assert frame["counted_percent"].tolist() == pytest.approx([3.0, 100.0, 100.0])
     assert frame["modification"].tolist()[2] == "mass at C"
     assert len(modes_frame(Run({}, ()))) == 0
-
-
-def test_run_ids_sort_by_time_and_differ() -> None:
-    early, late = (
-        datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC),
-        datetime(2026, 1, 2, 3, 4, 6, tzinfo=UTC),
-    )
-    assert re.fullmatch(r"20260102T030405Z-[0-9a-f]{6}", new_run_id(early))
-    assert new_run_id(early) < new_run_id(late)
-    assert len({new_run_id(early) for _ in range(20)}) == 20
-
-
-def test_versions_and_commit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert versions()["numpy"] == np.__version__
-    assert versions()["python"] == ".".join(map(str, sys.version_info[:3]))
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
-    assert git_commit() is None
-    monkeypatch.setenv("PATH", str(tmp_path))
-    assert git_commit() is None
-    assert Path.cwd() == tmp_path

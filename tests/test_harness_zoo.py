@@ -70,7 +70,6 @@ def targets(stack: ExitStack) -> dict[str, Any]:
         "home": str(Path.home()),
         "folder": str(Path.cwd()),
         "process": os.getpid(),
-        "host": os.uname().nodename,
         "word": WORD,
     }
 

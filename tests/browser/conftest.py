@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import shutil
 from collections.abc import Callable, Iterator
@@ -104,16 +105,21 @@ def command() -> Callable[..., str]:
 
 @pytest.fixture(scope="session")
 def real(tmp_path_factory: pytest.TempPathFactory) -> Real:
-    """Run some strategies, of which one fails and two are unphysical, and report."""
-    folder = tmp_path_factory.mktemp("real")
-    store, json_file = folder / "store", folder / "run.json"
-    wanted = [word for name in STRATEGIES for word in ("-s", name)]
-    # As the papers start; test_board.py has a run from both nominal models.
-    start = ("--nominal", "drawn", "-q", "--store", store)
-    call("run", *CASES, *wanted, *start, "--json", json_file)
-    run, page = with_a_failure(read_run(json_file)), folder / "run.html"
-    report(run, json_file)
-    report(run, page, store=store)
+    """Run some strategies, of which one fails and two are unphysical, and report; once for all."""
+    shared = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        shared = shared.parent
+    store, json_file, page = (shared / name for name in ("real-store", "real.json", "real.html"))
+    with (shared / "real.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not page.exists():
+            wanted = [word for name in STRATEGIES for word in ("-s", name)]
+            # As the papers start; test_board.py has a run from both nominal models.
+            start = ("--nominal", "drawn", "-q", "--store", store)
+            call("run", *CASES, *wanted, *start, "--json", json_file)
+            run = with_a_failure(read_run(json_file))
+            report(run, json_file)
+            report(run, page, store=store)
     return Real(read_run(json_file), json_file, page, store)
 
 

@@ -4,29 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from msgspec import structs
 from playwright.sync_api import Page
 from synthetic_run import synthetic_run
 
-from femubench import report
 from femubench.core.schema.records import read_run
-from femubench.reports.page import data as page_data_module
 from femubench.reports.summary import finding
-from femubench.results import (
-    JobResult,
-    Run,
-    leaderboard,
-    list_rows,
-    predictive,
-    rank_results,
-    run_to_json,
-    structures_of,
-)
+from femubench.results import Run, leaderboard, list_rows, rank_results, run_to_json
 
 ROUNDED = {"seconds": 1e-3}  # figures that the page holds with fewer digits
 KEYS = (
@@ -47,10 +34,7 @@ def page(view: Callable[..., Any], real: Any) -> Iterator[Page]:
 
 
 def part(
-    run: Run,
-    *,
-    cases: Collection[str] | None = None,
-    strategies: Collection[str] | None = None,
+    run: Run, *, cases: Collection[str] | None = None, strategies: Collection[str] | None = None
 ) -> Run:
     """Return the run as if there were nothing but these."""
 
@@ -135,85 +119,6 @@ def test_the_headline_and_the_lines_below_are_made_from_the_figures(page: Page, 
     assert "openblas" not in page.locator("header").inner_text()
 
 
-def test_who_leads_is_seen_without_scrolling(page: Page) -> None:
-    for node in (page.locator("h1"), page.locator("p.finding"), page.locator(".plot").first):
-        box = node.bounding_box()
-        assert box is not None
-        assert box["y"] + box["height"] <= 900
-    chart = page.locator("figure.chart").first.text_content() or ""
-    for words in ("Gain of every strategy on unseen data", "unchanged", "without data"):
-        assert words in chart
-
-
-def test_the_charts_of_the_page_have_units(page: Page) -> None:
-    for chart in page.locator("figure.chart").all():
-        axes = chart.locator("svg.canvas").last.text_content() or ""
-        title = chart.locator("strong").first.inner_text()
-        assert any(unit in axes for unit in ("(1)", ", 1", ", s,", "%", "rank")), title
-
-
-def test_calibration_is_that_of_the_results(view: Callable[..., Any], tmp_path: Path) -> None:
-    """The share of unseen modes inside stated intervals, level by level."""
-    run, levels = stated_run(), (0.1, 0.5, 0.9, 0.95)
-    file = tmp_path / "stated.html"
-    report(run, file)
-    page = view(file).page
-    page.wait_for_selector("html[data-ready=yes]")
-    assert "Are stated uncertainties true?" in page.locator("#board").inner_text()
-    for name in run.meta["strategies"]:
-        results = [result for result in run.results if result.strategy == name]
-        found = predictive.Forecasts.of(results, structures_of(run))
-        ours = page.evaluate(
-            """([name, levels]) => {
-              const row = bench.board.rows().find((row) => row.strategy === name);
-              return levels.map((level) => bench.ranking.covered(row, level));
-            }""",
-            [name, levels],
-        )
-        assert ours == pytest.approx([found.coverage(level) for level in levels])
-    assert len({*ours}) > 2
-
-
-def test_who_was_not_applicable_stands_where_the_run_says(
-    view: Callable[..., Any], real: Any, tmp_path: Path
-) -> None:
-    def spared(result: JobResult) -> JobResult:
-        if (result.case, result.strategy) != ("frame", "local"):
-            return result
-        return replace(result, status="not-applicable", blocks={})
-
-    listed = rank_results(map(spared, real.run.results), real.run.meta)
-    run, file = Run(real.run.meta, listed), tmp_path / "spared.html"
-    report(run, file)
-    page = view(file).page
-    page.wait_for_selector("html[data-ready=yes]")
-    assert_shows(page, run)
-    tick(page, "scenarios", "hframe", "frame-solid")
-    assert_shows(page, part(run, cases={"frame"}))
-    rows = shown(page)
-    assert rows["local"]["gain"] == pytest.approx(rows["unchanged"]["gain"], abs=1e-9)
-
-
-def stated_run() -> Run:
-    """Return a run whose unseen modes have a standard deviation of 1 % of their frequency."""
-    run = synthetic_run(3, 7, failing=0.0)
-
-    def stated(result: JobResult) -> JobResult:
-        blocks = {
-            name: replace(
-                block,
-                modes=tuple(
-                    structs.replace(mode, predicted_std_hz=0.01 * mode.measured_hz)
-                    for mode in block.modes
-                ),
-            )
-            for name, block in result.blocks.items()
-        }
-        return replace(result, blocks=blocks)
-
-    return Run(run.meta, tuple(map(stated, run.results)))
-
-
 @pytest.mark.parametrize(("form", "suffix"), [("json", ".json"), ("csv", ".csv")])
 def test_what_is_downloaded_is_what_the_commands_write(
     view: Callable[..., Any], command: Callable[..., str], real: Any, form: str, suffix: str
@@ -231,13 +136,6 @@ def test_what_is_downloaded_is_what_the_commands_write(
         assert json.loads(text)["results"] == stored["results"]
     assert [url for url in opened.requests if not url.startswith(("file:", "data:", "blob:"))] == []
     assert opened.messages == []
-
-
-def test_files_that_are_too_large_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(page_data_module, "MOST_DOWNLOADS", 3_000)
-    found = page_data_module.page_data(synthetic_run(5, 4))
-    assert [item["title"] for item in found["downloads"]] == ["Jobs (CSV)"]
-    assert any("bench report -f json" in note for note in found["notes"])
 
 
 def test_case_by_case_has_every_figure_beside_the_baseline(page: Page, real: Any) -> None:
@@ -261,30 +159,6 @@ def test_case_by_case_has_every_figure_beside_the_baseline(page: Page, real: Any
     page.get_by_role("button", name="local").last.click()
     order = [float(cells["local"]) for _, cells in page.evaluate(read)]
     assert order == sorted(order, reverse=True)
-
-
-@pytest.mark.parametrize("size", [(390, 844), pytest.param((1440, 900), marks=pytest.mark.nightly)])
-def test_names_and_the_baseline_stay_in_view(
-    view: Callable[..., Any], tmp_path: Path, size: tuple[int, int]
-) -> None:
-    file = tmp_path / "large.html"
-    report(synthetic_run(40, 54), file)
-    page = view(file, size=size).page
-    page.wait_for_selector("html[data-ready=yes]")
-    assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
-    table = page.locator(".wide:has(> .matrix)")
-    table.scroll_into_view_if_needed()
-    table.evaluate("(box) => (box.scrollLeft = 300)")
-    box = table.bounding_box()
-    first, baseline = (
-        table.locator(f"tbody tr:first-child > :nth-child({k})").bounding_box() for k in (1, 2)
-    )
-    assert abs(first["x"] - box["x"]) < 2
-    assert first["x"] + first["width"] - 2 < baseline["x"] < first["x"] + first["width"] + 2
-    assert table.locator("thead th").nth(1).inner_text() == "unchanged"
-    page.locator("tr[data-strategy=strategy-020]").scroll_into_view_if_needed()
-    line = page.locator("#board-table tr.baseline .name").bounding_box()
-    assert 0 <= line["y"] <= size[1] - line["height"] + 1
 
 
 def test_sorts_by_mouse_and_keyboard(page: Page) -> None:
@@ -319,33 +193,6 @@ def test_a_strategy_opens_case_by_case(page: Page) -> None:
     assert button.get_attribute("aria-expanded") == "false"
 
 
-def test_filter_of_scenarios(page: Page, real: Any) -> None:
-    tick(page, "scenarios", "hframe")
-    assert_shows(page, part(real.run, cases=["frame", "frame-solid"]))
-    assert "2 of 3 cases" in page.locator(".status").inner_text()
-    tick(page, "scenarios", "frame")
-    assert_shows(page, part(real.run, cases=["frame-solid"]))
-    page.click("#reset")
-    assert_shows(page, real.run)
-
-
-@pytest.mark.parametrize("off", [("modified",), ("used", "modified"), ("higher",)])
-def test_filter_of_blocks(page: Page, real: Any, off: tuple[str, ...]) -> None:
-    tick(page, "blocks", *off)
-    assert_shows(page, real.run, without=[f"{name}_percent" for name in off])
-
-
-def test_filter_of_strategies(page: Page, real: Any) -> None:
-    tick(page, "strategies", "baruch", "nobari")
-    kept = [n for n in real.run.meta["strategies"] if n not in ("baruch", "nobari")]
-    assert_shows(page, part(real.run, strategies=kept))
-    page.click("#reset")
-    page.fill("#find", "AL")
-    assert order(page) == ["local"]
-    page.fill("#find", "no such one")
-    assert "Nothing to show" in page.locator("#board-table").inner_text()
-
-
 def test_all_filters_at_once(page: Page, real: Any) -> None:
     tick(page, "scenarios", "frame")
     tick(page, "blocks", "used")
@@ -353,18 +200,6 @@ def test_all_filters_at_once(page: Page, real: Any) -> None:
     kept = [n for n in real.run.meta["strategies"] if n not in ("unchanged", "kabe")]
     whole = part(real.run, cases=["hframe", "frame-solid"], strategies=kept)
     assert_shows(page, whole, without=["used_percent"])
-
-
-def test_charts_tell_their_values_by_keyboard(page: Page) -> None:
-    plot = page.locator(".plot").first
-    readout = page.locator("figure.chart", has=plot).locator(".readout").first
-    before = readout.inner_text()
-    plot.focus()
-    page.keyboard.press("ArrowRight")
-    first = readout.inner_text()
-    page.keyboard.press("ArrowRight")
-    assert before != first != readout.inner_text()
-    assert "gain over the" in first
 
 
 def test_intervals_of_a_part_are_over_its_structures(

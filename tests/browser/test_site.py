@@ -15,15 +15,14 @@ EVIL = (
     """<script>alert(1)</script><img src=x onerror=alert(2)>"'</title>&amp; javascript:alert(3)"""
 )
 TURNED = "\u202eevil \u05e9\u05dc\u05d5\u05dd\u2066 \x1b[2J"
-SHOWN = "evil \u05e9\u05dc\u05d5\u05dd [2J"  # less what turns text around or a terminal obeys
 KINDS = ("index", "class", "strategy", "case")
 BAR = 2**18  # bytes of a page
 
 
 @pytest.fixture(scope="module")
 def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a site of 20 strategies on 15 cases."""
-    return synthetic_site(tmp_path_factory.mktemp("large"), 20, 13)
+    """Return a site of 12 strategies on 6 cases."""
+    return synthetic_site(tmp_path_factory.mktemp("large"), 12, 4)
 
 
 @pytest.fixture(scope="module")
@@ -66,8 +65,9 @@ def assert_quiet(found: Any, site: Path) -> None:
     found.assert_quiet(file, site / "site.css", site / "site.js")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("kind", "scheme"), [(kind, ("light", "dark")[k % 2]) for k, kind in enumerate(KINDS)]
+)
 def test_axe_finds_nothing_serious(
     view: Callable[..., Any], hostile: Path, kind: str, scheme: str
 ) -> None:
@@ -76,8 +76,9 @@ def test_axe_finds_nothing_serious(
     assert_quiet(found, hostile)
 
 
-@pytest.mark.parametrize("which", ["large", "hostile"])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("which", "kind"), [("large", "index"), *(("hostile", kind) for kind in KINDS)]
+)
 def test_a_small_screen_scrolls_no_chart(
     request: pytest.FixtureRequest, view: Callable[..., Any], which: str, kind: str
 ) -> None:
@@ -99,7 +100,7 @@ def test_a_small_screen_scrolls_no_chart(
     assert_quiet(found, site)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["index", "strategy"])
 def test_what_strangers_write_is_text(view: Callable[..., Any], hostile: Path, kind: str) -> None:
     found = view(page_of(hostile, kind))
     page = found.page
@@ -122,23 +123,13 @@ def test_what_strangers_write_is_text(view: Callable[..., Any], hostile: Path, k
     assert_quiet(found, hostile)
 
 
-def test_names_without_letters_of_control(view: Callable[..., Any], hostile: Path) -> None:
-    page = view(page_of(hostile, "index")).page
-    assert SHOWN in page.locator("table.filtered th a").all_inner_texts()
-    page.locator("table.filtered th a", has_text=SHOWN).click()
-    assert page.locator("h1").inner_text() == SHOWN
-    assert page.get_by_role("link", name="https://a.b/c").get_attribute("rel") == (
-        "nofollow noreferrer"
-    )
-
-
 def test_a_large_board_is_sorted_and_filtered_with_the_keyboard(
     view: Callable[..., Any], large: Path
 ) -> None:
     found = view(page_of(large, "index"))
     page, index = found.page, json.loads((large / "index.json").read_text())
     board = index["boards"][0]
-    assert (len(board["rows"]), len(board["cases"])) == (20, 15)
+    assert (len(board["rows"]), len(board["cases"])) == (12, 6)
     table, names = page.locator("table.filtered"), [row["strategy"] for row in board["rows"]]
 
     def column(number: int) -> list[str]:
@@ -163,14 +154,6 @@ def test_a_large_board_is_sorted_and_filtered_with_the_keyboard(
     assert table.locator("tbody tr:visible").count() == 10
     assert page.locator("#count").inner_text() == "10 shown"
     assert_quiet(found, large)
-
-
-def test_the_best_is_seen_without_scrolling(view: Callable[..., Any], large: Path) -> None:
-    page = view(page_of(large, "index")).page
-    for place in (".answer", "figure svg"):
-        box = page.locator(place).first.bounding_box()
-        assert box["y"] + box["height"] <= 900
-    assert "Its gain is 0." in page.locator(".answer").inner_text()
 
 
 @pytest.mark.nightly

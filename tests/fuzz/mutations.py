@@ -16,19 +16,8 @@ _TOKEN = re.compile(r'"[^"\n]*"|[A-Za-z_][\w-]*|[-+]?\d[\w.+-]*|\s+|.', re.DOTAL
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
 NUMBERS = (
     *("0", "-0.0", "-1", "1", "2", "3", "7", "0.5", "nan", "inf", "-inf", "NaN", "Infinity"),
-    *(
-        "1e400",
-        "-1e400",
-        "1e308",
-        "1e-320",
-        "1e30",
-        "-1e30",
-        "1e-30",
-        "1e155",
-        "1e16",
-        "1E5",
-        "1D5",
-    ),
+    *("1e400", "-1e400", "1e308", "1e-320", "1e30", "-1e30", "1e-30", "1e155", "1e16"),
+    *("1E5", "1D5"),
     *("2147483648", "4294967296", "-2147483649", "9223372036854775808", "1000000000", "9" * 30),
     *("9" * 5000, "0x10", "1_000", "1e", "--1", "1.2.3", "1+2j", "1j", "true", "null", ""),
 )
@@ -38,19 +27,8 @@ PIECES = (
     *('"""', "[[", "]]", "    -1\n", "[" * 500, "a." * 60 + "b = 1\n", '{"a":' * 200, "x" * 3000),
     *("../case.toml", "/etc/passwd", "~/x.csv", "file:///etc/passwd", "..\\x", "case.toml", "."),
     *("!!python/object/apply:os.system", "__import__('os')", "${HOME}", "=1+1", "<script>", "|"),
-    *(
-        "model",
-        "joints",
-        "members",
-        "ends",
-        "matrices",
-        "frame",
-        "3d",
-        "in-plane",
-        "all",
-        "x",
-        "rz",
-    ),
+    *("model", "joints", "members", "ends", "matrices", "frame", "3d", "in-plane", "all", "x"),
+    "rz",
     *("%%MatrixMarket matrix array real general", "coordinate", "complex", "pattern", "hermitian"),
 )
 

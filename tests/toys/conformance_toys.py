@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import threading
 import time
 from collections.abc import Mapping, Sequence
@@ -59,14 +58,6 @@ class InPlace(Good):
         return result
 
 
-class Normalising(Good):
-    """Scale the measured shapes where they are."""
-
-    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
-        measurement.shapes[:] /= 2.0
-        return super().update(model, measurement, rng)
-
-
 class Unseeded(Good):
     """Draw from a generator of its own."""
 
@@ -118,30 +109,11 @@ class WrongSize(Good):
         return super().finish(replace(model, stiffness=sp.csc_array(model.stiffness[:-1, :-1])))
 
 
-class Dense(Good):
-    """Return a dense matrix."""
-
-    def finish(self, model: Model) -> UpdateResult:
-        return super().finish(replace(model, stiffness=model.stiffness.toarray()))
-
-
 class Locked(Good):
     """Hold something that no other process can be given."""
 
     def __init__(self) -> None:
         self.key = threading.Lock()
-
-
-class _Trap:
-    def __getstate__(self) -> dict[str, bool]:
-        raise TypeError("this geometry stays here")
-
-
-class LockedResult(Good):
-    """Return a model that cannot be pickled."""
-
-    def finish(self, model: Model) -> UpdateResult:
-        return super().finish(replace(model, geometry=_Trap()))  # type: ignore[arg-type]
 
 
 class Undeclared(Good):
@@ -184,12 +156,6 @@ class Flattering(Candid):
     factor: ClassVar[float] = 0.5
 
 
-class Concealing(ByIndex):
-    """Say nothing of it."""
-
-    promises: ClassVar[frozenset[str]] = frozenset({"used-modes-or-stated"})
-
-
 class Looping(Good):
     """Never come back."""
 
@@ -198,28 +164,11 @@ class Looping(Good):
             time.sleep(0.05)
 
 
-class LoopingWhenFree(Good):
-    """Never come back from a structure without supports."""
-
-    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
-        if np.linalg.matrix_rank(model.stiffness.toarray(), hermitian=True) < model.size:
-            time.sleep(600.0)
-        return super().update(model, measurement, rng)
-
-
 class Exiting(Good):
     """Leave the process."""
 
     def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
         os._exit(0)
-
-
-class Segfaulting(Good):
-    """Die of a signal."""
-
-    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
-        os.kill(os.getpid(), signal.SIGSEGV)
-        raise AssertionError
 
 
 class Hog(Good):
@@ -461,24 +410,8 @@ class ForgingSymmetry(_Forging, Asymmetric):
     """Hide that the stiffness is not symmetric."""
 
 
-class ForgingNumbers(_Forging, NotNumbers):
-    """Hide that the core is nan."""
-
-
 class ForgingSeeds(_Forging, Unseeded):
     """Hide that two runs differ."""
-
-
-class ForgingCount(_Forging, Uncounted):
-    """Hide that there were unknowns."""
-
-
-class ForgingHistory(_Forging, BadHistory):
-    """Hide what is in its history."""
-
-
-class ForgingPromise(_Forging, ByIndex):
-    """Hide that a promise is broken."""
 
 
 class ForgingBytes(Good):
@@ -534,35 +467,25 @@ class Nosy(Good):
 
 FORGED: Mapping[type[Strategy], str] = {
     ForgingSymmetry: "symmetric",
-    ForgingNumbers: "finite",
     ForgingSeeds: "deterministic",
-    ForgingCount: "parameter-count",
-    ForgingHistory: "figures",
-    ForgingPromise: "promises",
     ForgingBytes: "picklable",
     ForgingWords: "returns",
     ForgingLack: "returns",
 }
 FAULTS: Mapping[type[Strategy], str] = {
     InPlace: "inputs",
-    Normalising: "inputs",
     Unseeded: "deterministic",
     Silencing: "global-state",
     CellsWanted: "missing-shapes",
     Asymmetric: "symmetric",
     NotNumbers: "finite",
     WrongSize: "sizes",
-    Dense: "sizes",
     Locked: "picklable",
-    LockedResult: "picklable",
     Undeclared: "capabilities",
     ByIndex: "promises",
     Flattering: "promises",
-    Concealing: "promises",
     Looping: "returns",
-    LoopingWhenFree: "free-structure",
     Exiting: "returns",
-    Segfaulting: "returns",
     Hog: "returns",
     SilentRefusal: "returns",
     Inverting: "free-structure",

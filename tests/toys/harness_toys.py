@@ -203,15 +203,6 @@ class Interrupting(Strategy):
         raise KeyboardInterrupt
 
 
-class InPlace(Strategy):
-    name = "in-place"
-    citation = "none"
-
-    def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
-        model.stiffness.data[:] *= 0.9
-        return UpdateResult(model)
-
-
 class Looping(Strategy):
     name = "looping"
     citation = "none"

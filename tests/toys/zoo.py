@@ -116,17 +116,6 @@ def segfault(model: Model) -> None:
     ctypes.string_at(0)
 
 
-@animal("crashed", "the worker process ended with exit code 0")
-def exit_(model: Model) -> None:
-    os._exit(0)
-
-
-@animal("timeout", "no result within ")
-def endless_loop(model: Model) -> None:
-    while True:
-        pass
-
-
 @animal("timeout", "no result within ")
 def deaf_loop(model: Model) -> None:
     """Does not listen to signals that can be ignored."""
@@ -177,20 +166,6 @@ def disk_filler(model: Model) -> None:
             stream.write(b"x" * 2**18)
 
 
-class _Payload(Exception):  # noqa: N818
-    def __init__(self, first: object, second: object) -> None:
-        super().__init__(first)
-        self.payload = (lambda: second, threading.Lock())
-
-    def __reduce__(self) -> Any:
-        raise RuntimeError("not for you")
-
-
-@animal("failed", "_Payload: 1")
-def unpicklable_error(model: Model) -> None:
-    raise _Payload(1, 2)
-
-
 class _Bomb:
     """Runs a command in anyone who unpickles it."""
 
@@ -222,22 +197,6 @@ def vandal(model: Model) -> None:
 
 
 @animal()
-def deserter(model: Model) -> None:
-    """Leaves a process behind that has left its session."""
-    subprocess.Popen(_SLEEPER, start_new_session=True)
-
-
-@animal()
-def daemon(model: Model) -> None:
-    """Leaves a process behind by forking twice, which keeps its output open."""
-    if os.fork() == 0:
-        os.setsid()
-        if os.fork() == 0:
-            os.execv(_SLEEPER[0], _SLEEPER)
-        os._exit(0)
-
-
-@animal()
 def third_party(model: Model) -> None:
     """Leaves a process behind that has nothing of its environment."""
     if os.fork() == 0:
@@ -259,18 +218,6 @@ def regicide(model: Model) -> None:
     time.sleep(900.0)
 
 
-@animal("failed", "ValueError: ")
-def babbler(model: Model) -> None:
-    """Raises a text that is none in UTF-8."""
-    raise ValueError("\ud800")
-
-
-@animal("failed", "ValueError: parameter_count is -1")
-def boaster(model: Model) -> UpdateResult:
-    """Says that it has fewer unknowns than none."""
-    return UpdateResult(model, parameter_count=-1)
-
-
 @animal()
 def litterer(model: Model) -> None:
     """Leaves files behind, here and in the temporary folder."""
@@ -284,20 +231,6 @@ def litterer(model: Model) -> None:
 def lingerer(model: Model) -> None:
     """Has a thread that would keep its process alive."""
     threading.Thread(target=time.sleep, args=(900.0,)).start()
-
-
-@animal("failed", "stiffness has 1 entries that are not finite")
-def not_finite(model: Model) -> Model:
-    stiffness = model.stiffness.copy()
-    stiffness.data[0] = np.nan
-    return replace(model, stiffness=stiffness)
-
-
-@animal("failed", "stiffness is not symmetric")
-def skewed(model: Model) -> Model:
-    stiffness = model.stiffness.tolil()
-    stiffness[0, 1] += 1e3 + abs(stiffness[0, 1])
-    return replace(model, stiffness=stiffness.tocsc())
 
 
 @animal("failed", "stiffness is not a valid sparse array")
@@ -355,15 +288,6 @@ def scenario_reader(target: dict[str, Any]) -> bool:
         if any(folder.rglob("*.csv")) or any(folder.rglob("case.toml")):
             return True
     return False
-
-
-@burglar()
-def paper_reader(target: dict[str, Any]) -> bool:
-    import femubench
-
-    package = Path(femubench.__file__).parent
-    places = (package / "papers", package.resolve().parent / "papers")
-    return any(any(folder.rglob("*.toml")) for folder in places)
 
 
 @burglar()
@@ -465,11 +389,6 @@ def mounter(target: dict[str, Any]) -> bool:
     return _LIBC.mount(b"tmpfs", b"/own", b"tmpfs", ctypes.c_ulong(0), None) == 0
 
 
-@burglar(loose=None)
-def unmounter(target: dict[str, Any]) -> bool:
-    return _LIBC.umount2(b"/usr", 2) == 0 or _LIBC.umount2(b"/own", 2) == 0
-
-
 @burglar()
 def nester(target: dict[str, Any]) -> bool:
     """Makes a namespace of users, in which it would be root."""
@@ -543,15 +462,6 @@ def sharer(target: dict[str, Any]) -> bool:
     return bool(found >= 0)
 
 
-@burglar()
-def messenger(target: dict[str, Any]) -> bool:
-    """Leaves a queue of messages behind."""
-    found = _LIBC.msgget(0, 0o1600)
-    if found >= 0:
-        _LIBC.msgctl(found, 0, None)
-    return bool(found >= 0)
-
-
 @burglar(loose=None)
 def key_keeper(target: dict[str, Any]) -> bool:
     """Keeps a word in a key ring of the kernel, for the next one."""
@@ -559,13 +469,6 @@ def key_keeper(target: dict[str, Any]) -> bool:
 
     add = {"x86_64": 248, "aarch64": 217}[platform.machine()]
     return _LIBC.syscall(add, b"user", MARK.encode(), b"word", 4, -4) >= 0
-
-
-@animal()
-def spectator(model: Model) -> None:
-    """Watches files."""
-    watch = _LIBC.inotify_init()
-    _LIBC.inotify_add_watch(watch, b"/", 0xFFF)
 
 
 @burglar(loose=None)
@@ -589,12 +492,6 @@ def _writable(path: str) -> bool:
     except OSError:
         return False
     return True
-
-
-@burglar(loose=None)
-def renamer(target: dict[str, Any]) -> bool:
-    """Gives the machine another name, or knows its own."""
-    return os.uname().nodename == target["host"] or _LIBC.sethostname(b"x", 1) == 0
 
 
 @animal()
@@ -627,22 +524,6 @@ def descriptors(target: dict[str, Any]) -> bool:
     found = [int(name) for name in os.listdir("/proc/self/fd")]
     links = [f"/proc/self/fd/{number}" for number in found if number > 2]
     return len([link for link in links if os.path.exists(link)]) > 1
-
-
-@animal("crashed", "the worker process was ended by SIGKILL")
-def self_killer(model: Model) -> None:
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-@animal("crashed", "the worker process was ended by SIGABRT")
-def aborter(model: Model) -> None:
-    """Ends with a core, which would be large."""
-    os.abort()
-
-
-@animal("crashed", "the worker process ended with exit code 3")
-def exit_three(model: Model) -> None:
-    os._exit(3)
 
 
 def _objects() -> set[str]:
