@@ -73,20 +73,20 @@ def index(room: Path) -> Data:
     return json.loads((room / "site" / "index.json").read_text())  # type: ignore[no-any-return]
 
 
-def test_an_honest_run_is_verified_and_stays_so(honest: Data, tmp_path: Path) -> None:
+def test_an_honest_run_is_stated_and_stays_so(honest: Data, tmp_path: Path) -> None:
     answer = publish(tmp_path, honest)
     assert answer.exit_code == 0, answer.output
-    assert [run["verified"] for run in index(tmp_path)["runs"]] == [True]
-    assert {
-        mark for s in index(tmp_path)["strategies"] for mark in s["versions"][0]["marks"]
-    } == set()
+    assert [run["proof"] for run in index(tmp_path)["runs"]] == ["stated"]
+    assert {mark for s in index(tmp_path)["strategies"] for mark in s["versions"][0]["marks"]} == {
+        "stated"
+    }
     assert "unverified</span>" not in (tmp_path / "site" / "index.html").read_text()
-    # Its published file can be verified again, and the site reads its own files as they are.
+    # Its published file can be checked again, and the site reads its own files as they are.
     (kept,) = (tmp_path / "site" / "data").iterdir()
     again = tmp_path / "again"
     again.mkdir()
     assert publish(again, json.loads(kept.read_text())).exit_code == 0
-    assert index(again)["runs"][0]["verified"]
+    assert index(again)["runs"][0]["proof"] == "stated"
     first = (tmp_path / "site" / "index.json").read_bytes()
     assert publish(tmp_path, honest).exit_code == 0
     assert (tmp_path / "site" / "index.json").read_bytes() == first
@@ -252,20 +252,20 @@ def test_a_smaller_run_is_a_run(honest: Data, tmp_path: Path) -> None:
 def test_the_rest_is_taken_when_asked_and_marked(honest: Data, tmp_path: Path) -> None:
     answer = publish(tmp_path, edited(honest, EDITS["no sandbox"][0]), "--unverified")
     assert answer.exit_code == 0, answer.output
-    assert [run["verified"] for run in index(tmp_path)["runs"]] == [False]
+    assert [run["proof"] for run in index(tmp_path)["runs"]] == ["unverified"]
     assert index(tmp_path)["strategies"][0]["versions"][0]["marks"] == ["unverified"]
     assert "unverified</span>" in (tmp_path / "site" / "index.html").read_text()
-    # A file cannot say of itself that it was verified.
+    # A file cannot say of itself how far it was checked.
     (kept,) = (tmp_path / "site" / "data").iterdir()
-    claimed = {**json.loads(kept.read_text()), "verified": True}
+    claimed = {**json.loads(kept.read_text()), "proof": "recomputed", "verified": True}
     again = tmp_path / "again"
     again.mkdir()
     assert publish(again, claimed).exit_code == 2
     assert publish(again, claimed, "--unverified").exit_code == 0
-    assert not index(again)["runs"][0]["verified"]
-    # The same run, verified, takes its place.
+    assert index(again)["runs"][0]["proof"] == "unverified"
+    # The same run, checked, takes its place.
     assert publish(tmp_path, honest).exit_code == 0
-    assert [run["verified"] for run in index(tmp_path)["runs"]] == [True]
+    assert [run["proof"] for run in index(tmp_path)["runs"]] == ["stated"]
 
 
 def test_sites_of_earlier_versions_are_read(honest: Data, tmp_path: Path) -> None:
@@ -277,4 +277,4 @@ def test_sites_of_earlier_versions_are_read(honest: Data, tmp_path: Path) -> Non
     old = {name: old[name] for name in ("schema", "meta", "results")}
     kept.write_text(json.dumps(old, sort_keys=True, separators=(",", ":")) + "\n")
     assert publish(tmp_path, honest).exit_code == 0
-    assert [run["verified"] for run in index(tmp_path)["runs"]] == [True]
+    assert [run["proof"] for run in index(tmp_path)["runs"]] == ["stated"]

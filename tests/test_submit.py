@@ -112,10 +112,12 @@ def test_the_result_file_goes_onto_a_leaderboard(repository: Repository, tmp_pat
     data = result_of(repository, "baseline.json")
     assert data["meta"]["twins"]["number"] == 2
     words = ["publish", str(site), str(file)]
-    verified = data["meta"]["sandbox"] == "namespaces"
-    answer = CliRunner().invoke(bench, words if verified else [*words, "--unverified"])
+    enclosed = data["meta"]["sandbox"] == "namespaces"
+    answer = CliRunner().invoke(bench, words if enclosed else [*words, "--unverified"])
     assert answer.exit_code == 0, answer.output
-    (item,) = json.loads((site / "index.json").read_text(encoding="utf-8"))["strategies"]
+    index = json.loads((site / "index.json").read_text(encoding="utf-8"))
+    assert [run["proof"] for run in index["runs"]] == ["recomputed" if enclosed else "unverified"]
+    (item,) = index["strategies"]
     assert item["about"] == {
         "homepage": "https://example.org/fitted", "summary": "One factor for all",
         "author": "Ada <ada@example.org>", "doi": "10.1000/fitted",
