@@ -24,12 +24,14 @@ KEYS = [
     *("verdict", "note", "tried"),
 ]
 ONE = (
-    "2 of 11 printed cells agree independently, 2 under a stated convention, 1 after a search and "
-    "1 after a fit; 1 are input, 1 cannot be checked, 1 are misprints and 2 do not follow"
+    "2 of 11 printed cells agree independently (2 different figures), 2 under a stated "
+    "convention, 1 after a search and 1 after a fit; 1 are input, "
+    "1 cannot be checked, 1 are misprints and 2 do not follow"
 )
 BOTH = (
-    "4 of 22 printed cells agree independently, 4 under a stated convention, 2 after a search and "
-    "2 after a fit; 2 are input, 2 cannot be checked, 2 are misprints and 4 do not follow"
+    "4 of 22 printed cells agree independently (4 different figures), 4 under a stated "
+    "convention, 2 after a search and 2 after a fit; 2 are input, "
+    "2 cannot be checked, 2 are misprints and 4 do not follow"
 )
 
 
@@ -245,9 +247,10 @@ class TestRealPaper:
         cells = json.loads((folder / "reproduce.json").read_text(encoding="utf-8"))
         verdicts = [cell["verdict"] for cell in cells]
         first = (folder / "screen.txt").read_text(encoding="utf-8").splitlines()[0]
-        independent, whole, *others = map(int, re.findall(r"\d+", first))
+        independent, whole, different, *others = map(int, re.findall(r"\d+", first))
         assert (independent, *others) == tuple(verdicts.count(verdict) for verdict in ORDER)
         assert whole == len(cells)
+        assert different <= independent
         assert first.startswith(f"{verdicts.count('independent')} of {len(cells)} printed cells")
         assert all(cell["note"] for cell in cells)
 
