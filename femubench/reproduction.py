@@ -31,6 +31,7 @@ from femubench.core.reproduction.study import (
     FIGURES as FIGURES,
     Extra as Extra,
     Study as Study,
+    count_different as count_different,
     verdict_counts as verdict_counts,
 )
 from femubench.core.reproduction.workbench import Workbench as Workbench

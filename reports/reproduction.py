@@ -26,6 +26,7 @@ from femubench.reproduction import (
     Figure,
     Study,
     Verdict,
+    count_different,
     verdict_counts,
 )
 
@@ -45,7 +46,7 @@ _VERDICTS: dict[Verdict, tuple[str, str, str, str, str]] = {
     "input": ("=", "input", "input", "input", "a count, a definition or a figure that the paper "
         "was given: its agreement shows nothing but care in copying"),
     "cannot-be-checked": ("·", "unseen", "cannot be checked", "cannot be checked",
-        "needs mode shapes that are not in print: ours is given for comparison alone"),
+        "what is not in print decides, such as mode shapes: ours is given for comparison alone"),
     "misprint": ("!", "misprint", "misprint", "misprinted",
         "other printed figures of the same paper contradict it"),
     "does-not-follow": ("✗", "no", "does not follow", "do not follow",
@@ -92,7 +93,8 @@ def sentence_of_counts(cells: Sequence[Cell]) -> str:
     """Return how many cells there are of every verdict, as a sentence without its stop."""
     count = verdict_counts(cells)
     return (
-        f"{count['independent']} of {len(cells)} printed {_noun(cells)} agree independently, "
+        f"{count['independent']} of {len(cells)} printed {_noun(cells)} agree independently "
+        f"({different(cells)}), "
         f"{count['under-convention']} under a stated convention, {count['searched']} after a "
         f"search and {count['fitted']} after a fit; {count['input']} are input, "
         f"{count['cannot-be-checked']} cannot be checked, {count['misprint']} are misprints and "
@@ -103,8 +105,15 @@ def sentence_of_counts(cells: Sequence[Cell]) -> str:
 def summary(cells: Sequence[Cell]) -> str:
     """Return the counts of a table without those that are zero."""
     counts = verdict_counts(cells)
-    parts = ", ".join(f"{counts[v]} {_VERDICTS[v][3]}" for v in VERDICTS if counts[v])
-    return f"{len(cells)} {_noun(cells)}: {parts}"
+    more = {"independent": f" ({different(cells)})"}
+    parts = (f"{counts[v]} {_VERDICTS[v][3]}{more.get(v, '')}" for v in VERDICTS if counts[v])
+    return f"{len(cells)} {_noun(cells)}: {', '.join(parts)}"
+
+
+def different(cells: Sequence[Cell]) -> str:
+    """Return how many different figures agree independently, in words."""
+    count = count_different(cells)
+    return f"{count} different figure{'s' * (count != 1)}"
 
 
 def _noun(cells: Sequence[Cell]) -> str:

@@ -195,7 +195,8 @@ def _cells(row: Mapping[Any, Any]) -> dict[str, Cell]:
 
 def _board(run: Run, title: str = "") -> Iterator[Passage]:
     """Yield the leaderboard, what its columns mean, and what the run shows."""
-    rows = list_rows(run)
+    standings = Standings.of(run)
+    rows = list_rows(run, standings)
     tested = any(row["better_than"] for row in rows)
     heads = {"#": Column("#", 6), "strategy": Column("strategy", 16, left=True), **_FIGURES}
     listed = [
@@ -220,7 +221,7 @@ def _board(run: Run, title: str = "") -> Iterator[Passage]:
     titles = " ".join([*(c.title.replace("\n", " ") for c in table.columns), *map(_marks, rows)])
     legend = [entry for entry in _LEGEND.items() if entry[0].partition(",")[0] in titles]
     if title or not tested:
-        legend.append(("tested", Standings.of(run).apart.note))
+        legend.append(("tested", standings.apart.note))
     yield Passage("", [lead(run), Items(legend)])
     if said := finding(run, rows):
         yield Passage("", [" ".join(said)])

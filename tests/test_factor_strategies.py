@@ -9,7 +9,16 @@ import pytest
 import scipy.sparse as sp
 
 import femubench
-from femubench import InputError, Measurement, Model, NotApplicable, Sensors, Strategy, solve_modes
+from femubench import (
+    InputError,
+    Measurement,
+    Model,
+    NotApplicable,
+    Sensors,
+    Strategy,
+    read_case,
+    solve_modes,
+)
 from femubench.core.update.l_curve import l_curve_curvature
 from femubench.fem import (
     Frame,
@@ -23,19 +32,22 @@ from femubench.fem import (
     Support,
 )
 from femubench.modal import mac, rigid_modes_of
+from femubench.plugins.strategies.bayesian import Bayesian
 from femubench.plugins.strategies.cma_es import CmaEs
-from femubench.plugins.strategies.cross_model import CrossModel
+from femubench.plugins.strategies.cross_model import CrossModel, cross_equations
 from femubench.plugins.strategies.eigensensitivity import Eigensensitivity
 from femubench.plugins.strategies.multi_start import MultiStart
 from femubench.plugins.strategies.secant import Secant
 from femubench.plugins.strategies.sparse import Sparse
 from femubench.plugins.strategies.strain_energy import StrainEnergy, energy_change_index
+from femubench.scenarios import HERE
 from femubench.update import (
     element_sets,
     l_curve_corner,
     lasso,
     modal_space,
     parameterise,
+    quasi_measured_modes,
     tikhonov,
 )
 
@@ -97,11 +109,13 @@ def exact(truth: Model, sensors: Sensors, count: int) -> Measurement:
     )  # fmt: skip
 
 
-def planted(frame: Frame, member: str, count: int) -> tuple[Model, Measurement]:
+def planted(
+    frame: Frame, member: str, count: int, factor: float = FACTOR
+) -> tuple[Model, Measurement]:
     """Return a frame and exact modes of the same with one member softer, seen everywhere."""
     model = Model.of(frame)
     parts = parameterise(model, "members")
-    factors = np.where(np.array(parts.names) == f"E {member}", FACTOR, 1.0)
+    factors = np.where(np.array(parts.names) == f"E {member}", factor, 1.0)
     return model, exact(parts.at(np.log(factors)), everywhere(model), count)
 
 
@@ -128,6 +142,65 @@ def test_a_planted_change_is_found_from_exact_modes(strategy: Strategy, within: 
     found = factors_of(strategy, model, measurement)
     assert found.pop("m-CD") == pytest.approx(FACTOR, abs=within)
     assert list(found.values()) == pytest.approx([1.0] * len(found), abs=within)
+
+
+def test_no_equation_asks_for_what_the_expanded_shapes_cannot_have() -> None:
+    """Shapes rotated within their partners are blind to all other modes of the model.
+
+    Such modes had equations of their own, with a zero on the right for any measured shape.
+    """
+    model, measurement = planted(frame_of_five(), "m-CD", 6)
+    parts, quasi = parameterise(model, "own"), quasi_measured_modes(model, measurement)
+    own = solve_modes(model).elastic
+    every = own.take(np.arange(18))
+    _, right = cross_equations(parts, every, quasi.shapes, measurement.eigenvalues)
+    assert np.isclose(right, 0.0, atol=1e-9).sum() == 72
+    found = CrossModel().update(model, measurement, np.random.default_rng(0))
+    assert found.diagnostics["equations"] == 36.0
+
+
+@pytest.mark.parametrize(
+    ("member", "saddle", "optimum"), [("upper-1", 262.3, 40.8), ("lower-1", 122.0, 45.8)]
+)
+def test_a_symmetric_start_is_left_for_the_better_optimum(
+    member: str, saddle: float, optimum: float
+) -> None:
+    """One of two equal members is softer: frequencies have no slope by their difference.
+
+    Which of the two it is, frequencies cannot tell; that they differ, they can.
+    """
+    frame = replace(read_case(HERE / "hframe").model.frame_structure.frame, masses=())
+    model, measurement = planted(frame, member, 5, 0.5)
+    ends = {}
+    for restarts in (0, 1):
+        options = replace(Bayesian().options, restarts=restarts)
+        strategy = Bayesian(changes="members", options=options)
+        ends[restarts] = strategy.update(model, measurement, np.random.default_rng(0))
+    assert Bayesian().options == replace(Bayesian().options, restarts=1)
+    pair = [f"E {member}", f"E {member[:-1]}2"]
+    values = {
+        restarts: [p.after for p in end.parameters if p.name in pair]
+        for restarts, end in ends.items()
+    }
+    assert values[0][0] == pytest.approx(values[0][1], rel=1e-3)
+    assert abs(values[1][0] - values[1][1]) > 0.35
+    costs = {restarts: end.history[-1]["cost"] for restarts, end in ends.items()}
+    assert (costs[0], costs[1]) == (
+        pytest.approx(saddle, rel=0.01),
+        pytest.approx(optimum, rel=0.01),
+    )
+    steps = [int(entry["iteration"]) for entry in ends[1].history]
+    assert steps == list(range(len(steps)))
+
+
+def test_an_optimum_that_is_the_only_one_stays_to_the_last_digit() -> None:
+    model, measurement = planted(frame_of_five(), "m-CD", 6)
+    found = []
+    for restarts in (0, 3):
+        options = replace(Bayesian().options, restarts=restarts)
+        result = Bayesian(options=options).update(model, measurement, np.random.default_rng(0))
+        found.append([p.after for p in result.parameters])
+    assert found[0] == found[1]
 
 
 def test_a_sum_of_sizes_finds_the_one_of_twenty_members_where_squares_blur_it() -> None:

@@ -107,7 +107,7 @@ class TestHtml:
         assert document.texts("h1") == ["6 of 22 printed figures do not come out again"]
         assert document.texts("b")[:8] == ["4", "4", "2", "2", "2", "2", "2", "4"]
         assert any(
-            text.startswith("2 of 11 printed cells agree independently, ")
+            text.startswith("2 of 11 printed cells agree independently (2 different figures), ")
             for text in document.texts("p")
         )
         assert document.all("html") == [{"lang": "en"}]

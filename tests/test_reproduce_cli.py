@@ -23,12 +23,14 @@ KEYS = [
     *("verdict", "note", "tried"),
 ]
 ONE = (
-    "2 of 11 printed cells agree independently, 2 under a stated convention, 1 after a search and "
-    "1 after a fit; 1 are input, 1 cannot be checked, 1 are misprints and 2 do not follow"
+    "2 of 11 printed cells agree independently (2 different figures), 2 under a stated "
+    "convention, 1 after a search and 1 after a fit; 1 are input, "
+    "1 cannot be checked, 1 are misprints and 2 do not follow"
 )
 BOTH = (
-    "4 of 22 printed cells agree independently, 4 under a stated convention, 2 after a search and "
-    "2 after a fit; 2 are input, 2 cannot be checked, 2 are misprints and 4 do not follow"
+    "4 of 22 printed cells agree independently (4 different figures), 4 under a stated "
+    "convention, 2 after a search and 2 after a fit; 2 are input, "
+    "2 cannot be checked, 2 are misprints and 4 do not follow"
 )
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from femubench import InputError
 from femubench.reports.reproduction import counts_line
-from femubench.reproduction import VERDICTS, Ground, Page, Verdict, verdict_counts
+from femubench.reproduction import VERDICTS, Ground, Page, Verdict, count_different, verdict_counts
 from tests.toys import reproduction_toys as toys
 
 FREE = Ground("independent", "nothing is chosen")
@@ -55,6 +55,41 @@ def test_what_cannot_be_checked_is_neither_praised_nor_accused(ours: float | Non
     assert verdict_of(FREE, UNSEEN, ours=ours) == "cannot-be-checked"
 
 
+@pytest.mark.parametrize(
+    ("ours", "others", "verdict"),
+    [
+        (110.0, (), "does-not-follow"),
+        (110.0, (105.0, 120.0), "does-not-follow"),
+        (90.0, (95.0, 98.0), "does-not-follow"),
+        (110.0, (99.06,), "does-not-follow"),  # the tolerance is not added to the reach,
+        (110.0, (99.05,), "cannot-be-checked"),  # the printed digits are
+        (110.0, (float("nan"), 95.0, 140.0), "cannot-be-checked"),
+        (None, (90.0, 110.0), "cannot-be-checked"),
+    ],
+)
+def test_nothing_is_accused_that_lies_in_reach_of_what_is_not_in_print(
+    ours: float | None, others: tuple[float, ...], verdict: Verdict
+) -> None:
+    page = Page("paper", "1", (FREE,), "Hz", decimals=1, unprinted="shapes decide")
+    cell = page.cell("mode 1", "FE", 99.0, ours, lambda: others)
+    assert cell.verdict == verdict
+    assert cell.note.startswith("shapes decide, from ") == (verdict == "cannot-be-checked")
+
+
+def test_what_agrees_asks_for_no_other_values() -> None:
+    page = Page("paper", "1", (FREE,), decimals=1)
+    assert page.cell("a", "b", 1.0, 1.0, lambda: 1 / 0).verdict == "independent"  # type: ignore[arg-type,return-value]
+
+
+def test_a_figure_printed_again_is_no_further_evidence() -> None:
+    ratio, hertz = (Page("paper", "2", (FREE,), unit, decimals=3) for unit in ("", "Hz"))
+    cells = [ratio.cell(mesh, f"mode {k}", 1.0, 1.0) for mesh in "BCD" for k in range(4)]
+    cells += [ratio.cell(mesh, "mode 5", 0.999, 0.999) for mesh in "BCD"]
+    cells += [hertz.cell("B", "mode 1", 1.0, 1.0), hertz.cell("B", "mode 2", 2.0, 7.0)]
+    assert verdict_counts(cells)["independent"] == 16
+    assert count_different(cells) == 3
+
+
 def test_the_note_names_every_ground_once_and_a_fault_alone() -> None:
     page = Page("paper", "1", (STATED, FITTED, STATED), fault=MISPRINT)
     assert page.cell("a", "b", 1.0, 1.0).note == f"{STATED.words}; {FITTED.words}"
@@ -98,5 +133,5 @@ def test_the_headline_is_the_number_of_independent_cells() -> None:
     assert set(counts) == set(VERDICTS)
     assert all(counts.values())
     assert sum(counts.values()) == len(study.cells)
-    headline = f"{counts['independent']} of {len(study.cells)} printed cells agree independently, "
+    headline = f"{counts['independent']} of {len(study.cells)} printed cells agree independently ("
     assert counts_line([study]).startswith(headline)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from femubench.core.errors import InputError
 from femubench.core.reproduction.ground import FAULTS, Ground, Verdict, weakest
 
 _UNEXPLAINED = Ground("does-not-follow", "no reading of the text was found that gives it")
+Others = Callable[[], Iterable[float]]
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,7 @@ class Cell:
         unit: of both; ``%`` for a figure that is a percentage itself.
         tried: number of readings that were tried, of a cell that was found by searching.
         page: what it was judged by.
+        others: computes ours for other choices of what the paper does not print.
     """
 
     paper: str
@@ -39,6 +42,7 @@ class Cell:
     unit: str = ""
     tried: int | None = None
     page: Page | None = field(default=None, repr=False, compare=False)
+    others: Others = field(default=tuple, repr=False, compare=False)
 
     @property
     def deviation_percent(self) -> float | None:
@@ -79,6 +83,7 @@ class Page:
         decimals: digits behind the point in print: what rounds to the printed figure agrees too;
             None for the tolerance alone.
         fault: what a cell is that does not agree, unless it cannot be checked.
+        unprinted: what decides a cell whose printed figure lies between ours and `Cell.others`.
 
     Raises:
         InputError: for no grounds, or where a fault stands among them or something else as fault.
@@ -91,6 +96,7 @@ class Page:
     tolerance: float = 0.1
     decimals: int | None = None
     fault: Ground = _UNEXPLAINED
+    unprinted: str = ""
 
     def __post_init__(self) -> None:
         """Check that grounds are grounds, and the fault is one."""
@@ -102,18 +108,23 @@ class Page:
                 f"{' or '.join(FAULTS)}, and one of these as fault)"
             )
 
-    def cell(self, row: str, column: str, printed: float, ours: float | None) -> Cell:
+    def cell(
+        self, row: str, column: str, printed: float, ours: float | None, others: Others = tuple
+    ) -> Cell:
         """Return the cell with its verdict: figures decide whether, grounds for what."""
         deciding = weakest(self.grounds)
         note = "; ".join(dict.fromkeys(ground.words for ground in self.grounds))
         off = deviation_percent(printed, ours, self.unit)
-        same = ours is not None and round(ours - printed, 12) == 0.0
-        digits = math.inf if self.decimals is None else self.decimals
-        rounds = ours is not None and abs(ours - printed) <= 0.5000001 * 10.0**-digits
-        meets = same or rounds or (off is not None and abs(off) <= self.tolerance)
+        half = 1e-12 if self.decimals is None else 0.5000001 * 10.0**-self.decimals
+        rounds = ours is not None and abs(ours - printed) <= half
+        meets = rounds or (off is not None and abs(off) <= self.tolerance)
         if deciding.verdict != "cannot-be-checked" and not meets:
             deciding, note = self.fault, self.fault.words
+            found = [x for x in (ours, *others()) if x is not None and math.isfinite(x)]
+            if found and min(found) - half <= printed <= max(found) + half:
+                words = f"{self.unprinted}, from {min(found):.5g} to {max(found):.5g} {self.unit}"
+                deciding, note = Ground("cannot-be-checked", words), f"{words.strip()}; {note}"
         return Cell(
             self.paper, self.table, row, column, printed, ours,
-            deciding.verdict, note, self.unit, deciding.tried, self,
+            deciding.verdict, note, self.unit, deciding.tried, self, others,
         )  # fmt: skip

@@ -85,5 +85,5 @@ def under(choice: Choice, cells: Sequence[Cell]) -> dict[Key, Cell]:
             raise InputError(f"no judged cell {key}", expected="one of the study's")
         grounds = (*cell.page.grounds, Ground(choice.worth, choice.label))
         page = replace(cell.page, grounds=grounds, fault=missed)
-        found[key] = page.cell(cell.row, cell.column, cell.printed, ours)
+        found[key] = page.cell(cell.row, cell.column, cell.printed, ours, cell.others)
     return found

@@ -80,6 +80,18 @@ def verdict_counts(cells: Sequence[Cell]) -> dict[Verdict, int]:
     return {verdict: sum(cell.verdict == verdict for cell in cells) for verdict in VERDICTS}
 
 
+def count_different(cells: Sequence[Cell]) -> int:
+    """Return how many different figures agree independently: one printed again counts once.
+
+    Examples:
+        >>> free = reproduction.Ground("independent", "nothing is chosen for it")
+        >>> page = reproduction.Page("paper", "2", (free,), decimals=3)
+        >>> reproduction.count_different([page.cell(m, "mode 1", 1.0, 1.0001) for m in "BCD"])
+        1
+    """
+    return len({(c.paper, c.unit, c.printed) for c in cells if c.verdict == "independent"})
+
+
 def cells_to_json(studies: Sequence[Study]) -> list[dict[str, Any]]:
     """Return all cells as plain data; None for what is missing."""
     return [

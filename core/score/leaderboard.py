@@ -264,11 +264,12 @@ def leaderboard(run: Run) -> pd.DataFrame:
     return pd.DataFrame(list_rows(run), columns=list(COLUMNS)).astype({"rank": float})
 
 
-def list_rows(run: Run) -> list[dict[str, Any]]:
+def list_rows(run: Run, standings: Standings | None = None) -> list[dict[str, Any]]:
     """Return the rows of `leaderboard`, best first; the rank of a yardstick is None.
 
     Arguments:
         run: as for `leaderboard`.
+        standings: of the run, where they are known already.
 
     Raises:
         InputError: when the run keeps too little to be scored.
@@ -277,7 +278,7 @@ def list_rows(run: Run) -> list[dict[str, Any]]:
         >>> [round(row["gain"], 2) for row in results.list_rows(run)]
         [0.6, -0.67]
     """
-    standings = Standings.of(run)
+    standings = standings or Standings.of(run)
     if not standings.own.cases:
         return []
     by_name: dict[str, list[JobResult]] = {name: [] for name in standings.own.names}

@@ -78,7 +78,8 @@ def twin_gains(run: Run) -> dict[str, TwinGain]:
     pairs = {n: (a[there[n]], b[there[n]]) for n, (a, b) in pairs.items() if there[n].any()}
     lost = {name: before - after for name, (before, after) in pairs.items()}
     kinds = run.meta["twins"].get("kinds") or {}
-    known = {name: _known(run, name, ran, kinds) for name in pairs}
+    scale = Scale.of(run.meta)
+    known = {name: _known(run, scale, name, ran, kinds) for name in pairs}
     return {
         item.strategy: TwinGain(
             gain=float(pairs[item.strategy][1].mean()),
@@ -94,7 +95,7 @@ def twin_gains(run: Run) -> dict[str, TwinGain]:
 
 
 def _known(
-    run: Run, strategy: str, ran: Sequence[JobResult], kinds: Mapping[str, Sequence[str]]
+    run: Run, scale: Scale, strategy: str, ran: Sequence[JobResult], kinds: Mapping[str, list[str]]
 ) -> tuple[str, ...]:
     """Return the cases on which a strategy is good, and on each of their twins much worse.
 
@@ -102,7 +103,7 @@ def _known(
         ran: results on twins.
         kinds: of the twins; similar ones where not stated.
     """
-    scale, origins = Scale.of(run.meta), origins_of(run.meta, "of")
+    origins = origins_of(run.meta, "of")
     # Frequencies and changes apart: who knows one of the two by heart need not know the other.
     left: dict[tuple[str, str], list[float]] = {}
     for result in (*run.ranked, *ran):

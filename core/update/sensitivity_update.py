@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 
@@ -25,6 +26,7 @@ _SMALLEST_STEP = 1e-9
 _ROUNDING = 1e-10  # relative, of a modal quantity: some ten times what linear algebra leaves
 _NO_GAIN = 1e-6
 _PATIENCE = 3
+_AWAY = 0.5  # prior deviations
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class UpdateOptions:
             parameters that hardly matter drift on for ever.
         max_step: longest step of a scaled parameter in one iteration.
         halvings: how often a step that makes the cost grow is halved.
+        restarts: how often the end is left, by half a prior deviation in a random direction, and
+            the iteration repeated: a saddle, such as that of a symmetric model, is left.
     """
 
     residual: Residual = "eigenvalue"
@@ -55,6 +59,7 @@ class UpdateOptions:
     cost_tolerance: float = 1e-4
     max_step: float = 0.5
     halvings: int = 8
+    restarts: int = 0
 
     def __post_init__(self) -> None:
         if self.weighting not in ("unit", "statistical"):
@@ -149,8 +154,31 @@ class Iteration:
         data = self.data
         self.beta = self.options.damping * float(np.square(data.weight * data.target).sum())
         self.record(0, point, 0.0)
-        slow = 0
-        for iteration in range(1, self.options.max_iterations + 1):
+        point, rng = self.descend(point), np.random.default_rng(0)
+        for _ in range(self.options.restarts):
+            point = self.improve(point, rng.standard_normal(len(parametric)))
+        self.check(point)
+        return point
+
+    def improve(self, point: Iterate, direction: FloatArray) -> Iterate:
+        """Return the better of an end and of where the iteration goes from a point near it."""
+        parametric, kept = self.parametric, (self.history, self.converged)
+        away = _AWAY * np.where(parametric.precision, parametric.precision, np.inf) ** -0.5
+        q = np.clip(point.q + away * direction, parametric.lower, parametric.upper)
+        self.history = [*self.history]
+        with suppress(ModelError, Diverged):
+            other = self.descend(self.at(q, point.prediction))
+            self.check(other)
+            lost = (point.prediction.partner >= 0) & (other.prediction.partner < 0)
+            if not lost.any() and self.gain(point, other) > self.options.cost_tolerance:
+                return other
+        self.history, self.converged = kept
+        return point
+
+    def descend(self, point: Iterate) -> Iterate:
+        """Return where the steps from a point end."""
+        slow, self.converged, begun = 0, False, len(self.history)
+        for iteration in range(begun, begun + self.options.max_iterations):
             problem = self.linearise(point)
             low, high = self.parametric.lower, self.parametric.upper
             step = problem.step(low, high, self.options.max_step, ridge=self.beta)
@@ -165,7 +193,6 @@ class Iteration:
             if moved < self.options.tolerance or slow == _PATIENCE:
                 self.converged = True
                 break
-        self.check(point)
         return point
 
     def record(self, iteration: int, point: Iterate, step: float) -> None:

@@ -117,11 +117,3 @@ def count_cells(bench: Workbench) -> tuple[Cell, ...]:
 def _only(values: IntArray) -> int:
     """Return the one value that all elements have; -1 where they differ."""
     return int(values[0]) if (values == values[0]).all() else -1
-
-
-def largest_difference(bench: Workbench) -> float:
-    """Return how far Nobari's stiffness with rigid-body modes is from the physical one."""
-    one, other = (
-        bench.update(CASE, words).model.stiffness for words in ("nobari-rigid", "physical")
-    )
-    return float(np.abs(one - other).max() / np.abs(other).max())

@@ -9,25 +9,20 @@ import scipy.linalg as la
 
 from femubench import Model, solve_modes
 from femubench.fem import FloatArray, Structure
-from femubench.papers.frame.common import CASE, PAPER, format_frequencies, strain_modes
-from femubench.papers.frame.spaces import Spaces
-from femubench.papers.frame.tables import compute_printed_errors
-from femubench.papers.printed import read_printed
+from femubench.papers.frame.common import CASE, format_frequencies, strain_modes
 from femubench.reproduction import Extra, Workbench
 from femubench.update import Symmetry, generic_family, quasi_measured_modes
 
 _TORSION_FACTOR = 140.0
 
 
-def misprint_table(bench: Workbench, spaces: Spaces) -> Extra:
+def misprint_table(bench: Workbench) -> Extra:
     """Return what is misprinted or contradictory, and what shows it."""
     rows = (
         _rotation(bench),
         _torsional_mass(bench),
         _symmetry(bench),
         _stiffness_parameter(bench),
-        _errors(),
-        _over_determined(bench, spaces),
     )
     return Extra(
         "Misprints and contradictions",
@@ -127,31 +122,4 @@ def _stiffness_parameter(bench: Workbench) -> tuple[str, ...]:
         "r L^2, k4 = EI r / L = GJ / L",
         f"with r = GJ / EI the printed sides differ by 1 / L^2: {as_printed:.4g} N/m against "
         f"{torsion / length:.4g} N m for the first element",
-    )
-
-
-def _errors() -> tuple[str, ...]:
-    table = read_printed(PAPER)["table1"]
-    fe, measured = np.array(table["fe"]), np.array(table["measured"])
-    return (
-        "Table 1, error",
-        format_frequencies(np.array(table["error_percent"])),
-        format_frequencies(compute_printed_errors()),
-        "from the two printed columns; relative to the FE column it would be "
-        f"{format_frequencies(100.0 * (1.0 - measured / fe))}",
-    )
-
-
-def _over_determined(bench: Workbench, spaces: Spaces) -> tuple[str, ...]:
-    ranks = [
-        int(bench.update(CASE, words).diagnostics["rank"])
-        for words in ("kabe", "kabe:cutoff=1e-05")
-    ]
-    equations = int(bench.update(CASE, "generic-ls").diagnostics["equations"])
-    return (
-        "section 4.1",
-        f"over-determined: {equations} equations, {spaces.entries} unknowns",
-        "under-determined",
-        f"rank {ranks[0]} with singular values above 0.03 of the inertia forces, "
-        f"{ranks[1]} above 0.00001",
     )

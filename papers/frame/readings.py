@@ -12,7 +12,6 @@ from femubench.papers.frame.common import (
     TWIN_SHAPES,
     format_frequencies,
     modes_of,
-    one,
     rigid_modes,
     strain_modes,
 )
@@ -24,9 +23,6 @@ SEARCH = "docs/reproduce.md has the search"
 # for all columns before the grid was chosen.
 TRIED, EXPLORED = 2208, 17000
 CUTOFFS = (0.1, 0.03, 0.01, 0.001, 0.0003, 0.0001, 0.00001)
-ELEMENT_METHODS = ("physical", "nobari", "nobari-rigid", "generic-ls", "generic-adjusted")
-OPTIONS = ("orthogonality=false", "expansion=force", "frequencies=nominal")
-ITERATED = ("kabe", "kabe-rigid", *ELEMENT_METHODS)
 
 
 def kabe_words(cutoff: float) -> str:
@@ -141,30 +137,6 @@ def _first(bench: Workbench) -> QuasiModes:
     return quasi_measured_modes(case.model, case.used_measurement())
 
 
-def other_readings(bench: Workbench) -> Extra:
-    """Return the columns of tables 3 and 4 as the text has it and read otherwise."""
-    rows = []
-    for name in ELEMENT_METHODS:
-        for words in (name, *(f"{name}:{option}" for option in OPTIONS)):
-            count = int(bench.update(CASE, words).diagnostics["equations"])
-            rigid, modes = rigid_modes(bench, words), strain_modes(bench, words)
-            rows.append(
-                (words, str(count), format_frequencies(rigid), *(one(float(f)) for f in modes))
-            )
-    return Extra(
-        "Tables 3 and 4 under other readings",
-        (
-            "strategy",
-            "equations",
-            "rigid-body modes (Hz)",
-            *(f"mode {i} (Hz)" for i in range(1, 6)),
-        ),
-        tuple(rows),
-        "The plain names are the text: 249 equations, shapes by (16)-(17), measured frequencies. "
-        "No reading gives every column.",
-    )
-
-
 def cutoffs(bench: Workbench) -> Extra:
     """Return what the cutoff makes of the changed non-zeros."""
     rows = []
@@ -181,19 +153,4 @@ def cutoffs(bench: Workbench) -> Extra:
         tuple(rows),
         "Every row has the three used modes. The paper calls 249 equations for 231 unknowns "
         "over-determined; by rank they are not.",
-    )
-
-
-def convergence(bench: Workbench) -> Extra:
-    """Return how far each procedure still moves after every iteration."""
-    rows = []
-    for words in ITERATED:
-        steps = bench.update(CASE, words).history[1:5]
-        rows.append((words, *(f"{100.0 * step['change']:.2g}" for step in steps)))
-    return Extra(
-        "Convergence: change of the unknowns in each iteration",
-        ("strategy", *(f"iteration {i} (%)" for i in range(2, 6))),
-        tuple(rows),
-        "Relative to the whole change. The paper reports no further change after 2 to 4 "
-        "iterations.",
     )

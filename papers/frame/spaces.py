@@ -105,8 +105,8 @@ def compare_spaces(model: Model) -> Spaces:
     )
 
 
-def spaces_extra(bench: Workbench) -> tuple[Extra, tuple[str, ...], Spaces]:
-    """Return the table of spaces, the findings, and the figures themselves."""
+def spaces_extra(bench: Workbench) -> tuple[Extra, tuple[str, ...]]:
+    """Return the table of spaces, and the findings."""
     s = compare_spaces(bench.cases[CASE].model)
     rows = (
         ("matrices with the pattern of K0", str(s.entries), ""),
@@ -141,7 +141,7 @@ def spaces_extra(bench: Workbench) -> tuple[Extra, tuple[str, ...], Spaces]:
         f"that set is the physical one (dimension {s.physical}, largest principal angle "
         f"{s.same_as_physical:.0e} rad), as equation (21) says."
     )
-    return extra, (generic, nobari), s
+    return extra, (generic, nobari)
 
 
 def _upper(matrix: FloatArray, size: FloatArray) -> FloatArray:

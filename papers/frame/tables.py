@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from femubench import Modes
 from femubench.fem import FloatArray
 from femubench.papers.frame import readings
 from femubench.papers.frame.common import (
     GIVEN,
     PAPER,
     RECOVERED,
+    SHAPES,
     TRUTH,
     TWIN_SHAPES,
     format_frequencies,
     rigid_modes,
     strain_modes,
+    under_other_shapes,
 )
 from femubench.papers.printed import read_printed
 from femubench.reproduction import Cell, Grid, Ground, Page, PrintedTable, Workbench
@@ -76,24 +80,33 @@ def layout() -> tuple[PrintedTable, ...]:
 
 def page(table: str, tolerance: float, ground: Ground, reason: str = "") -> Page:
     """Return a page of frequencies in Hz with one printed digit behind the point."""
-    made = Page(PAPER, table, (ground,), "Hz", tolerance, 1)
+    made = Page(PAPER, table, (ground,), "Hz", tolerance, 1, unprinted=SHAPES)
     return replace(made, fault=Ground("does-not-follow", reason)) if reason else made
 
 
 def column(
-    where: Page, name: str, values: Sequence[float], ours: FloatArray, first: int
+    bench: Workbench, where: Page, words: str, name: str, values: Sequence[float], first: int = 1
 ) -> list[Cell]:
-    """Return the cells of strain modes, the first of which has the number ``first``."""
+    """Return the cells of strain modes under an update, from that with the number ``first`` on."""
+    ours, last = strain_modes(bench, words), first + len(values)
     return [
-        where.cell(f"mode {first + i}", name, p, float(o))
-        for i, (p, o) in enumerate(zip(values, ours, strict=True))
+        where.cell(
+            *(f"mode {k}", name, theirs, float(ours[k - 1])),
+            partial(under_other_shapes, bench, words, partial(_strain_mode, k)),
+        )
+        for k, theirs in zip(range(first, last), values, strict=True)
     ]
 
 
-def _rigid(where: Page, name: str, values: Sequence[float], ours: FloatArray) -> Cell:
+def _strain_mode(number: int, modes: Modes) -> float:
+    return float(modes.elastic.natural_frequencies[number - 1])
+
+
+def _rigid(bench: Workbench, where: Page, words: str, name: str, values: Sequence[float]) -> Cell:
     """Return the cell of the row of rigid-body modes, which prints one figure a column."""
-    size = rigid_figure(values, ours)
-    return where.cell("rigid-body modes", name, float(values[0]), size)
+    size = rigid_figure(values, rigid_modes(bench, words))
+    others = partial(under_other_shapes, bench, words, lambda m: float(m.natural_frequencies[0]))
+    return where.cell("rigid-body modes", name, float(values[0]), size, others)
 
 
 def rigid_figure(values: Sequence[float], ours: FloatArray) -> float | None:
@@ -113,7 +126,7 @@ def compute_printed_errors() -> FloatArray:
 
 
 def _table1(bench: Workbench, data: dict[str, Any]) -> list[Cell]:
-    table, fe = data["table1"], strain_modes(bench, "unchanged")
+    table = data["table1"]
     half = 0.05  # Hz, of the last printed digit
     errors = []
     for i, (p, own) in enumerate(
@@ -128,7 +141,10 @@ def _table1(bench: Workbench, data: dict[str, Any]) -> list[Cell]:
         )
         where = Page(PAPER, "1", (_COLUMNS,), "%", 0.0, 1, wrong)
         errors.append(where.cell(f"mode {i + 1}", "error", p, float(own)))
-    return column(page("1", _EXACT, RECOVERED), "FE model", table["fe"], fe, 1) + errors
+    return [
+        *column(bench, page("1", _EXACT, RECOVERED), "unchanged", "FE model", table["fe"]),
+        *errors,
+    ]
 
 
 def _table2(bench: Workbench, data: dict[str, Any]) -> list[Cell]:
@@ -144,12 +160,11 @@ def _table2(bench: Workbench, data: dict[str, Any]) -> list[Cell]:
             *(_AS_DATA, shapes, ""),
         ),
     ):
-        values, ours = data["table2"][key], strain_modes(bench, words)
-        at = page("2", _EXACT, free, reason)
-        cells.append(_rigid(at, name, values["rigid"], rigid_modes(bench, words)))
-        cells += column(page("2", _EXACT, GIVEN), name, values["modes"][:3], ours[:3], 1)
+        values, at = data["table2"][key], page("2", _EXACT, free, reason)
+        cells.append(_rigid(bench, at, words, name, values["rigid"]))
+        cells += column(bench, page("2", _EXACT, GIVEN), words, name, values["modes"][:3])
         higher = page("2", _EXACT if key == "baruch" else _SHAPED, ground, reason)
-        cells += column(higher, name, values["modes"][3:], ours[3:], 4)
+        cells += column(bench, higher, words, name, values["modes"][3:], 4)
     return cells
 
 
@@ -160,30 +175,30 @@ def _table3(bench: Workbench, data: dict[str, Any]) -> list[Cell]:
         ("physical", "physical parameters", "physical", _BY_ELEMENTS),
         ("nobari", "Nobari's method", "nobari", shapes),
     ):
-        values, ours = data["table3"][key], strain_modes(bench, words)
+        values = data["table3"][key]
         reason = readings.explain_met(bench, words, values["modes"])
         rigid, other = rigid_modes(bench, words), rigid_modes(bench, words, TRUTH)
         size = (
             f"one imaginary and one zero frequency as printed, but {format_frequencies(rigid)} Hz; "
             f"{TWIN_SHAPES}; with the beam truth and its shapes {format_frequencies(other)} Hz"
         )
-        cells.append(_rigid(page("3", _EXACT, free, size), name, values["rigid"], rigid))
-        cells += column(page("3", _SHAPED, shapes, reason), name, values["modes"], ours, 1)
+        cells.append(_rigid(bench, page("3", _EXACT, free, size), words, name, values["rigid"]))
+        cells += column(bench, page("3", _SHAPED, shapes, reason), words, name, values["modes"])
     return cells
 
 
 def _table4(bench: Workbench, data: dict[str, Any]) -> list[Cell]:
     least, adjusted = data["table4"]["generic_ls"], data["table4"]["generic_adjusted"]
-    forced, tied = strain_modes(bench, LS_FORCED), strain_modes(bench, "generic-adjusted")
     free, met = page("4", _EXACT, _BY_ELEMENTS), page("4", _EXACT, GIVEN)
-    name = "LS solution"
     searched = page("4", _SHAPED, readings.explain_higher_modes(bench, LS_FORCED))
-    cells = [_rigid(free, name, least["rigid"], rigid_modes(bench, "generic-ls"))]
-    cells += column(met, name, least["modes"][:3], forced[:3], 1)
-    cells += column(searched, name, least["modes"][3:], forced[3:], 4)
-    name = "adjusted solution"
-    cells.append(_rigid(free, name, adjusted["rigid"], rigid_modes(bench, "generic-adjusted")))
-    cells += column(met, name, adjusted["modes"][:3], tied[:3], 1)
     shapes = Ground("under-convention", TWIN_SHAPES)
     higher = page("4", _SHAPED, shapes, readings.explain_adjusted(bench))
-    return cells + column(higher, name, adjusted["modes"][3:], tied[3:], 4)
+    cells = []
+    for name, words, taken, theirs, last in (
+        ("LS solution", "generic-ls", LS_FORCED, least, searched),
+        ("adjusted solution", "generic-adjusted", "generic-adjusted", adjusted, higher),
+    ):
+        cells.append(_rigid(bench, free, words, name, theirs["rigid"]))
+        cells += column(bench, met, taken, name, theirs["modes"][:3])
+        cells += column(bench, last, taken, name, theirs["modes"][3:], 4)
+    return cells

@@ -15,15 +15,14 @@ from femubench.papers.hframe.physical import (
     physical_model,
     shape_paired_errors,
 )
-from femubench.papers.hframe.rows import FREE_EI, ROWS, Update, at_printed, parameter_values, run
-from femubench.papers.hframe.updates import USED, follows, is_misprinted, unit_of
+from femubench.papers.hframe.rows import FREE_EI, ROWS, at_printed, parameter_values, run
+from femubench.papers.hframe.updates import USED, unit_of
 from femubench.papers.printed import read_printed
 from femubench.reproduction import Bars, Extra, Workbench
 
 DIAGNOSED = "diagnosed:meet_frequencies=false"
 BUILT, PHYSICAL = "C_a as built", "shear, k_theta, E"
 _DRAWN = (BUILT, "a", "b", "d", "e", PHYSICAL)
-_LONG, _EVERY = 16, 10  # tables of iterations
 
 
 @dataclass(frozen=True)
@@ -83,8 +82,6 @@ def extras(bench: Workbench, comparison: ModelComparison) -> tuple[Extra, ...]:
             "No update: the parameters are set to the printed ones. Row c with rigid springs.",
         ),
         _converged(bench),
-        *(_history(bench, row) for row in ROWS),
-        _misprints(bench),
     )
 
 
@@ -132,49 +129,6 @@ def _converged(bench: Workbench) -> Extra:
         ("table", "parameter", "update", *("printed", "ours", "deviation, %"), *ratios),
         tuple(rows),
         "In c only EI / rho A is determined; in d k_x and k_z are not.",
-    )
-
-
-def _history(bench: Workbench, row: Update) -> Extra:
-    words = row.converged or row.updated.words
-    history = run(bench, words).history
-    names = [name for name in history[0] if name not in ("iteration", "step")]
-    kept = [
-        entry
-        for i, entry in enumerate(history)
-        if len(history) <= _LONG or i % _EVERY == 0 or i == len(history) - 1
-    ]
-    rows = tuple(
-        (f"{entry['iteration']:.0f}", *(f"{entry[name]:.6g}" for name in names)) for entry in kept
-    )
-    units = {p.name: p.unit or "factor" for p in run(bench, words).parameters}
-    heads = [f"{name}, {units.get(name, '(rad/s)^4')}" for name in names]
-    note = f"bench run hframe -s '{words}'"
-    if row.converged:
-        note += "; to convergence, where the cells stop short"
-    return Extra(f"Iterations of table {row.table}", ("iteration", *heads), rows, note)
-
-
-def _misprints(bench: Workbench) -> Extra:
-    measured = bench.cases["hframe"].used_measurement(0).frequencies
-    rows = []
-    for row in ROWS:
-        theirs = read_printed("hframe")["table4"][row.key]
-        for column in ("initial", "updated"):
-            pairs = zip(theirs[column], measured, theirs[f"{column}_error"], strict=True)
-            for mode, (f, f_m, error) in enumerate(pairs, 1):
-                if is_misprinted(f, f_m, error):
-                    place = f"table {row.table}, mode {mode}, {column} error"
-                    rows.append((place, f"{error:+.2f} %", f"{follows(f, f_m):+.2f} %"))
-    text, table = read_printed("hframe")["section8"], read_printed("hframe")["table4"]["e_offset"]
-    units = f"{text['a_V']:g} mm", f"{table['parameters']['a_V'][0]:g} m"
-    rows.append(("section 8 against table 4e, a_V", *units))
-    return Extra(
-        "Misprints",
-        ("where", "printed", "elsewhere in print"),
-        tuple(rows),
-        "The errors contradict the frequencies printed next to them. For a_V text and table "
-        "have different units; the frequencies hardly depend on it.",
     )
 
 

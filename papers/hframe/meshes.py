@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 from femubench import Case, Model, solve_modes
 from femubench.fem import FloatArray
@@ -14,6 +15,10 @@ MODES = 8
 RECOVERED = Ground(
     "fitted",
     "dimensions and accelerometers are recovered from these very frequencies: no independent check",
+)
+LEVERS = (
+    "what was recovered decides: with the second accelerometer on a lever like the first one's, "
+    "on either side of its leg (the text gives no length) there are values of ours"
 )
 _BASE = Ground("input", "by definition: the row that all others are divided by")
 _RATIOS = Ground(
@@ -40,6 +45,15 @@ def bare(case: Case, mesh: Sequence[int]) -> Model:
     return Model.of(replace(frame, members=members, masses=()))
 
 
+def levered(case: Case) -> Iterator[Case]:
+    """Yield the case with its second accelerometer on a lever like the first one's, either way."""
+    frame = case.model.frame_structure.frame
+    first, second = frame.masses
+    for x in (first.offset[2], -first.offset[2]):
+        moved = replace(second, offset=(x, 0.0, 0.0))
+        yield replace(case, model=Model.of(replace(frame, masses=(first, moved))))
+
+
 def mesh_cells(case: Case) -> tuple[Cell, ...]:
     """Return table 2, normalised with mesh A; what agrees rounds to the printed digit."""
     tables = read_printed("hframe")
@@ -61,6 +75,11 @@ def mesh_cells(case: Case) -> tuple[Cell, ...]:
                 reason += f"; the printed {own} Hz of table 3 over our mesh A is {own / base:.6f}"
             ground = {"A": _BASE, "C_a": RECOVERED}.get(row, _RATIOS)
             fault = Ground("does-not-follow", reason)
-            page = Page("hframe", "2", (ground,), "", 0.0, 3, fault)
-            cells.append(page.cell(row, f"mode {k + 1}", theirs, ours))
+            page = Page("hframe", "2", (ground,), "", 0.0, 3, fault, LEVERS)
+            others = partial(_levered_ratios, case, k, base) if row == "C_a" else tuple
+            cells.append(page.cell(row, f"mode {k + 1}", theirs, ours, others))
     return tuple(cells)
+
+
+def _levered_ratios(case: Case, mode: int, base: float) -> Iterator[float]:
+    return (float(frequencies(other.model)[mode] / base) for other in levered(case))

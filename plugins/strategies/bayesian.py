@@ -20,7 +20,7 @@ from femubench.update import (
     scale_property,
 )
 
-_OPTIONS = UpdateOptions(residual="frequency", weighting="statistical", damping=0.0)
+_OPTIONS = UpdateOptions(residual="frequency", weighting="statistical", damping=0.0, restarts=1)
 
 
 @dataclass(frozen=True)

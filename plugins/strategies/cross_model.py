@@ -20,7 +20,10 @@ from femubench.update import (
     quasi_measured_modes,
 )
 
-_RIDGE = 1e-3  # decides factors that no equation sees
+_RIDGE = 1e-3  # decides what no equation sees
+# Of factors with rotated shapes, which are so far from the measured ones that an equation errs as
+# much as a factor changes.
+_ROTATED = 1.0
 _LEAST, _LARGEST = 0.2, 5.0
 
 
@@ -34,13 +37,14 @@ class CrossModel(ParametricStrategy):
 
     Arguments:
         changes: as of `ParametricStrategy`.
-        modes: model modes taken for every measured one, the lowest.
-        expansion: of measured shapes to all dofs: `rotation` of the model's own, or `force`, the
-            least force residual with the readings met, which is exact for complete shapes.
+        modes: model modes taken for every measured one with `force`, the lowest.
+        expansion: of measured shapes to all dofs: `rotation` of the model's own, which have no
+            equations but those of the partners, or `force`, the least force residual with the
+            readings met, which is exact for complete shapes.
 
     The authors' is the system, without iteration; the mass is not changed here. Ours are the
-    expansion, equations relative to omega_i omega*_j instead of lambda_i, which may be divided by
-    next to nothing, and factors between 1/5 and 5.
+    expansion, the weight of changes with `rotation`, equations relative to omega_i omega*_j instead
+    of lambda_i, which may be divided by next to nothing, and factors between 1/5 and 5.
     """
 
     name: ClassVar[str] = "cross-model"
@@ -69,16 +73,18 @@ class CrossModel(ParametricStrategy):
         """
         parts = parameterise(model, self.changes)
         model = parts.start
-        own = solve_modes(model).elastic
-        own = own.take(np.arange(min(len(own), self.modes * len(measurement))))
         if self.expansion == "force":
+            own = solve_modes(model).elastic
+            own = own.take(np.arange(min(len(own), self.modes * len(measurement))))
             shapes = mass_normalised(model, expand_measured_shapes(model, measurement))
         else:
-            shapes = quasi_measured_modes(model, measurement).shapes
+            quasi = quasi_measured_modes(model, measurement)
+            own, shapes = quasi.modes.take(quasi.partners), quasi.shapes
         matrix, right = cross_equations(parts, own, shapes, measurement.eigenvalues)
         count, factor = len(parts), parts.is_property
+        ridge = np.where(factor & (self.expansion == "rotation"), _ROTATED, _RIDGE)
         found = lsq_linear(
-            np.vstack([matrix, _RIDGE * np.eye(count)]),
+            np.vstack([matrix, np.diag(ridge)]),
             np.append(right, np.zeros(count)),
             bounds=(
                 np.where(factor, _LEAST - 1.0, parts.lower),

@@ -39,7 +39,7 @@ class Meet(Strategy):
         return UpdateResult(with_measured_frequencies(model, measurement), len(measurement))
 
 
-class Shifted(Strategy):
+class Shifted(Meet):
     """Put the given frequencies on the modes of the model and carry half of their ratios on.
 
     The stiffness is scaled so that all frequencies move by half of the mean ln(f_m / f_p) of the
@@ -52,7 +52,6 @@ class Shifted(Strategy):
         "no knowledge of the structure: the given ratios of frequencies, carried on by half"
     )
     yardstick: ClassVar[str] = "the given ratios carried on"
-    promises: ClassVar[frozenset[str]] = frozenset({"rigid-body-modes", "no-negative-eigenvalue"})
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator
@@ -76,4 +75,5 @@ class Shifted(Strategy):
             stiffness=factor * model.stiffness,
             stiffness_change=change and replace(change, core=factor * change.core),
         )
-        return UpdateResult(with_measured_frequencies(scaled, measurement), len(measurement) + 1)
+        found = super().update(scaled, measurement, rng)
+        return replace(found, parameter_count=found.parameter_count + 1)

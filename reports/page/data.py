@@ -75,7 +75,8 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
     Arguments:
         exhibits: what the store has to draw.
     """
-    board, apart, scale = list_rows(run), Standings.of(run).apart, Scale.of(run.meta)
+    standings, scale = Standings.of(run), Scale.of(run.meta)
+    board, apart = list_rows(run, standings), standings.apart
     shared = {
         "finding": finding(run, board),
         "lead": lead(run),
