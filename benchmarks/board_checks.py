@@ -35,7 +35,7 @@ VARIED = {
     "above": (1.0, 1.5),
     "same_mac": (0.7, 0.9),
 }
-TRIALS = 200
+TRIALS = 1000
 
 
 # What could stand in place of the mean over structures, of gains by structure and strategy.
