@@ -1,4 +1,4 @@
-"""Whether stated probabilities and deviations hold, and what is a fault of the search."""
+"""What an answer states of names and of places, with which probability."""
 
 from __future__ import annotations
 

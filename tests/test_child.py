@@ -193,6 +193,7 @@ class TestDescriptors:
             start()
         assert self.count() == before
 
+    @pytest.mark.slow(20)  # a server that other tests used is reaped here
     def test_where_a_server_takes_nothing(
         self, start: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:

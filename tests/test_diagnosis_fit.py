@@ -319,6 +319,7 @@ def small() -> Problem:
         [("rotary-inertia", "all")],
         [("youngs-modulus", "all"), ("density", "all")],
         [("added-mass", "J1"), ("member-mass", "rung-middle")],
+        [("rotary-inertia", "all"), ("torsion-constant", "all")],
     ],
     ids=lambda labels: "+".join(f"{name}@{place}" for name, place in labels),
 )

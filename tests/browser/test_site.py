@@ -21,8 +21,8 @@ BAR = 2**18  # bytes of a page
 
 @pytest.fixture(scope="module")
 def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a site of 12 strategies on 6 cases."""
-    return synthetic_site(tmp_path_factory.mktemp("large"), 12, 4)
+    """Return a site of 12 strategies on 9 cases."""
+    return synthetic_site(tmp_path_factory.mktemp("large"), 12, 8)
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +129,7 @@ def test_a_large_board_is_sorted_and_filtered_with_the_keyboard(
     found = view(page_of(large, "index"))
     page, index = found.page, json.loads((large / "index.json").read_text())
     board = index["boards"][0]
-    assert (len(board["rows"]), len(board["cases"])) == (12, 6)
+    assert (len(board["rows"]), len(board["cases"])) == (12, 9)
     table, names = page.locator("table.filtered"), [row["strategy"] for row in board["rows"]]
 
     def column(number: int) -> list[str]:
