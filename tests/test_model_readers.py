@@ -376,7 +376,7 @@ def test_a_solid_has_the_frequencies_of_calculix(plates: Path) -> None:
 @pytest.mark.skipif(CCX is None, reason="ccx is not installed")
 def test_five_commands_lead_from_a_job_to_a_ranking(tmp_path: Path) -> None:
     """Those of docs/readers.md, word for word."""
-    shutil.copytree(PLATES, tmp_path / "plates")
+    folder = Path(shutil.copytree(PLATES, tmp_path / "plates"))
     text = (PLATES.parents[1] / "docs" / "readers.md").read_text(encoding="utf-8")
     section = text.partition("### Three bolted plates")[2]
     (block,) = re.findall(r"```console\n(.*?)```", section.partition("\n## ")[0], re.DOTALL)
@@ -384,10 +384,10 @@ def test_five_commands_lead_from_a_job_to_a_ranking(tmp_path: Path) -> None:
     assert len(commands) == 5
     for words in commands:
         ours = [sys.executable, "-m", "femubench", *words[1:]] if words[0] == "bench" else words
-        done = subprocess.run(ours, cwd=tmp_path, capture_output=True, text=True, check=False)
+        done = subprocess.run(ours, cwd=folder, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         assert done.stderr == "" or words[0] != "bench"
-    case = femubench.read_case(tmp_path / "plates" / "case", readers=READERS)
+    case = femubench.read_case(folder / "case", readers=READERS)
     assert list(case.model.groups) == ["left", "right"]
     assert len(case.measurement.sensors) == 90
     assert np.ptp(case.model.dofs.xyz, axis=0) == pytest.approx([0.4, 0.06, 0.013])

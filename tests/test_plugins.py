@@ -279,7 +279,7 @@ def test_objects_with_methods_are_plugins_too(tmp_path: Path) -> None:
     plugins = load_plugins([], {"several": Several()})
     assert plugins.broken == ()
     assert isinstance(plugins.reporters["unit"], Unit)
-    offers = {kind: names for kind, names in plugins.loaded[0].offers if names}
+    offers = {kind: names for kind, names in dict(plugins.loaded[0].offers).items() if names}
     assert offers == {"scenarios": ("s",), "effects": ("unit",), "reporters": ("unit",)}
 
 
