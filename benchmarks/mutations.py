@@ -81,7 +81,7 @@ core/inference/prior.py :: diagnosis_search
 core/update/modal_space.py :: factor_strategies
     _LOST = 1.0 - 1.0 / WINDOW_WITHOUT_SHAPE => _LOST = 0.0
     _DEPENDENT = 1e-8 => _DEPENDENT = 1e-16
-    shape - 2.0 * scale * own => shape - scale * own
+    shapes[i] - 2.0 * scale * read => shapes[i] - scale * read
 core/update/uncertainty.py :: uncertainty
     _SYMMETRY, _NEGATIVE = 1e-8, 1e-8 => _SYMMETRY, _NEGATIVE = 1e-4, 1e-8
     _SYMMETRY, _NEGATIVE = 1e-8, 1e-8 => _SYMMETRY, _NEGATIVE = 1e-8, 0.0
