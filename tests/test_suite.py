@@ -11,11 +11,11 @@ import pytest
 from printed_boards import as_printed, assert_board_is_that_of, assert_same_errors, stored, text_of
 
 import femubench
-from femubench import read_case
+from femubench import Run, read_case
 from femubench.core.schema.results import UNSEEN
 from femubench.core.score.predictive import Forecasts
 from femubench.core.score.scoring import reference_of
-from femubench.reports.summary import finding
+from femubench.reports.summary import finding, lead
 from femubench.results import leaderboard, list_rows, structures_of
 from truths.published import write_garteur
 
@@ -84,6 +84,16 @@ def test_what_the_documents_say_of_the_board() -> None:
         words = text_of(page).replace("\u2212", "-")
         for sentence in finding(run, list_rows(run)):
             assert sentence.replace("\u2212", "-") in words, (page, sentence)
+
+
+def test_a_board_says_what_its_strategies_could_read_and_that_yardsticks_lead_nothing() -> None:
+    run = stored("suite")
+    assert "sandbox" not in lead(run)
+    assert "without a sandbox" in lead(Run({**run.meta, "sandbox": "none"}, run.results))
+    rows = list_rows(run)
+    assert finding(run, [row for row in rows if row["yardstick"]]) == ["Only yardsticks ran."]
+    lost = [{**row, "rank": 1, "answered": 0} for row in rows]
+    assert finding(run, lost) == ["No strategy gave a possible model."]
 
 
 def test_leave_one_out_and_varied_rules_are_those_of_the_run_kept() -> None:
