@@ -16,6 +16,7 @@ from femubench.core.fem.frame import Factor, JointSpring, Place
 from femubench.core.fit.modal_fit import Problem, State, fit, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.static_response import Basis
+from femubench.core.inference.examine import slopes_with
 from femubench.core.inference.model_error import (
     Inadequacy,
     class_widths,
@@ -33,9 +34,8 @@ TEST = measured(MODEL, FRAME)
 NOTHING = np.zeros(0)
 WIDTHS = class_widths()
 MEMBER = FRAME.members[0]
-JOINT = MEMBER.ends[1]
+FOOT, JOINT = MEMBER.ends
 LENGTH = member_length(FRAME, MEMBER.name)
-ELEMENT = 1  # the second one of the first member
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def problem() -> Problem:
 
 @pytest.fixture(scope="module")
 def slopes(problem: Problem) -> dict[str, FloatArray]:
-    return error_slopes(problem, MODEL.structure, Basis.of(MODEL, TEST).modes)
+    return error_slopes(problem, Basis.of(MODEL, TEST).modes)
 
 
 def raw(frame: Frame) -> FloatArray:
@@ -60,7 +60,7 @@ def change(frame: Frame) -> FloatArray:
 
 
 def stiffer(step: float) -> Frame:
-    return replace(FRAME, factors=(*FRAME.factors, Factor("E", (f"{MEMBER.name}/2",), 1.0 + step)))
+    return replace(FRAME, factors=(*FRAME.factors, Factor("E", (f"{MEMBER.name}/1",), 1.0 + step)))
 
 
 def heavier(step: float) -> Frame:
@@ -69,14 +69,14 @@ def heavier(step: float) -> Frame:
 
 
 def softer(step: float) -> Frame:
-    """A spring about the bending axis at an end, of 4 EI/L over the step."""
+    """A spring about the bending axis at the foot, of 4 EI/L over the step."""
     stiffness = 4.0 * MEMBER.material.E * MEMBER.section.Iy / LENGTH / step
-    spring = JointSpring(JOINT, MEMBER.name, {"ry": stiffness})
+    spring = JointSpring(FOOT, MEMBER.name, {"ry": stiffness})
     return replace(FRAME, joint_springs=(*FRAME.joint_springs, spring))
 
 
 def element(slopes: dict[str, FloatArray]) -> FloatArray:
-    return slopes["element stiffness"][:, ELEMENT]
+    return slopes["element stiffness"][:, 0]
 
 
 def joint(slopes: dict[str, FloatArray]) -> FloatArray:
@@ -86,7 +86,7 @@ def joint(slopes: dict[str, FloatArray]) -> FloatArray:
 
 def end(slopes: dict[str, FloatArray]) -> FloatArray:
     """In-plane frames have one direction an end, two ends a member."""
-    return slopes["flexibility of joints"][:, 1]
+    return slopes["flexibility of joints"][:, 0]
 
 
 @pytest.mark.parametrize(("frame", "column"), [(stiffer, element), (heavier, joint), (softer, end)])
@@ -101,6 +101,56 @@ def test_slopes_are_those_of_a_frame_that_is_changed(
     expected = column(slopes)
     assert np.linalg.norm(expected) > 0.5
     np.testing.assert_allclose(slope, expected, atol=2e-3 * np.abs(expected).max())
+
+
+@pytest.fixture(scope="module")
+def given() -> State:
+    """The model with a foot that gives, as a cause in its modal coordinates."""
+    own = problem_of(MODEL, TEST, effects_named("support-flexibility"))
+    part = part_at(own, "support-flexibility", f"support:{FOOT}")
+    return state_at(own, (part,), np.array([0.5, 1.5]))
+
+
+@pytest.mark.parametrize(("frame", "column"), [(stiffer, element), (heavier, joint), (softer, end)])
+def test_slopes_with_a_cause_are_those_of_the_frame_with_it(
+    given: State,
+    frame: Callable[[float], Frame],
+    column: Callable[[dict[str, FloatArray]], FloatArray],
+) -> None:
+    """Where the foot gives, the forces of the drawn element are not those at its end."""
+    effect, place = given.parts[0].hypothesis.effect, given.parts[0].hypothesis.place
+    values = given.parts[0].hypothesis.values(given.x[None])[0]
+
+    def prediction(drawn: Frame) -> FloatArray:
+        model = effect.extend(Model.of(drawn), place, values.tolist())
+        return -state_at(problem_of(model, TEST, ()), (), NOTHING).raw
+
+    step = 2e-4
+    half, whole = (prediction(frame(s)) - prediction(FRAME) for s in (0.5 * step, step))
+    slope = (4.0 * half - whole) / step
+    expected = column(slopes_with(given))
+    np.testing.assert_allclose(slope, expected, atol=2e-3 * np.abs(expected).max())
+    drawn = column(error_slopes(given.problem, Basis.of(MODEL, TEST).modes))
+    assert np.abs(expected - drawn).max() > 0.02 * np.abs(drawn).max()
+
+
+def test_what_a_model_error_makes_of_a_change_is_shared(
+    given: State, slopes: dict[str, FloatArray]
+) -> None:
+    moved = slopes_with(given)
+    rng = np.random.default_rng(3)
+    before, raw = rng.standard_normal((2, len(given.raw)))
+    for name in ("element stiffness", "flexibility of joint types", "mass of joints"):
+        z = WIDTHS[name] * rng.standard_normal(slopes[name].shape[1])
+        before, raw = before + slopes[name] @ z, raw + moved[name] @ z
+    state = replace(given, raw=raw)
+    still = Inadequacy.of(slopes, slopes, before, WIDTHS, 0.02, 0.0)
+    seen = []
+    for model in (still, still.moved(moved)):
+        found = model.fit(state)
+        seen.append((model.unshared_share(found.v), model.log_density(state, found.v)))
+    assert seen[1][0] < 0.5 * seen[0][0]
+    assert seen[1][1] > seen[0][1] + 3.0
 
 
 def test_everything_stiffer_raises_all_frequencies_alike(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import log
@@ -18,13 +19,14 @@ from femubench.core.change.hypothesis import (
     holding_to_ground,
     hypotheses_of,
 )
-from femubench.core.errors import NotApplicable
+from femubench.core.errors import FemubenchError, NotApplicable
 from femubench.core.fem.model import Model
+from femubench.core.fit.extended_model import extend_model
 from femubench.core.fit.mesh_error import mesh_bias
 from femubench.core.fit.modal_fit import Fit, Problem, State, fit, log_evidence, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
-from femubench.core.fit.static_response import Basis, place_data
+from femubench.core.fit.static_response import Basis, LargeProblem, place_data
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.model_error import (
     Fitted,
@@ -32,6 +34,7 @@ from femubench.core.inference.model_error import (
     class_widths,
     condition_noise,
     error_slopes,
+    general_slopes,
     scatter_slopes,
 )
 from femubench.core.inference.posterior import Explanation, Posterior, by_weight
@@ -148,8 +151,8 @@ class Examination:
         kept = np.flatnonzero(
             np.concatenate([np.ones(count), mode < used, np.ones(1)])[: len(data)]
         )
-        problem, structure = replace(self.problem, data=data), self.model.structure
-        slopes = {k: s[kept] for k, s in error_slopes(problem, structure, self.modes).items()}
+        everything = error_slopes(replace(self.problem, data=data), self.modes)
+        slopes = {k: s[kept] for k, s in everything.items()}
         unseen = np.arange(used, count)
         found = []
         for state, raw in explained:
@@ -361,6 +364,8 @@ def with_scales(
     """Return an explanation with the scales of model error that suit it best."""
     state = explanation.fit.state
     if state.parts:
+        if len(error.residual):
+            error = error.moved(slopes_with(state))
         error = error.add_own_error(nothing, state)
     problem = replace(state.problem, noise=error.noise(error.fit(state, near)))
     found: Fit | None
@@ -373,13 +378,28 @@ def with_scales(
     return explanation if found is None else replace(explanation, fit=found)
 
 
+def slopes_with(state: State) -> dict[str, FloatArray]:
+    """Return what `error_slopes` does of the model with the causes of a state in it.
+
+    The same perturbations change what a cause does, which is no error that two states do not share.
+    Nothing for a large model, and where the causes make no model.
+    """
+    problem = state.problem
+    with suppress(FemubenchError):
+        if not isinstance(problem, LargeProblem):
+            model = extend_model(problem.model, state.parts, state.x)
+            basis = Basis.of(model, problem.data.measurement)
+            own = place_data(basis, problem.data, problem.noise, ())
+            return {**error_slopes(own, basis.modes), "general": general_slopes(state)}
+    return {}
+
+
 def model_error_of(
     problem: Problem, basis: Basis, before: State | None, width: float, log_prior: float
 ) -> Inadequacy:
     """Return the model error of a problem, and of a reference where there is one."""
-    structure = problem.model.structure
-    present = error_slopes(problem, structure, basis.modes)
-    reference = None if before is None else error_slopes(before.problem, structure, basis.modes)
+    present = error_slopes(problem, basis.modes)
+    reference = None if before is None else error_slopes(before.problem, basis.modes)
     residual = np.zeros(0) if before is None else before.raw
     widths = {name: width * value for name, value in class_widths().items()}
     unshared = settings.width_between_states

@@ -47,21 +47,18 @@ def class_widths() -> dict[str, float]:
     }
 
 
-def error_slopes(
-    problem: Problem, structure: Structure | None, modes: Modes
-) -> dict[str, FloatArray]:
+def error_slopes(problem: Problem, modes: Modes) -> dict[str, FloatArray]:
     """Return the sensitivities of the data to unit perturbations of every class, (n_data, p_k).
 
     Arguments:
-        problem: data in the modal coordinates of the nominal model.
-        structure: its frame; None for a model from matrices, which has fewer classes.
-        modes: of the nominal model, in the order of the coordinates.
+        problem: data in the modal coordinates of a model; one from matrices has fewer classes.
+        modes: of the model, in the order of the coordinates.
     """
-    nominal = state_at(problem, (), np.zeros(0))
+    nominal, structure = state_at(problem, (), np.zeros(0)), problem.model.structure
     found = {
         "stiffness of everything": _everything(nominal, 1.0, 0.0),
         "density of everything": _everything(nominal, -1.0, problem.space.mass),
-        "general": _general(nominal),
+        "general": general_slopes(nominal),
         "sensor gains": _gains(nominal),
         **_shapes(nominal),
     }
@@ -115,17 +112,20 @@ def _everything(nominal: State, sign: float, mass: float) -> FloatArray:
     return nominal.rows(forces, np.array([mass]))
 
 
-def _general(nominal: State) -> FloatArray:
-    """Return the slopes of random symmetric changes sqrt(lambda_a lambda_b) g_ab, (n_data, p)."""
-    space, near = nominal.problem.space, nominal.vectors[:, nominal.partner]
+def general_slopes(state: State) -> FloatArray:
+    """Return the slopes of random symmetric changes sqrt(lambda_a lambda_b) g_ab, (n_data, p).
+
+    Between the coordinates of the nominal model, whatever causes are in the state.
+    """
+    space, near = state.problem.space, state.vectors[:, state.partner]
     modes = np.arange(space.rigid, min(space.rigid + settings.general_modes, len(space)))
     one, other = (modes[index] for index in np.triu_indices(len(modes)))
     size = np.sqrt(np.maximum(space.eigenvalues[one] * space.eigenvalues[other], 0.0))
     column = np.arange(len(one))
-    forces = np.zeros((len(near), len(nominal.partner), len(one)))
+    forces = np.zeros((len(near), len(state.partner), len(one)))
     forces[one, :, column] = size[:, None] * near[other]
     forces[other, :, column] = size[:, None] * near[one]
-    return nominal.rows(forces, np.zeros(len(one)))
+    return state.rows(forces, np.zeros(len(one)))
 
 
 def _gains(nominal: State) -> FloatArray:
@@ -248,6 +248,7 @@ class Inadequacy:
         residual: of the reference at the nominal model, in deviations, (r,).
         unshared: width of the scale of what the states do not share.
         log_prior: ln of the prior probability that the structure is no beam model.
+        earlier: sensitivities of the reference to each, (r, p_k).
         change: by how much an explanation moves each datum, in deviations, (n,); a share of that
             is its own error. Empty where there is none.
     """
@@ -260,6 +261,7 @@ class Inadequacy:
     residual: FloatArray
     unshared: float
     log_prior: float
+    earlier: tuple[FloatArray, ...]
     change: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
@@ -273,21 +275,37 @@ class Inadequacy:
         log_prior: float,
     ) -> Inadequacy:
         """Return the model error of sensitivities, (n_data, p_k) by class."""
-        before = {} if reference is None else reference
+        before, r, n = reference or {}, len(residual), len(next(iter(present.values())))
         names = tuple(dict.fromkeys((*present, *before)))
-        count = len(next(iter(present.values())))
-        now = {name: rows_of(name, present, before, count) for name in names}
-        other = {name: rows_of(name, before, present, len(residual)) for name in names}
+        # Zeros where only the other state has a class.
+        earlier = [
+            before[name] if name in before else np.zeros((r, present[name].shape[1]))
+            for name in names
+        ]
         return cls(
             names,
             np.array([widths[kind(name)] for name in names]),
-            np.array([now[name] @ now[name].T for name in names]),
-            np.array([other[name] @ other[name].T for name in names]),
-            np.array([other[name] @ now[name].T for name in names]),
+            np.zeros((len(names), n, n)),
+            np.array([rows @ rows.T for rows in earlier]),
+            np.zeros((len(names), r, n)),
             residual,
             unshared,
             log_prior,
-        )
+            tuple(earlier),
+        ).moved(present)
+
+    def moved(self, slopes: Mapping[str, FloatArray]) -> Inadequacy:
+        """Return the model error where the same perturbations have other sensitivities.
+
+        Arguments:
+            slopes: of the data; a class that is not there, or is another one, stays as it is.
+        """
+        present, cross = self.present.copy(), self.cross.copy()
+        for k, (name, earlier) in enumerate(zip(self.names, self.earlier, strict=True)):
+            rows = slopes.get(name)
+            if rows is not None and rows.shape[1] == earlier.shape[1]:
+                present[k], cross[k] = rows @ rows.T, earlier @ rows.T
+        return replace(self, present=present, cross=cross)
 
     def add_own_error(self, nothing: State, state: State) -> Inadequacy:
         """Return the model error where part of what an explanation changes is its own error.
@@ -542,13 +560,6 @@ def _inverse(matrix: FloatArray) -> tuple[FloatArray, float]:
     inverse, _ = la.lapack.dpotri(factor, lower=1)
     inverse = np.tril(inverse) + np.tril(inverse, -1).T
     return np.asarray(inverse), 2.0 * float(np.log(factor.diagonal()).sum())
-
-
-def rows_of(
-    name: str, own: Mapping[str, FloatArray], other: Mapping[str, FloatArray], count: int
-) -> FloatArray:
-    """Return the sensitivities of a state to a class; zeros where only the other state has it."""
-    return own[name] if name in own else np.zeros((count, other[name].shape[1]))
 
 
 def kind(name: str) -> str:
