@@ -95,7 +95,7 @@ def test_what_was_not_answered_counts_as_the_model_that_was_given(closed: Set) -
     assert [one.gain for one in lost] == [0.0, 0.0]
 
 
-@pytest.mark.parametrize("key", [None, "short", Fernet.generate_key().decode()])
+@pytest.mark.parametrize("key", [None, "short", "A" * 43 + "="])
 def test_no_other_key_opens_it(closed: Set, key: str | None) -> None:
     said = closed.bench("challenge", "judge", closed.folder, closed.answers, code=2, key=key)
     assert said.count("\n") == 1
