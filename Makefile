@@ -31,7 +31,7 @@ ON_ALL_CORES := -n 2 --dist loadfile --no-loadscope-reorder -p no:benchmark
 QUICK := -m "not slow and not nightly"
 LINT := ruff layout budgets mypy pyright
 
-.PHONY: run check test nightly pytest $(LINT) docs kernels bench bench-report truths format clean
+.PHONY: run check test lint nightly pytest $(LINT) docs kernels bench bench-report truths format clean
 .DELETE_ON_ERROR:
 
 run: $(VENV)/.installed
@@ -45,9 +45,12 @@ check: $(VENV)/.installed-test
 # Nothing that fails keeps the rest from running.
 test: $(VENV)/.installed-test
 	@status=0; \
-	$(MAKE) --no-print-directory -k -j 2 --output-sync=target $(LINT) || status=1; \
+	$(MAKE) --no-print-directory lint || status=1; \
 	$(MAKE) --no-print-directory pytest || status=1; \
 	exit $$status
+
+lint: $(VENV)/.installed-test
+	@$(MAKE) --no-print-directory -k -j 2 --output-sync=target $(LINT)
 
 ruff: $(VENV)/.installed-test
 	$(BIN)/ruff check .
