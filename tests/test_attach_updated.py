@@ -9,15 +9,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from femubench.core.fem.frame import (
-    Frame,
-    GroundSpring,
-    Joint,
-    Material,
-    Member,
-    Place,
-    PointMass,
-)
+from femubench.core.fem.frame import Frame, GroundSpring, Joint, Material, Member, Place, PointMass
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import Section, constant_kappa

@@ -170,8 +170,7 @@ def as_arrays(file: Path, measured: FrequencyResponses) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("name", "write"),
-    [("a.uff", write_universal), ("a.csv", as_csv), ("a.npz", as_arrays)],
+    ("name", "write"), [("a.uff", write_universal), ("a.csv", as_csv), ("a.npz", as_arrays)]
 )
 def test_files_hold_the_same(
     tmp_path: Path, small: Any, name: str, write: Callable[[Path, FrequencyResponses], Path]

@@ -75,10 +75,7 @@ def test_a_polar_moment_for_a_torsion_constant_is_found(ladder: FrameBuilder) ->
     assert min(repaired) < -0.1  # 0.113 at the first mode
 
 
-@pytest.mark.parametrize(
-    "section",
-    [round_tube(0.03, 0.002), rectangular_tube(0.03, 0.02, 0.002)],
-)
+@pytest.mark.parametrize("section", [round_tube(0.03, 0.002), rectangular_tube(0.03, 0.02, 0.002)])
 def test_sections_with_their_own_constant_raise_no_warning(
     ladder: FrameBuilder, section: Section
 ) -> None:
@@ -92,10 +89,7 @@ def numbers(section: Section, J: float) -> Section:
 
 @pytest.mark.parametrize(
     ("section", "accuracy"),
-    [
-        (rectangular_tube(0.0254, 0.0254, 0.00238), 1e-9),
-        (solid_rectangle(0.04, 0.02), 0.10),
-    ],
+    [(rectangular_tube(0.0254, 0.0254, 0.00238), 1e-9), (solid_rectangle(0.04, 0.02), 0.10)],
 )
 def test_numbers_alone_give_nearly_the_constant_of_the_shape(
     section: Section, accuracy: float
@@ -249,10 +243,7 @@ def test_what_holds_a_structure_that_hangs_free_is_said() -> None:
 
 @pytest.mark.parametrize(
     ("material", "word"),
-    [
-        (Material(68.0, 0.33, 2700.0), "E / rho"),
-        (Material(68e9, 0.5, 2700.0), "Poisson"),
-    ],
+    [(Material(68.0, 0.33, 2700.0), "E / rho"), (Material(68e9, 0.5, 2700.0), "Poisson")],
 )
 def test_materials_that_do_not_exist(clean: Frame, material: Material, word: str) -> None:
     members = tuple(replace(m, material=material) for m in clean.members)

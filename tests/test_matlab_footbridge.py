@@ -185,11 +185,7 @@ def test_without_the_data_one_line_says_what_to_get_and_what_to_set(
     ],
 )
 def test_wrong_variables_are_one_line(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    file: str,
-    change: Variables,
-    says: str,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str, change: Variables, says: str
 ) -> None:
     contents = {MODEL: variables()[0], TEST: variables()[1]}
     wrong = {k: v for k, v in (contents[file] | change).items() if v is not None}

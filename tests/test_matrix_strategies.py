@@ -82,10 +82,7 @@ def frame_case(ladder: FrameBuilder) -> Case:
 
 @pytest.fixture(scope="module")
 def cases(
-    frame_case: Case,
-    ladder: FrameBuilder,
-    hframe: FrameBuilder,
-    asymmetric_ladder: FrameBuilder,
+    frame_case: Case, ladder: FrameBuilder, hframe: FrameBuilder, asymmetric_ladder: FrameBuilder
 ) -> dict[str, Case]:
     stiff: dict[str, Any] = {"polar": False, "elements": 12, "E": 71e9}
     truth = ladder("timoshenko", **stiff)
@@ -283,9 +280,7 @@ def test_kabe_rigid_keeps_the_rigid_modes(cases: dict[str, Case], name: str) -> 
         assert result.parameter_count == 28 * 4 - 23
 
 
-def test_kabe_rigid_equals_kabe_on_a_structure_without_rigid_modes(
-    cases: dict[str, Case],
-) -> None:
+def test_kabe_rigid_equals_kabe_on_a_structure_without_rigid_modes(cases: dict[str, Case]) -> None:
     one, other = (update(s, cases["supported"]).model.stiffness for s in (Kabe, KabeRigid))
     assert abs(one - other).max() == 0.0
 
@@ -477,9 +472,7 @@ def test_mixed_shapes_are_found(frame_case: Case) -> None:
 def test_berman_refuses_shapes_that_are_one(frame_case: Case) -> None:
     model, data = frame_case
     twice = replace(
-        data,
-        frequencies=np.full(3, 226.8),
-        shapes=np.repeat(data.shapes[:, :1], 3, axis=1),
+        data, frequencies=np.full(3, 226.8), shapes=np.repeat(data.shapes[:, :1], 3, axis=1)
     )
     with pytest.raises(StrategyFailure, match="depend on each other"):
         update(Berman, (model, twice))

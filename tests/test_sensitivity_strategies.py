@@ -180,11 +180,7 @@ def test_stiffness_stays_positive_without_damping(hframe_case: Any) -> None:
 
 @pytest.mark.parametrize(
     ("strategy", "residual"),
-    [
-        (Local, "frequency"),
-        (Spring, "relative-eigenvalue"),
-        (Offset, "eigenvalue"),
-    ],
+    [(Local, "frequency"), (Spring, "relative-eigenvalue"), (Offset, "eigenvalue")],
 )
 def test_a_truth_within_the_class_is_recovered(
     hframe: Any, strategy: type[Strategy], residual: str

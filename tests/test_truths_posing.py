@@ -13,15 +13,7 @@ from small_suite import write_suite
 
 from femubench import InputError, read_case
 from femubench.core.challenge.truth_file import KnownCase, TrueCause, is_held, read_truth
-from truths.posing import (
-    DEFECTS,
-    OPENSEES,
-    SHEAR,
-    SHEAR_STRUCTURES,
-    STRUCTURES,
-    SUITE,
-    pose,
-)
+from truths.posing import DEFECTS, OPENSEES, SHEAR, SHEAR_STRUCTURES, STRUCTURES, SUITE, pose
 from truths.truth_text import truth_text
 
 pytestmark = pytest.mark.slow(20)
@@ -66,16 +58,8 @@ def test_a_truth_is_read_as_it_was_written(tmp_path: Path) -> None:
         ("held = ", "held = not", "expected valid TOML"),
         ("chi2 = 83.2", "chi2 = nan", "visible.chi2: out of bounds"),
         ("size = 125000.0", 'size = "big"', "cause[0].size: a text (expected"),
-        (
-            'place = "J5"',
-            'place = "J5"\nwhere = "J5"',
-            "cause[0].where: unknown key",
-        ),
-        (
-            '["joint-rotation@T"]',
-            '["joint-rotation"]',
-            "cause[0].also[0]: of another form",
-        ),
+        ('place = "J5"', 'place = "J5"\nwhere = "J5"', "cause[0].where: unknown key"),
+        ('["joint-rotation@T"]', '["joint-rotation"]', "cause[0].also[0]: of another form"),
     ],
 )
 def test_a_faulty_key_is_one_line(tmp_path: Path, old: str, new: str, line: str) -> None:
