@@ -593,17 +593,9 @@ def test_any_names_and_numbers(
         shapes,
         np.tile(np.nanmax(np.abs(shapes), axis=0) / 3.0, (4, 1)),
     )
-    case = replace(
-        base,
-        model=Model.of(frame),
-        measurement=measurement,
-        modifications=(),
-        used=(1,),
-        held_out=(3,),
-        name=names[0],
-        title=names[1],
-        source=names[2],
-    )
+    words = dict(zip(("name", "title", "source"), names, strict=False))
+    case = replace(base, model=Model.of(frame), measurement=measurement, modifications=())
+    case = replace(case, used=(1,), held_out=(3,), **words)
     with TemporaryDirectory() as folder:
         back = round_trip(Path(folder), case)
     assert_same_frame(frame, frame_of(back))

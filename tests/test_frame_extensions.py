@@ -322,13 +322,6 @@ class TestOscillators:
         expected = np.sort([*tuned(mass, frequency), even])
         assert found == pytest.approx(expected, rel=4e-5)
 
-    @pytest.mark.parametrize("plane", ["out-of-plane", "3d"])
-    def test_a_stiff_one_is_a_mass(self, plane: str) -> None:
-        place = Place(member="m", s=0.37)
-        hung = beam(plane, 4, oscillators=(Oscillator(place, "z", 0.5, 3e5),))
-        lumped = beam(plane, 4, masses=(PointMass(place, 0.5),))
-        assert frequencies(hung, 4) == pytest.approx(frequencies(lumped, 4), rel=1e-5)
-
     def test_attachments_find_the_dofs_again(self, ladder: Any) -> None:
         hung = (Oscillator(Place(member="AB", s=0.4), "z", 0.1, 90.0),)
         frame = replace(ladder(), oscillators=hung, preloads=(Preload("BE", 500.0),))

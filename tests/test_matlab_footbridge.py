@@ -192,8 +192,5 @@ def test_wrong_variables_are_one_line(
     contents[file] = wrong
     monkeypatch.setenv(VARIABLE, str(put(tmp_path / "wrong", contents[MODEL], contents[TEST])))
     assert says in refused("run", "footbridge")
-
-
-def test_a_file_that_is_none_is_one_line(data: Path) -> None:
-    (data / TEST).write_bytes(b"not from MATLAB" * 20)
-    assert f"{TEST}: cannot be read" in refused("run", "footbridge")
+    (tmp_path / "wrong" / MODEL).write_bytes(b"not from MATLAB" * 20)
+    assert f"{MODEL}: cannot be read" in refused("run", "footbridge")
