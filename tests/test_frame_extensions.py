@@ -23,6 +23,7 @@ from femubench.core.fem.frame import (
     Factor,
     Frame,
     Joint,
+    JointSpring,
     Material,
     Member,
     Oscillator,
@@ -324,14 +325,17 @@ class TestOscillators:
 
     def test_attachments_find_the_dofs_again(self, ladder: Any) -> None:
         hung = (Oscillator(Place(member="AB", s=0.4), "z", 0.1, 90.0),)
+        springs = (JointSpring("F", "CF", {"ry": 3e3}),)
         frame = replace(ladder(), oscillators=hung, preloads=(Preload("BE", 500.0),))
+        frame = replace(frame, joint_springs=springs)
         weighed = Structure.build(frame).total_mass - Structure.build(ladder()).total_mass
         assert weighed == pytest.approx(0.1, rel=1e-9)
         more = (PointMass(Place(member="BE", s=0.6), 0.2),)
-        parameter = Property("E", "E", ("AB/1", "CF/2"))
-        model = Model.of(Structure.build(frame).with_values([parameter], [0.8]))
+        given = [Property("E", "E", ("AB/1", "CF/2")), Property("k", "spring", ("CF@F:ry",))]
+        model = Model.of(Structure.build(frame).with_values(given, [0.8, 4e3]))
         attached = model.attach(more, ())
-        wanted = Structure.build(frame.with_attachments(more, ())).with_values([parameter], [0.8])
+        anew = Structure.build(frame.with_attachments(more, ()))
+        wanted = anew.with_values(given, [0.8, 4e3])
         for one, two in zip((attached.mass, attached.stiffness), wanted.matrices(), strict=True):
             assert abs(one - two).max() < 1e-9 * abs(two).max()
         spring = np.zeros((model.size, 1))
