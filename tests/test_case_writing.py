@@ -608,7 +608,9 @@ def test_any_names_and_numbers(
 # --- folders --------------------------------------------------------------------------------------
 
 
-def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path, ladder: Case) -> None:
+def test_new_and_empty_folders_are_taken_and_others_left_alone(
+    tmp_path: Path, ladder: Case
+) -> None:
     (tmp_path / "old").mkdir()
     (tmp_path / "old" / "mine.txt").write_text("mine")
     (tmp_path / "file").write_text("mine")
@@ -616,9 +618,6 @@ def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path, ladder: Cas
         with pytest.raises(InputError, match=f"{name}: {what}"):
             write_case(tmp_path / name, ladder)
     assert {str(p) for p in content(tmp_path)} == {"file", "old/mine.txt"}
-
-
-def test_new_and_empty_folders(tmp_path: Path, ladder: Case) -> None:
     (tmp_path / "empty").mkdir()
     for name in ("empty", "a/b/c"):
         write_case(tmp_path / name, ladder)

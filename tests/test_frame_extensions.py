@@ -325,9 +325,8 @@ class TestOscillators:
 
     def test_attachments_find_the_dofs_again(self, ladder: Any) -> None:
         hung = (Oscillator(Place(member="AB", s=0.4), "z", 0.1, 90.0),)
-        springs = (JointSpring("F", "CF", {"ry": 3e3}),)
-        frame = replace(ladder(), oscillators=hung, preloads=(Preload("BE", 500.0),))
-        frame = replace(frame, joint_springs=springs)
+        soft, tight = (JointSpring("F", "CF", {"ry": 3e3}),), (Preload("BE", 500.0),)
+        frame = replace(ladder(), oscillators=hung, preloads=tight, joint_springs=soft)
         weighed = Structure.build(frame).total_mass - Structure.build(ladder()).total_mass
         assert weighed == pytest.approx(0.1, rel=1e-9)
         more = (PointMass(Place(member="BE", s=0.6), 0.2),)
