@@ -22,16 +22,7 @@ from femubench.core.inference.examine import pose_problem
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.roles import Effect
 from femubench.effect import total_mass
-from femubench.fem import (
-    FloatArray,
-    Frame,
-    Joint,
-    Material,
-    Member,
-    Place,
-    Section,
-    Support,
-)
+from femubench.fem import FloatArray, Frame, Joint, Material, Member, Place, Section, Support
 
 FREQUENCY_STD, SHAPE_STD, MASS_STD = 0.002, 0.015, 0.002
 

@@ -39,7 +39,8 @@ class Point(Strategy):
         elastic = solve_modes(model).elastic.natural_frequencies
         ratio = (measurement.frequencies / elastic[: len(measurement)]) ** 2
         return UpdateResult(
-            replace(model, stiffness=float(ratio.mean()) * model.stiffness), parameter_count=1
+            replace(model, stiffness=float(ratio.mean()) * model.stiffness),
+            parameter_count=1,
         )
 
 
