@@ -31,7 +31,7 @@ core/fem/beam.py :: beam_elements textbook
     bar * (p.GJ / L) => bar * (p.GJ / p.length)
 core/fem/assembly.py :: assembly
     > 1e-13 * scale => > 1e-3 * scale
-core/fem/attaching.py :: attachments attach_updated
+core/fem/attaching.py :: attachments frame_extensions
     *= [share, 1.0 - share] => *= [0.5, 0.5]
     (1.0 - share) * first + share * last => share * first + (1.0 - share) * last
 core/fem/preload.py :: preload

@@ -6,12 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from femubench import (
-    Measurement,
-    Model,
-    Sensors,
-    solve_modes,
-)
+from femubench import Measurement, Model, Sensors, solve_modes
 from femubench.core.advise.advice import Group, advise, options_for
 from femubench.core.advise.point_attachments import points_of
 from femubench.core.advise.prediction import Outlook, Points, outlook_of

@@ -22,7 +22,7 @@ from femubench.core.inference.examine import pose_problem
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.roles import Effect
 from femubench.effect import total_mass
-from femubench.fem import FloatArray, Frame
+from femubench.fem import FloatArray, Frame, Joint, Material, Member, Place, Section, Support
 
 FREQUENCY_STD, SHAPE_STD, MASS_STD = 0.002, 0.015, 0.002
 
@@ -128,3 +128,13 @@ def case_of(model: Model, measurement: Measurement, used: int, **more: object) -
     numbers = measurement.numbers
     case = Case("case", "", "computed", Path("case"), model, measurement, numbers[:used], ())
     return replace(case, **{"held_out": numbers[used:], **more})  # type: ignore[arg-type]
+
+
+def clamped_portal(elements: int, section: Section, material: Material) -> Frame:
+    """Return a portal in its plane, its feet on clamps."""
+    places = {"fl": (0.0, 0.0), "fr": (1.2, 0.0), "el": (0.0, 1.0), "er": (1.2, 1.0)}
+    joints = tuple(Joint(name, (x, 0.0, z)) for name, (x, z) in places.items())
+    ends = {"left": ("fl", "el"), "right": ("fr", "er"), "beam": ("el", "er")}
+    members = tuple(Member(name, pair, elements, section, material) for name, pair in ends.items())
+    feet = tuple(Support(Place(joint=j), ("x", "z", "ry")) for j in ("fl", "fr"))
+    return Frame("in-plane", "euler-bernoulli", joints, members, supports=feet)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,9 +29,7 @@ arm,knee,tip,5,numbers,steel,,,
 
 def tabled(folder: Path, joints: str = JOINTS, members: str = MEMBERS) -> Path:
     """Write the spatial case of the tests with its joints and members in tables."""
-    folder.mkdir()
-    for file in (CASES / "3d").iterdir():
-        (folder / file.name).write_bytes(file.read_bytes())
+    shutil.copytree(CASES / "3d", folder)
     text = (folder / "case.toml").read_text()
     text = re.sub(r"\[\[model\.(joints|members)\]\]\n(?:[^\[\n].*\n|\n)*", "", text)
     keys = '[model]\njoints = "joints.csv"\nmembers = "members.csv"\n'

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from diagnosis_problems import sensors_on_joints
 from numpy.testing import assert_allclose
 
 from femubench import Measurement, Model, Sensors, solve_modes
@@ -53,15 +54,6 @@ def model(ladder: FrameBuilder) -> Model:
     return Model.of(replace(frame, rotary_inertia=True))
 
 
-def sensors_on(frame: Frame) -> Sensors:
-    points = [joint.xyz for joint in frame.joints]
-    for member in frame.members:
-        first, last = (np.array(frame.joint(end).xyz) for end in member.ends)
-        points.append(tuple(0.5 * (first + last)))
-    labels = tuple(f"s{i}" for i in range(len(points)))
-    return Sensors(labels, np.array(points), ("z",) * len(points))
-
-
 def measured(
     truth: Model, sensors: Sensors, count: int, rng: np.random.Generator | None = None
 ) -> Measurement:
@@ -80,7 +72,7 @@ def measured(
 
 
 def posed_on(model: Model, hypotheses: tuple[Hypothesis, ...]) -> Problem:
-    measurement = measured(model, sensors_on(model.frame_structure.frame), USED)
+    measurement = measured(model, sensors_on_joints(model.frame_structure.frame), USED)
     data = Data(measurement, np.zeros(0))
     noise = Noise.of(np.zeros((len(data), 0)), 0.0)
     return place_data(Basis.of(model, measurement), data, noise, hypotheses)
@@ -218,7 +210,7 @@ def found(model: Model) -> Callable[..., Examination]:
 
     def run(effect: Effect, place: str, value: float, *others: Effect) -> Examination:
         truth = effect.extend(model, place, [value])
-        measurement = measured(truth, sensors_on(model.frame_structure.frame), USED)
+        measurement = measured(truth, sensors_on_joints(model.frame_structure.frame), USED)
         return examine(model, measurement, [*KNOWN, *others], tolerance=0.0, pairs=False)
 
     return run

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_problems import case_of, measured
+from diagnosis_problems import case_of, clamped_portal, measured
 from effect_checks import compare
 
 from femubench import Model, diagnose
@@ -28,12 +28,7 @@ TUBE, STEEL = rectangular_tube(0.06, 0.04, 0.003), Material(207e9, 0.3, 7850.0)
 
 def portal(elements: int) -> Frame:
     """Return a portal on clamps, its corners of sections with sizes."""
-    places = {"fl": (0.0, 0.0), "fr": (1.2, 0.0), "el": (0.0, 1.0), "er": (1.2, 1.0)}
-    joints = tuple(Joint(name, (x, 0.0, z)) for name, (x, z) in places.items())
-    ends = {"left": ("fl", "el"), "right": ("fr", "er"), "beam": ("el", "er")}
-    members = tuple(Member(name, pair, elements, TUBE, STEEL) for name, pair in ends.items())
-    feet = tuple(Support(Place(joint=j), ("x", "z", "ry")) for j in ("fl", "fr"))
-    return Frame("in-plane", "euler-bernoulli", joints, members, supports=feet)
+    return clamped_portal(elements, TUBE, STEEL)
 
 
 def test_a_spring_at_the_axis_is_found_with_its_stiffness() -> None:

@@ -78,7 +78,7 @@ def test_folder_runs_and_says_what_was_done(tmp_path: Path) -> None:
     assert stated.count("held out") == 2
     folder = tmp_path / "case"
     assert {path.name for path in folder.iterdir()} == {
-        *("K.mtx", "M.mtx", "dofs.csv", "test.uff", "case.toml", "matches.csv", "matches.png"),
+        *("K.mtx", "M.mtx", "dofs.csv", "test.uff", "case.toml", "matches.csv", "matches.png")
     }
     assert (folder / "matches.png").read_bytes().startswith(b"\x89PNG")
     assert (folder / "matches.csv").read_text().splitlines()[1].startswith("1:z,z,n1,0.003,0.2,")

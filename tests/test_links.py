@@ -190,17 +190,17 @@ def test_a_rigid_floor_sways_and_turns_as_a_model_made_by_hand() -> None:
     assert frequencies(frame, 3) == pytest.approx(np.sort(wanted), rel=1e-6)
 
 
-@pytest.mark.parametrize("what", ["springs", "oscillators"])
-def test_nothing_hangs_on_a_motion_that_no_link_makes_use_of(what: str) -> None:
-    frame = floor()
-    at = Place(joint=frame.links[0].leads)
-    items: dict[str, Any] = {
-        "springs": lambda d: GroundSpring(at, d, 1e4),
-        "oscillators": lambda d: Oscillator(at, d, 1.0, 20.0),
-    }
-    Model.of(replace(frame, **{what: (items[what]("x"),)}))
-    with pytest.raises(ModelError, match=r"no member ends at joint '\w+' and no link moves it"):
-        Model.of(replace(frame, **{what: (items[what]("-z"),)}))
+def test_nothing_hangs_on_a_motion_that_no_link_makes_use_of() -> None:
+    frame, at = floor(), Place(joint="M")
+    spring, hung = GroundSpring(at, "x", 1e4), Oscillator(at, "x", 1.0, 20.0)
+    Model.of(replace(frame, springs=(spring,), oscillators=(hung,)))
+    wrong: tuple[dict[str, Any], ...] = (
+        {"springs": (replace(spring, direction="-z"),)},
+        {"oscillators": (replace(hung, direction="-z"),)},
+    )
+    for parts in wrong:
+        with pytest.raises(ModelError, match=r"no member ends at joint 'M' and no link moves it"):
+            Model.of(replace(frame, **parts))
     assert not [p for p in BraceSpring().places(Model.of(frame)) if "M" in p]
 
 
@@ -261,28 +261,19 @@ def test_no_brace_ties_what_links_or_a_straight_run_join() -> None:
     assert {"A-E", "C-E", "E-F", "E-G", "B-G", "C-G", "D-G", "F-G"} == pairs - {"B-E"}
 
 
-@pytest.mark.parametrize(
-    ("links", "what"),
-    [
+def test_links_that_say_too_much_are_refused() -> None:
+    for links, what in (
         ((Link("B", ("X",)),), "there is no joint 'X'"),
-        ((Link("B", ("D",)), Link("A", ("D",))), "joint 'D' follows 'B' and 'A'"),
         ((Link("B", ("D",)), Link("D", ("E",)), Link("E", ("B",))), "round in a circle"),
         ((Link("B", ("A", "D"), ("w",)),), "has the motions x, y, z, rx, ry, rz"),
-    ],
-)
-def test_links_that_say_too_much_are_refused(links: tuple[Link, ...], what: str) -> None:
-    with pytest.raises(ModelError, match=what):
-        Model.of(tee("3d", *links))
+    ):
+        with pytest.raises(ModelError, match=what):
+            Model.of(tee("3d", *links))
 
 
 def test_what_follows_is_held_by_its_leader() -> None:
-    for name, size in (("B", 0), ("D", None)):
-        frame = tee("3d", supports=(Support(Place(joint=name), CLAMP),))
-        if size is None:
-            with pytest.raises(ModelError, match="holds joint 'D', which follows another"):
-                Model.of(frame)
-        else:
-            assert rigid_modes_of(Model.of(frame)).shape[1] == size
+    frame = tee("3d", supports=(Support(Place(joint="B"), CLAMP),))
+    assert rigid_modes_of(Model.of(frame)).shape[1] == 0
 
 
 CASE = """
@@ -324,6 +315,8 @@ def write(folder: Path, text: str = CASE) -> Path:
 
 
 def test_a_case_with_links_reads_back_to_itself(tmp_path: Path) -> None:
+    turned = CASE.replace(LINK, '[[model.links]]\nleads = "C"\nfollows = ["B"]\n')
+    assert read_case(write(tmp_path / "turned", turned)).model.size > 0
     case = read_case(write(tmp_path / "tee"))
     frame = case.model.frame_structure.frame
     assert frame.links == (Link("B", ("C",), ("x", "z", "ry")),)
@@ -347,7 +340,6 @@ LINK = '[[model.links]]\nleads = "B"\nfollows = ["C"]\nmotions = ["x", "z", "ry"
         (LINK.replace('["C"]', '["C", "C"]'), 2, "follows[1]", "twice", "its own"),
         (LINK.replace("leads", "lead"), 1, "links[0].lead", "'leads' meant", "follows"),
         (LINK + LINK.replace('"B"', '"D"'), 4, "links[1]", "'C' follows 'B' and 'D'", "one"),
-        ('[[model.links]]\nleads = "C"\nfollows = ["B"]\n', 3, "", "", ""),
         ("", -18, "joints[2]", "not connected to 'A'", "members or links"),
     ],
 )
@@ -355,9 +347,6 @@ def test_what_is_wrong_with_a_link_is_one_line(
     new: str, line: int, key: str, what: str, expected: str, tmp_path: Path
 ) -> None:
     folder = write(tmp_path / "tee", CASE.replace(LINK, new))
-    if not key:
-        assert read_case(folder).model.size > 0
-        return
     with pytest.raises(InputError) as caught:
         read_case(folder)
     error = caught.value

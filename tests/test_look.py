@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from look_checks import look, measured, texts
 
 from femubench.core.effect.attachments import total_mass
 from femubench.core.fem.frame import (
+    Factor,
     Frame,
     GroundSpring,
     Joint,
@@ -19,10 +19,13 @@ from femubench.core.fem.frame import (
     Material,
     Member,
     Place,
+    PointMass,
+    Preload,
     Support,
 )
 from femubench.core.fem.joints import whole_members
 from femubench.core.fem.model import Model
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import (
     Section,
     constant_kappa,
@@ -30,10 +33,15 @@ from femubench.core.fem.sections import (
     round_tube,
     solid_rectangle,
 )
-from femubench.core.fit.mesh_error import mesh_bias
+from femubench.core.fem.sensors import Sensors
+from femubench.core.fem.structure import Structure
+from femubench.core.fit.mesh_error import mesh_bias, refine_mesh
+from femubench.core.look import look as core_look
 from femubench.core.modal.frequency_changes import elastic_modes
+from femubench.core.modal.measurement import Measurement
 from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.typing import FloatArray
+from femubench.diagnosis import list_effects
 from femubench.plugins.effects.torsion_constant import estimate_torsion_constant, is_round
 
 FrameBuilder = Callable[..., Frame]
@@ -75,10 +83,7 @@ def test_a_polar_moment_for_a_torsion_constant_is_found(ladder: FrameBuilder) ->
     assert min(repaired) < -0.1  # 0.113 at the first mode
 
 
-@pytest.mark.parametrize(
-    "section",
-    [round_tube(0.03, 0.002), rectangular_tube(0.03, 0.02, 0.002)],
-)
+@pytest.mark.parametrize("section", [round_tube(0.03, 0.002), rectangular_tube(0.03, 0.02, 0.002)])
 def test_sections_with_their_own_constant_raise_no_warning(
     ladder: FrameBuilder, section: Section
 ) -> None:
@@ -92,10 +97,7 @@ def numbers(section: Section, J: float) -> Section:
 
 @pytest.mark.parametrize(
     ("section", "accuracy"),
-    [
-        (rectangular_tube(0.0254, 0.0254, 0.00238), 1e-9),
-        (solid_rectangle(0.04, 0.02), 0.10),
-    ],
+    [(rectangular_tube(0.0254, 0.0254, 0.00238), 1e-9), (solid_rectangle(0.04, 0.02), 0.10)],
 )
 def test_numbers_alone_give_nearly_the_constant_of_the_shape(
     section: Section, accuracy: float
@@ -249,10 +251,7 @@ def test_what_holds_a_structure_that_hangs_free_is_said() -> None:
 
 @pytest.mark.parametrize(
     ("material", "word"),
-    [
-        (Material(68.0, 0.33, 2700.0), "E / rho"),
-        (Material(68e9, 0.5, 2700.0), "Poisson"),
-    ],
+    [(Material(68.0, 0.33, 2700.0), "E / rho"), (Material(68e9, 0.5, 2700.0), "Poisson")],
 )
 def test_materials_that_do_not_exist(clean: Frame, material: Material, word: str) -> None:
     members = tuple(replace(m, material=material) for m in clean.members)
@@ -275,3 +274,134 @@ def test_a_pair_of_matrices_is_weighed_and_nothing_else(clean: Frame) -> None:
     assert warning.effect == "density"
     np.testing.assert_allclose([p for _, p in warning.changes], 100.0 * (1.0 / 1.1 - 1.0))
     assert mesh_bias(model, 5) is None
+
+
+def look(
+    model: Model, measurement: Measurement, band: tuple[float, float] | None = None
+) -> tuple[LookWarning, ...]:
+    """Return what a diagnosis would show: the looks of all effects included."""
+    return core_look.look(model, measurement, band, list_effects())
+
+
+def midpoints(frame: Frame) -> Sensors:
+    """Return z at all joints and at the middle of all members."""
+    points = [joint.xyz for joint in frame.joints]
+    for member in frame.members:
+        a, b = (np.array(frame.joint(name).xyz) for name in member.ends)
+        x, y, z = (0.5 * (a + b)).tolist()
+        points.append((x, y, z))
+    labels = tuple(f"s{k}" for k in range(len(points)))
+    return Sensors(labels, np.array(points), ("z",) * len(points))
+
+
+def measured(model: Model, count: int = 5, sensors: Sensors | None = None) -> Measurement:
+    """Return elastic modes of a model as if measured, 0.2 % and 1.5 %."""
+    sensors = midpoints(model.frame_structure.frame) if sensors is None else sensors
+    modes = elastic_modes(model, count)
+    shapes = np.asarray(model.observe(sensors) @ modes.shapes[:, :count])
+    shapes = shapes / np.abs(shapes).max(axis=0, initial=1e-300)
+    frequencies = modes.natural_frequencies[:count]
+    std, damping = 0.002 * frequencies, np.full(count, np.nan)
+    numbers = tuple(range(1, count + 1))
+    noise = np.full(shapes.shape, 0.015)
+    return Measurement(sensors, numbers, frequencies, std, damping, shapes, noise)
+
+
+def texts(warnings: tuple[LookWarning, ...], word: str) -> list[LookWarning]:
+    return [warning for warning in warnings if word in warning.what]
+
+
+def test_a_finer_mesh_is_the_mesh_with_twice_the_elements(ladder: FrameBuilder) -> None:
+    coarse, fine = ladder(elements=4), ladder(elements=8)
+    bias = mesh_bias(Model.of(coarse), 12)
+    assert bias is not None
+    np.testing.assert_allclose(
+        bias, frequencies(fine, 12) / frequencies(coarse, 12) - 1.0, atol=1e-12
+    )
+    assert (bias < 0.0).all()  # a conforming mesh is too stiff
+
+
+def test_a_finer_mesh_keeps_factors_springs_ends_and_changes(fitted_portal: FrameBuilder) -> None:
+    factors = (Factor("E", ("m2/1",), 0.5), Factor("density", ("m3",), 1.5))
+    frame = fitted_portal(3, factors=factors, preloads=(Preload("m2", 1e3),))
+    structure = Structure.build(frame).with_values(
+        [Property("EI", "EI", ("m4/2",)), Property("a", "rigid", ("m8@J5",), "m")], [0.7, 0.025]
+    )
+    finer = structure.rebuilt(refine_mesh(structure))
+    assert len(finer.properties) > 1.9 * len(structure.properties) - 2
+    for name in ("EIy", "rhoA", "GJ"):
+        for label, rows in structure.label_index.items():
+            values = getattr(finer.properties, name)[finer.label_index[label]]
+            np.testing.assert_allclose(values, getattr(structure.properties, name)[rows[0]])
+    assert total_mass(Model.of(finer)) == pytest.approx(total_mass(Model.of(structure)), rel=1e-9)
+    bias = mesh_bias(Model.of(structure), 6)
+    assert bias is not None
+    assert np.abs(bias).max() < 0.01
+
+
+def test_a_coarse_mesh_is_found_and_a_fine_one_is_not(ladder: FrameBuilder) -> None:
+    for elements, expected in ((2, 1), (8, 0)):
+        model = Model.of(ladder(polar=False, elements=elements))
+        assert len(texts(look(model, measured(model)), "mesh is coarse")) == expected
+
+
+def test_elements_out_of_proportion_are_found(ladder: FrameBuilder) -> None:
+    frame = ladder()
+    near = replace(frame, masses=(PointMass(Place(member="AB", s=0.256), 0.01),))
+    model = Model.of(near)
+    (warning,) = texts(look(model, measured(model)), "shorter than its neighbour")
+    assert warning.where == "AB/2"
+
+
+@pytest.mark.parametrize("relative", [1e-7, 0.4, np.nan])
+def test_absurd_deviations_are_found(clean: Frame, relative: float) -> None:
+    model = Model.of(clean)
+    data = measured(model)
+    std = data.frequency_std.copy()
+    std[2] = relative * data.frequencies[2]
+    found = texts(look(model, replace(data, frequency_std=std)), "of mode 3 ")
+    assert len(found) == 1
+
+
+def test_two_sensors_at_one_place(clean: Frame) -> None:
+    model = Model.of(clean)
+    s = midpoints(clean)
+    twice = Sensors(
+        (*s.labels, "again"), np.vstack([s.xyz, s.xyz[3]]), (*s.directions[:-1], "z", "-z")
+    )
+    (warning,) = texts(look(model, measured(model, sensors=twice)), "same motion")
+    assert warning.where == "again"
+    assert "s3" in warning.what
+
+
+@pytest.mark.parametrize(("sensor", "gain"), [(0, -1.0), (5, 0.3), (12, 10.0)])
+def test_a_sensor_with_another_gain_is_found(
+    asymmetric_ladder: FrameBuilder, sensor: int, gain: float
+) -> None:
+    model = Model.of(asymmetric_ladder(polar=False))
+    truth = Model.of(asymmetric_ladder(softness=2.0, elements=8))  # also the wrong torsion constant
+    data = measured(truth).with_noise(np.random.default_rng(0))
+    data.shapes[sensor] *= gain
+    (warning,) = texts(look(model, data), "other sensors")
+    assert warning.where == f"s{sensor}"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_sensor_is_blamed_for_an_error_of_the_model(ladder: FrameBuilder, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    truth = ladder(polar=bool(seed % 2), elements=8)
+    member = truth.members[rng.integers(7)].name
+    soft = Factor("E", (f"{member}/{rng.integers(1, 9)}",), 0.5)
+    lump = PointMass(Place(joint="ABCDEF"[rng.integers(6)]), 0.2)
+    truth = replace(truth, factors=(soft,), masses=(*truth.masses, lump))
+    data = measured(Model.of(truth)).with_noise(rng)
+    assert not texts(look(Model.of(ladder()), data), "other sensors")
+
+
+def test_more_modes_in_the_band_than_were_found(clean: Frame) -> None:
+    model = Model.of(clean)
+    data = measured(model, 5)
+    band = (50.0, 1.1 * float(data.frequencies[-1]))
+    assert not texts(look(model, data, band), "inside the band")
+    (warning,) = texts(look(model, data.select([1, 2, 4, 5]), band), "inside the band")
+    assert "mode 3 at" in warning.what

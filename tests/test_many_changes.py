@@ -9,12 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from femubench.core.fem.frame import (
-    GroundSpring,
-    Place,
-    PointMass,
-    Support,
-)
+from femubench.core.fem.frame import GroundSpring, Place, PointMass, Support
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal import many_changes as module
 from femubench.core.modal.eigen import DENSE_LIMIT, Modes, count_evaluations, solve_modes

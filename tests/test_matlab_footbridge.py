@@ -185,19 +185,12 @@ def test_without_the_data_one_line_says_what_to_get_and_what_to_set(
     ],
 )
 def test_wrong_variables_are_one_line(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    file: str,
-    change: Variables,
-    says: str,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str, change: Variables, says: str
 ) -> None:
     contents = {MODEL: variables()[0], TEST: variables()[1]}
     wrong = {k: v for k, v in (contents[file] | change).items() if v is not None}
     contents[file] = wrong
     monkeypatch.setenv(VARIABLE, str(put(tmp_path / "wrong", contents[MODEL], contents[TEST])))
     assert says in refused("run", "footbridge")
-
-
-def test_a_file_that_is_none_is_one_line(data: Path) -> None:
-    (data / TEST).write_bytes(b"not from MATLAB" * 20)
-    assert f"{TEST}: cannot be read" in refused("run", "footbridge")
+    (tmp_path / "wrong" / MODEL).write_bytes(b"not from MATLAB" * 20)
+    assert f"{MODEL}: cannot be read" in refused("run", "footbridge")

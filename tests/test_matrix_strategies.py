@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
-import femubench.scenarios
 from femubench import (
     InputError,
     Measurement,
@@ -20,7 +18,6 @@ from femubench import (
     Sensors,
     StrategyFailure,
     UpdateResult,
-    read_case,
     solve_modes,
 )
 from femubench.core.modal.correlation import mac
@@ -45,7 +42,6 @@ from femubench.plugins.strategies.berman import Berman
 from femubench.plugins.strategies.kabe import Kabe, KabeRigid
 from femubench.update import SelfCheckFailed
 
-SCENARIOS = Path(femubench.scenarios.__file__).parent
 PAPER = np.array([226.8, 275.2, 537.4])  # Hz, measured modes 1-3 of the paper's ladder
 FrameBuilder = Callable[..., Frame]
 Case = tuple[Model, Measurement]
@@ -86,10 +82,7 @@ def frame_case(ladder: FrameBuilder) -> Case:
 
 @pytest.fixture(scope="module")
 def cases(
-    frame_case: Case,
-    ladder: FrameBuilder,
-    hframe: FrameBuilder,
-    asymmetric_ladder: FrameBuilder,
+    frame_case: Case, ladder: FrameBuilder, hframe: FrameBuilder, asymmetric_ladder: FrameBuilder
 ) -> dict[str, Case]:
     stiff: dict[str, Any] = {"polar": False, "elements": 12, "E": 71e9}
     truth = ladder("timoshenko", **stiff)
@@ -287,9 +280,7 @@ def test_kabe_rigid_keeps_the_rigid_modes(cases: dict[str, Case], name: str) -> 
         assert result.parameter_count == 28 * 4 - 23
 
 
-def test_kabe_rigid_equals_kabe_on_a_structure_without_rigid_modes(
-    cases: dict[str, Case],
-) -> None:
+def test_kabe_rigid_equals_kabe_on_a_structure_without_rigid_modes(cases: dict[str, Case]) -> None:
     one, other = (update(s, cases["supported"]).model.stiffness for s in (Kabe, KabeRigid))
     assert abs(one - other).max() == 0.0
 
@@ -372,26 +363,18 @@ def test_kabe_states_by_how_much_a_used_frequency_is_off_where_no_matrix_has_the
     own = partners.modes.natural_frequencies[partners.partners]
     worst = np.abs(own / data.frequencies - 1.0).max()
     assert result.diagnostics["used_frequency_error"] == pytest.approx(worst, rel=1e-9)
-    assert worst > 1e-3
+    assert 1e-3 < worst < 0.3
     assert result.diagnostics["residual"] > worst
     same_pattern(model, result.model)
-    assert "used_frequency_error" not in update(KabeRigid, cases["frame"]).diagnostics
-
-
-def test_kabe_rigid_gives_a_physical_model_of_the_hframe() -> None:
+    rigid = rigid_modes_of(model)
+    force = np.abs(result.model.stiffness_times(rigid)).max()
+    assert force <= 1e-9 * (np.abs(result.model.stiffness) @ np.abs(rigid)).max()
+    modes = solve_modes(result.model)
+    assert modes.rigid.sum() == rigid.shape[1] == 3
+    assert (modes.eigenvalues >= 0.0).all()
     with pytest.raises(InputError, match="cutoff -1 is not positive"):
         KabeRigid(least_squares_cutoff=-1.0)
-    case = read_case(SCENARIOS / "hframe-solid")
-    result = KabeRigid().update(case.model, case.used_measurement(0), np.random.default_rng(0))
-    rigid = rigid_modes_of(case.model)
-    force = np.abs(result.model.stiffness_times(rigid)).max()
-    gross = (np.abs(result.model.stiffness) @ np.abs(rigid)).max()
-    assert rigid.shape[1] == 3
-    assert force <= 1e-9 * gross
-    modes = solve_modes(result.model)
-    assert modes.rigid.sum() == 3
-    assert (modes.eigenvalues >= 0.0).all()
-    assert 1e-3 < result.diagnostics["used_frequency_error"] < 0.3
+    assert "used_frequency_error" not in update(KabeRigid, cases["frame"]).diagnostics
 
 
 def test_least_squares_is_the_least_among_what_keeps_the_rigid_modes(
@@ -478,18 +461,9 @@ def test_a_broken_expansion_is_found(frame_case: Case, monkeypatch: pytest.Monke
     assert caught.value.measured > 1e-4
 
 
-def test_the_reason_names_the_mode_that_is_off(frame_case: Case) -> None:
-    model, data = frame_case
+def test_mixed_shapes_are_found(frame_case: Case) -> None:
     updated = update(Baruch, frame_case).model
-    quasi = quasi_measured_modes(model, data)
-    wrong = quasi.eigenvalues * np.array([1.0, 1.0, 1.01**2])
-    measured = np.sqrt(wrong[2]) / (2 * np.pi)
-    with pytest.raises(SelfCheckFailed) as caught:
-        check_used_modes(updated, quasi.shapes, wrong)
-    assert str(caught.value).startswith(
-        f"the measured mode at {measured:.5g} Hz comes out at {measured / 1.01:.5g} Hz in the "
-        "updated model (-0.99 %)"
-    )
+    quasi = quasi_measured_modes(*frame_case)
     mixed = np.column_stack([quasi.shapes[:, 0] + 1e-3 * quasi.shapes[:, 1], quasi.shapes[:, 1:]])
     with pytest.raises(SelfCheckFailed, match=r"226.8 Hz"):
         check_used_modes(updated, mixed, quasi.eigenvalues)
@@ -498,9 +472,7 @@ def test_the_reason_names_the_mode_that_is_off(frame_case: Case) -> None:
 def test_berman_refuses_shapes_that_are_one(frame_case: Case) -> None:
     model, data = frame_case
     twice = replace(
-        data,
-        frequencies=np.full(3, 226.8),
-        shapes=np.repeat(data.shapes[:, :1], 3, axis=1),
+        data, frequencies=np.full(3, 226.8), shapes=np.repeat(data.shapes[:, :1], 3, axis=1)
     )
     with pytest.raises(StrategyFailure, match="depend on each other"):
         update(Berman, (model, twice))

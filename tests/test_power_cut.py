@@ -165,10 +165,7 @@ class Later:
     "seed", [*range(FEW), *(pytest.param(n, marks=pytest.mark.nightly) for n in range(FEW, CUTS))]
 )
 def test_nothing_acknowledged_is_lost(
-    seed: int,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    synced: list[Callable[[Path], None]],
+    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, synced: list[Callable[[Path], None]]
 ) -> None:
     draw = random.Random(seed)
     Later.due = []

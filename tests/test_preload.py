@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.linalg as la
-from diagnosis_problems import case_of, measured
+from diagnosis_problems import case_of, clamped_portal, measured
 
 from femubench import diagnose
 from femubench.core.errors import ModelError
@@ -332,14 +332,7 @@ class TestWeight:
 
 def slender(elements: int) -> Frame:
     """Return a portal on clamps with a mass at either corner."""
-    places = {"fl": (0.0, 0.0), "fr": (1.2, 0.0), "el": (0.0, 1.0), "er": (1.2, 1.0)}
-    ends = {"left": ("fl", "el"), "right": ("fr", "er"), "beam": ("el", "er")}
-    tube = rectangular_tube(0.012, 0.012, 0.001)
-    return Frame(
-        "in-plane",
-        "euler-bernoulli",
-        tuple(Joint(name, (x, 0.0, z)) for name, (x, z) in places.items()),
-        tuple(Member(name, pair, elements, tube, STEEL) for name, pair in ends.items()),
-        masses=tuple(PointMass(Place(joint=j), 4.0) for j in ("el", "er")),
-        supports=tuple(Support(Place(joint=j), ("x", "z", "ry")) for j in ("fl", "fr")),
+    masses = tuple(PointMass(Place(joint=j), 4.0) for j in ("el", "er"))
+    return replace(
+        clamped_portal(elements, rectangular_tube(0.012, 0.012, 0.001), STEEL), masses=masses
     )

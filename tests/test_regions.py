@@ -111,10 +111,7 @@ def test_a_group_in_one_region_is_announced_by_it() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    "other",
-    [None, replace(END, kind="mass added"), replace(END, place="C")],
-)
+@pytest.mark.parametrize("other", [None, replace(END, kind="mass added"), replace(END, place="C")])
 def test_a_group_in_several_regions_is_not(other: Region | None) -> None:
     assert "which: e0 at p or e1 at p" in sentence(END, other)
 

@@ -142,10 +142,7 @@ def hostile() -> Run:
     run = synthetic_run(4, 6, names=[EVIL, "=HYPERLINK(1)"], failing=0.0)
     first = next(iter(run.meta["cases"]))
     cases = {**run.meta["cases"], first: {"title": TITLE, "digest": "0" * 64}}
-    results = (
-        replace(run.results[0], status="failed", reason=TITLE, blocks={}),
-        *run.results[1:],
-    )
+    results = (replace(run.results[0], status="failed", reason=TITLE, blocks={}), *run.results[1:])
     return Run({**run.meta, "cases": cases}, results)
 
 

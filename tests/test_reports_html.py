@@ -10,10 +10,7 @@ import pytest
 import reproduction_toys as toys
 
 from femubench.reports.digits import Digits, off
-from femubench.reports.reproduction import (
-    reproduction_markdown,
-    reproduction_text,
-)
+from femubench.reports.reproduction import reproduction_markdown, reproduction_text
 from femubench.reports.reproduction_page import reproduction_html
 from femubench.reports.svg import embed_svg
 
@@ -115,7 +112,7 @@ class TestHtml:
 
     def test_nothing_runs_and_nothing_is_fetched(self, source: str, document: Document) -> None:
         assert not {tag for tag, _ in document.elements} & {
-            *("script", "iframe", "object", "embed", "link", "img", "foreignobject", "form"),
+            *("script", "iframe", "object", "embed", "link", "img", "foreignobject", "form")
         }
         for _, attributes in document.elements:
             assert not [name for name in attributes if name.startswith("on")]

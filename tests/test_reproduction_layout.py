@@ -7,12 +7,7 @@ import reproduction_toys as toys
 
 from femubench import InputError
 from femubench.papers.printed import equations
-from femubench.reproduction import (
-    Choice,
-    Convention,
-    Equation,
-    under,
-)
+from femubench.reproduction import Choice, Convention, Equation, under
 
 CELLS = toys.study().cells
 MATH = "<math><mi>x</mi></math>"

@@ -9,18 +9,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from femubench.core.fem.frame import (
-    Frame,
-    Place,
-    Support,
-)
+from femubench.core.fem.frame import Frame, Place, Support
 from femubench.core.fem.model import Model
-from femubench.core.modal.eigen import (
-    dense_matrices,
-    solve_dense,
-    solve_modes,
-    zero_tolerance,
-)
+from femubench.core.modal.eigen import dense_matrices, solve_dense, solve_modes, zero_tolerance
 from femubench.core.modal.rigid import rigid_body_vectors, rigid_modes_of
 from femubench.core.typing import FloatArray
 

@@ -55,12 +55,7 @@ def supported(ladder: Any) -> Frame:
 
 
 @pytest.fixture(params=["spring", "rigid", "supported", "cubic-mass", "3d"])
-def structure(
-    request: pytest.FixtureRequest,
-    hframe: Any,
-    ladder: Any,
-    portal: Any,
-) -> Structure:
+def structure(request: pytest.FixtureRequest, hframe: Any, ladder: Any, portal: Any) -> Structure:
     timoshenko = ladder("timoshenko", polar=False, elements=2)
     frames = {
         "spring": lambda: spring_frame(hframe),

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from diagnosis_problems import sensors_on_joints
 from scipy import stats
 
 from femubench import (
@@ -21,7 +22,6 @@ from femubench import (
     solve_modes,
 )
 from femubench.core.conformance.problems import problem
-from femubench.core.fem.frame import ACTIVE
 from femubench.core.fem.model_parameters import matrix_slopes
 from femubench.core.fem.sections import constant_kappa
 from femubench.core.modal.eigen import count_evaluations
@@ -61,25 +61,12 @@ LADDER_HZ = np.array([226.8, 275.2, 537.4])
 PAPER_SPRINGS = {"x": 3.30e9, "z": 4.48e9, "ry": 3.02e6}
 
 
-def sensors_on(frame: Frame) -> Sensors:
-    """Return sensors in all translations at joints and at two points of every member."""
-    at = {joint.name: np.array(joint.xyz) for joint in frame.joints}
-    points = list(at.values())
-    for member in frame.members:
-        start, stop = (at[name] for name in member.ends)
-        points += [start + s * (stop - start) for s in (0.25, 0.5)]
-    directions = [d for d in ACTIVE[frame.plane] if len(d) == 1]
-    labels = tuple(f"{i}{d}" for i in range(len(points)) for d in directions)
-    xyz = np.repeat(np.array(points), len(directions), axis=0)
-    return Sensors(labels, xyz, tuple(directions) * len(points))
-
-
 def measured(
     truth: Frame | Model, count: int, frequencies: np.ndarray | None = None, std: float = 0.005
 ) -> Measurement:
     """Return modes of a truth at sensors; frequencies replaced by printed ones where given."""
     model = Model.of(truth) if isinstance(truth, Frame) else truth
-    sensors = sensors_on(model.frame_structure.frame)
+    sensors = sensors_on_joints(model.frame_structure.frame)
     modes = solve_modes(model).elastic
     shapes = model.observe(sensors) @ modes.shapes[:, :count]
     hertz = modes.natural_frequencies[:count] if frequencies is None else frequencies
@@ -193,11 +180,7 @@ def test_stiffness_stays_positive_without_damping(hframe_case: Any) -> None:
 
 @pytest.mark.parametrize(
     ("strategy", "residual"),
-    [
-        (Local, "frequency"),
-        (Spring, "relative-eigenvalue"),
-        (Offset, "eigenvalue"),
-    ],
+    [(Local, "frequency"), (Spring, "relative-eigenvalue"), (Offset, "eigenvalue")],
 )
 def test_a_truth_within_the_class_is_recovered(
     hframe: Any, strategy: type[Strategy], residual: str

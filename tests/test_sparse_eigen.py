@@ -10,15 +10,7 @@ import pytest
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.frame import (
-    Frame,
-    Joint,
-    JointSpring,
-    Material,
-    Member,
-    Place,
-    PointMass,
-)
+from femubench.core.fem.frame import Frame, Joint, JointSpring, Material, Member, Place, PointMass
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.sections import round_tube
 from femubench.core.modal.eigen import dense_matrices, solve_dense, solve_modes

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from samples import one_of_each
 
 from femubench import read_case
 from femubench.core.challenge.truth_file import read_truth
@@ -64,22 +63,6 @@ def test_structures_are_as_drawn(name: str) -> None:
     assert mass_of(cut(plan)) == pytest.approx(plan.mass, rel=1e-9)
     assert len(case.used) == plan.used
     assert len(case.held_out) == plan.held_out
-
-
-@pytest.mark.parametrize(
-    "folder",
-    one_of_each(FOLDERS, lambda folder: DRAWS[folder.name].plan.name),
-    ids=lambda folder: folder.name,
-)
-def test_a_truth_is_a_case(folder: Path, tmp_path: Path) -> None:
-    truth = pose(folder, tmp_path / "case", reference=True, suite=STRUCTURES)
-    case = read_case(tmp_path / "case")
-    assert case.reference is not None
-    assert case.measurement.total_mass is not None
-    before, after = (pd.read_csv(folder / name) for name in ("healthy.csv", "modes.csv"))
-    assert list(before.columns) == list(after.columns)
-    plan = DRAWS[truth.name].plan
-    assert len(before) == len(after) == plan.used + plan.held_out
 
 
 @pytest.mark.parametrize("folder", SHOWN, ids=lambda folder: folder.name)

@@ -1,16 +1,19 @@
-"""Truth files, and the cases that are posed from them."""
+"""Truth files, the cases that are posed from them, and the committed ones of all generators."""
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
+from samples import one_of_each
 from small_suite import write_suite
 
 from femubench import InputError, read_case
 from femubench.core.challenge.truth_file import KnownCase, TrueCause, is_held, read_truth
-from truths.posing import DEFECTS, SUITE, pose
+from truths.posing import DEFECTS, OPENSEES, SHEAR, SHEAR_STRUCTURES, STRUCTURES, SUITE, pose
 from truths.truth_text import truth_text
 
 pytestmark = pytest.mark.slow(20)
@@ -55,16 +58,8 @@ def test_a_truth_is_read_as_it_was_written(tmp_path: Path) -> None:
         ("held = ", "held = not", "expected valid TOML"),
         ("chi2 = 83.2", "chi2 = nan", "visible.chi2: out of bounds"),
         ("size = 125000.0", 'size = "big"', "cause[0].size: a text (expected"),
-        (
-            'place = "J5"',
-            'place = "J5"\nwhere = "J5"',
-            "cause[0].where: unknown key",
-        ),
-        (
-            '["joint-rotation@T"]',
-            '["joint-rotation"]',
-            "cause[0].also[0]: of another form",
-        ),
+        ('place = "J5"', 'place = "J5"\nwhere = "J5"', "cause[0].where: unknown key"),
+        ('["joint-rotation@T"]', '["joint-rotation"]', "cause[0].also[0]: of another form"),
     ],
 )
 def test_a_faulty_key_is_one_line(tmp_path: Path, old: str, new: str, line: str) -> None:
@@ -123,3 +118,38 @@ def test_a_defect_is_a_case_with_the_healthy_structure_beside_it(tmp_path: Path)
         case.reference.frequencies, healthy.measurement.frequencies, rtol=0.03
     )
     assert not np.array_equal(case.reference.frequencies, healthy.measurement.frequencies)
+
+
+def test_there_are_enough_defects_of_each_kind_and_what_is_clean_is_clean() -> None:
+    truths = [read_truth(file.parent) for file in DEFECTS.glob("*/truth.toml")]
+    counts = Counter(truth.kind for truth in truths)
+    fewest = {"defect": 100, "pair": 15, "clean": 20, "outside": 20}
+    assert all(counts[kind] >= number for kind, number in fewest.items()), counts
+    for truth in truths:
+        clean = truth.kind == "clean"
+        assert (not truth.causes) is clean
+        assert truth.chi2 == 0.0 if clean else truth.chi2 is not None
+
+
+SUITES = {DEFECTS: SUITE, OPENSEES: STRUCTURES, SHEAR: SHEAR_STRUCTURES}
+
+
+@pytest.mark.parametrize(
+    "folder",
+    one_of_each(
+        (file.parent for above in SUITES for file in sorted(above.glob("*/truth.toml"))),
+        lambda folder: (folder.parent, read_truth(folder).structure),
+    ),
+    ids=lambda folder: folder.name,
+)
+def test_a_truth_is_a_case(folder: Path, tmp_path: Path) -> None:
+    """Both states have the same sensors, other scatter, and a case can be read of them."""
+    pose(folder, tmp_path / "case", reference=True, suite=SUITES[folder.parent])
+    case = read_case(tmp_path / "case")
+    assert case.reference is not None
+    assert not case.modifications
+    assert case.measurement.total_mass is not None or folder.parent != OPENSEES
+    present, healthy = (pd.read_csv(folder / name) for name in ("modes.csv", "healthy.csv"))
+    assert list(present.columns) == list(healthy.columns)
+    assert len(present) == len(healthy) == len(case.used) + len(case.held_out)
+    assert not np.allclose(present["frequency"], healthy["frequency"], rtol=1e-9)

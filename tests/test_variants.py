@@ -22,11 +22,7 @@ def test_options_are_set_and_told_by_the_name() -> None:
     found = strategy_of(words, KNOWN)
     assert isinstance(found, Variant)
     assert found.base == GenericLS(orthogonality=False, plain="full")
-    assert (found.name, found.citation, found.needs) == (
-        words,
-        GenericLS.citation,
-        GenericLS.needs,
-    )
+    assert (found.name, found.citation, found.needs) == (words, GenericLS.citation, GenericLS.needs)
     assert pickle.loads(pickle.dumps(found)) == found
 
 
