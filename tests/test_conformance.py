@@ -305,7 +305,7 @@ def pytest_configure():
 
 def run_pytest(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     (folder / "conftest.py").write_text(PLUGIN.format(toys=str(ROOT / "tests" / "toys")))
-    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider"]
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--rootdir", "."]
     plugin = ["-p", "femubench.core.conformance.pytest_plugin"]
     environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
     return subprocess.run(
@@ -318,6 +318,7 @@ def run_pytest(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow(10)
 def test_pytest_runs_checks_without_any_test_file(tmp_path: Path) -> None:
     words = ("--femubench", "good", "--femubench", "exiting", "-k", "described or returns", "-rA")
     found = run_pytest(tmp_path, *words)

@@ -27,8 +27,57 @@ from femubench.core.schema.results import JobResult
 from femubench.core.study.conditions import vary_case
 from femubench.core.study.study_file import read_study
 from femubench.results import gain_by, leaderboard
-from tests.test_cli import put_case
 
+ROD = """\
+[case]
+name = "rod"
+title = "A cantilever"
+source = "made up"
+
+[model]
+kind = "frame"
+plane = "in-plane"
+beam = "euler-bernoulli"
+
+[model.materials.steel]
+E = 210e9
+nu = 0.3
+rho = 7850.0
+
+[model.sections.bar]
+A = 1e-4
+Iy = 1e-9
+Iz = 1e-9
+J = 1e-9
+Jp = 2e-9
+kappa = 0.83
+
+[[model.joints]]
+name = "A"
+xyz = [0.0, 0.0, 0.0]
+
+[[model.joints]]
+name = "B"
+xyz = [1.0, 0.0, 0.0]
+
+[[model.members]]
+name = "bar"
+ends = ["A", "B"]
+elements = 4
+section = "bar"
+material = "steel"
+
+[[model.supports]]
+at = "A"
+fixed = ["x", "z", "ry"]
+
+[measurement]
+sensors = "sensors.csv"
+modes = "modes.csv"
+shape_std = 0.01
+used = [1]
+held_out = [2]
+"""
 SENSORS = "label,x,y,z,direction\n" + "".join(f"s{i},{i / 5},0,0,z\n" for i in range(1, 6))
 MODES = (
     "mode,frequency,frequency_std,s1,s2,s3,s4,s5\n"
@@ -49,12 +98,19 @@ options = {factor = [1.0, 1.2], loud = [false, true]}
 PLUGINS = Plugins(strategies={"spy": Spy()})
 
 
+def put_case(folder: Path) -> None:
+    folder.mkdir()
+    files = {"case.toml": ROD, "sensors.csv": SENSORS, "modes.csv": MODES}
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Work in a folder with one small case."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("FEMUBENCH_STORE", raising=False)
-    put_case(tmp_path / "rod", sensors_csv=SENSORS, modes_csv=MODES)
+    put_case(tmp_path / "rod")
     return tmp_path
 
 
@@ -81,7 +137,7 @@ def values(run: Run, *names: str) -> dict[tuple[str, str, int], tuple[Any, ...]]
 def spied(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """Return a study that was run once for this file."""
     at = tmp_path_factory.mktemp("spied")
-    put_case(at / "rod", sensors_csv=SENSORS, modes_csv=MODES)
+    put_case(at / "rod")
     text = STUDY.replace("[1.0, 1.2], loud = [false, true]", f"[1.0, 1.2, {BROKEN}]")
     (at / "study.toml").write_text(text.replace("[0.5, 1.0, 2.0]", "[1.0, 2.0]"), encoding="utf-8")
     return run_plan(study_plan(read_study(at / "study.toml"), PLUGINS), 2)
