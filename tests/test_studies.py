@@ -33,44 +33,17 @@ ROD = """\
 name = "rod"
 title = "A cantilever"
 source = "made up"
-
 [model]
 kind = "frame"
 plane = "in-plane"
 beam = "euler-bernoulli"
-
-[model.materials.steel]
-E = 210e9
-nu = 0.3
-rho = 7850.0
-
-[model.sections.bar]
-A = 1e-4
-Iy = 1e-9
-Iz = 1e-9
-J = 1e-9
-Jp = 2e-9
-kappa = 0.83
-
-[[model.joints]]
-name = "A"
-xyz = [0.0, 0.0, 0.0]
-
-[[model.joints]]
-name = "B"
-xyz = [1.0, 0.0, 0.0]
-
-[[model.members]]
-name = "bar"
-ends = ["A", "B"]
-elements = 4
-section = "bar"
-material = "steel"
-
-[[model.supports]]
-at = "A"
-fixed = ["x", "z", "ry"]
-
+materials.steel = {E = 210e9, nu = 0.3, rho = 7850.0}
+sections.bar = {A = 1e-4, Iy = 1e-9, Iz = 1e-9, J = 1e-9, Jp = 2e-9, kappa = 0.83}
+joints = [{name = "A", xyz = [0.0, 0.0, 0.0]}, {name = "B", xyz = [1.0, 0.0, 0.0]}]
+members = [
+  {name = "bar", ends = ["A", "B"], elements = 4, section = "bar", material = "steel"},
+]
+supports = [{at = "A", fixed = ["x", "z", "ry"]}]
 [measurement]
 sensors = "sensors.csv"
 modes = "modes.csv"
