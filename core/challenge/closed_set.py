@@ -1,8 +1,8 @@
 """Cases whose unseen data are encrypted: what a strategy is given is open, the rest is not.
 
 A folder of the set has the case with its used modes alone, and in one file all of the case as it
-is, which opens with the key of whoever keeps the set. Unlike a sealed truth nobody can read it
-without, so that the set says how strategies do on truths that nobody has.
+is, which opens with the key of the set's keeper. Unlike a sealed truth nobody can read it without,
+so that the set says how strategies do on truths that nobody has.
 """
 
 from __future__ import annotations
