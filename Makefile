@@ -28,7 +28,10 @@ NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py attach*.py \
 ON_ALL_CORES := -n 2 --dist loadfile --no-loadscope-reorder -p no:benchmark
 
 # What a change is tried with while one works on it; `test` has the rest that does not take hours.
-QUICK := -m "not slow and not nightly"
+# Of these files each test is quick, and all together are not.
+LONG := browser $(addprefix test_,conformance.py diagnosed_strategy.py diagnosis_blind.py diagnosis_faults.py \
+	harness_sandbox.py hostile_imports.py identify.py library.py publish.py resume.py standing_judge.py)
+QUICK := -m "not slow and not nightly" $(addprefix --ignore=tests/,$(LONG))
 LINT := ruff layout budgets mypy pyright
 
 .PHONY: run check test lint nightly pytest $(LINT) docs kernels bench bench-report truths format clean
