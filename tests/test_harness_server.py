@@ -51,6 +51,7 @@ def test_a_server_of_an_older_source_is_not_used(monkeypatch: pytest.MonkeyPatch
         assert "femubench.core.run.judging" in answer(pool)
 
 
+@pytest.mark.slow(20)  # it ends a server, and is charged what others ran in it
 def test_a_server_that_starts_does_not_hear_ctrl_c() -> None:
     """A terminal sends it to all; its imports would end in a traceback."""
     server.end_server()

@@ -23,8 +23,7 @@ from femubench.core.schema.results import JobName
 from femubench.core.score.ranking import rank_results
 
 pytestmark = pytest.mark.slow(40)
-Data = dict[str, Any]
-Handed = tuple[Data, Path]
+Data, Handed = dict[str, Any], tuple[dict[str, Any], Path]
 
 
 @pytest.fixture(scope="module")
