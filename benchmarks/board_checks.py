@@ -80,7 +80,7 @@ def vary(run: Run) -> pd.DataFrame:
     left = leave_one_out(gains, "mean")
     found = {
         "gain": board["gain"].round(4),
-        "place": ranks_of(run),
+        "place": places(MEANS["mean"](gains)),
         "one_left_out_best": left.min(axis=1),
         "one_left_out_worst": left.max(axis=1),
     }
@@ -131,7 +131,7 @@ def families(run: Run) -> pd.DataFrame:
 def compare_means(run: Run) -> pd.DataFrame:
     """Return by kind of mean the first strategy, and how far one structure moves a place."""
     gains = gains_of(run)
-    usual, rows = ranks_of(run), []
+    usual, rows = places(MEANS["mean"](gains)), []
     for name, mean in MEANS.items():
         own = places(mean(gains))
         moves = leave_one_out(gains, name).sub(own, axis=0).abs().max(axis=1)

@@ -75,8 +75,8 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
     Arguments:
         exhibits: what the store has to draw.
     """
-    standings, scale = Standings.of(run), Scale.of(run.meta)
-    board, apart = list_rows(run, standings), standings.apart
+    standings = Standings.of(run)
+    board, apart, scale = list_rows(run, standings), standings.apart, standings.own.scale
     shared = {
         "finding": finding(run, board),
         "lead": lead(run),
