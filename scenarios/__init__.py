@@ -2,62 +2,68 @@
 
 from __future__ import annotations
 
+import atexit
+import os
+import shutil
 import tomllib
+from functools import cache, partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from femubench import Scenario, hookimpl
+from femubench import InputError, Scenario, hookimpl
 
 HERE = Path(__file__).parent
-SUITE = HERE / "suite"
-
-_TUBES = ("planar frame", "hollow sections", "free")
-_TESTED, _COMPUTED = (*_TUBES, "published test"), (*_TUBES, "computed truth")
-# Name: title, classes.
-_PUBLISHED_AND_SOLID = {
-    "frame": ("Ladder frame of Ahmadian et al., published test", _TESTED),
-    "hframe": ("H-frame of Horton et al., published test", _TESTED),
-    "frame-solid": ("Ladder frame, everything from its solid twin", _COMPUTED),
-    "hframe-solid": ("H-frame, everything from its solid twin", _COMPUTED),
-}
-# Not in the default set: one truth is a beam model too, the other weighs two structures again.
-_FURTHER = {
-    "frame-beam": ("Ladder frame, truth of shear-flexible beams and soft joints", _COMPUTED),
-    "frame-beam-asymmetric": (
-        "The same with one half side 4 % longer and one soft joint",
-        _COMPUTED,
-    ),
-    "design-change": (
-        "Eight design changes of both structures, nothing else held out",
-        (*_COMPUTED, "design changes"),
-    ),
-}
+SUITE, TESTS = HERE / "suite", HERE / "tests"
+OWN_FILES = "FEMUBENCH_TESTS"  # the folder of files that are read where the user keeps them
 
 
-def _cases(name: str) -> dict[str, Path]:
+def _cases(folder: Path, name: str) -> dict[str, Path]:
     """Return the scenario's own case, or those of its sub-folders."""
-    folder = HERE / name
     if (folder / "case.toml").is_file():
         return {name: folder}
     parts = sorted(path.parent for path in folder.glob("*/case.toml"))
     return {f"{name}/{part.name}": part for part in parts}
 
 
-def _suite() -> list[Scenario]:
-    """Return the structures that `suite.toml` lists, each as a scenario; none without the file."""
-    table = SUITE / "suite.toml"
-    if not table.is_file():
-        return []
-    listed = tomllib.loads(table.read_text(encoding="utf-8"))
+def _listed(folder: Path, group: str = "") -> list[Scenario]:
+    """Return the scenarios that a folder's table lists; none without it."""
+    table = folder / f"{folder.name}.toml"
+    listed = tomllib.loads(table.read_text(encoding="utf-8")) if table.is_file() else {}
     return [
         Scenario(
-            f"suite/{name}",
+            f"{group}{name}",
             item["title"],
-            {f"suite/{name}": SUITE / name},
+            {f"{group}{name}": partial(_read_in_place, folder / name, **item["reads"])}
+            if "reads" in item
+            else _cases(folder / name, f"{group}{name}"),
             tuple(item["classes"]),
             item["default"],
         )
         for name, item in listed.items()
     ]
+
+
+def _read_in_place(folder: Path, file: str, origin: str) -> Path:
+    """Return a case folder, gone when the process ends, with the user's own copy of a file.
+
+    Raises:
+        InputError: when the file is not below the folder that the environment names.
+    """
+    named = os.environ.get(OWN_FILES)
+    found = sorted(Path(named).expanduser().rglob(file)) if named else []
+    if not found:
+        what = f"{OWN_FILES} names no folder with {file}"
+        raise InputError(what, expected=f"a copy of {origin}")
+    return _joined(folder, found[0].resolve())
+
+
+@cache
+def _joined(folder: Path, own: Path) -> Path:
+    made = TemporaryDirectory(prefix=f"femubench-{folder.name}-")
+    atexit.register(made.cleanup)
+    for path in (own, *folder.iterdir()):
+        shutil.copy(path, made.name)
+    return Path(made.name)
 
 
 def _footbridge() -> Path:
@@ -71,11 +77,6 @@ def _footbridge() -> Path:
 @hookimpl
 def femubench_scenarios() -> list[Scenario]:
     """Return the built-in scenarios."""
-    own = [
-        Scenario(name, title, _cases(name), kinds, default)
-        for listed, default in ((_PUBLISHED_AND_SOLID, True), (_FURTHER, False))
-        for name, (title, kinds) in listed.items()
-    ]
     footbridge = Scenario(
         "footbridge",
         "Steel pedestrian bridge, published test; needs FEMUBENCH_FOOTBRIDGE",
@@ -83,11 +84,5 @@ def femubench_scenarios() -> list[Scenario]:
         ("bridge", "matrices", "soft supports", "published test"),
         default=False,
     )
-    garteur = Scenario(
-        "garteur",
-        "Aeroplane-like test bed GARTEUR SM-AG19, published test",
-        _cases("garteur"),
-        ("published test", "wing-like", "free"),
-        default=False,
-    )
-    return [*own, garteur, *_suite(), footbridge]
+    groups = (*_listed(TESTS, "tests/"), *_listed(SUITE, "suite/"))
+    return [*_listed(HERE), *groups, footbridge]

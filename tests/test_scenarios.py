@@ -15,7 +15,7 @@ from femubench.scenarios import HERE, femubench_scenarios
 from femubench.scenarios.generate import FRAME_HZ, HFRAME_HZ, write_all
 
 # Those whose measured side is generated here.
-ELSEWHERE = ("suite/", "garteur", "footbridge")
+ELSEWHERE = ("suite/", "tests/", "garteur", "footbridge")
 OWN = [s for s in femubench_scenarios() if not s.name.startswith(ELSEWHERE)]
 CASES = {name: scenario.folder(name) for scenario in OWN for name in scenario.cases}
 DATA = sorted(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from functools import partial
@@ -14,7 +15,7 @@ from femubench.core.cli.outputs import RunOutput
 from femubench.core.cli.registry import plugins_for, wrap_text
 from femubench.core.display import count_noun
 from femubench.core.errors import InputError, PluginError
-from femubench.core.library.cases import case_folders
+from femubench.core.library.cases import LEFT_OUT, case_folders
 from femubench.core.plugin.validation import choose_names
 from femubench.core.schema.quantities import say_duration
 from femubench.core.schema.run_options import DEFAULT_TIMEOUT, RunOptions
@@ -82,7 +83,12 @@ def _checked(ctx: click.Context, cases: Iterable[str], strategies: Iterable[str]
     if ctx.params["strict_plugins"] and plugins.broken:
         raise PluginError(f"{count_noun(len(plugins.broken), 'fault')} in plugins, see above")
     choose_names("strategy", (word.partition(":")[0] for word in strategies), plugins.strategies)
-    case_folders(cases, plugins.scenarios)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        case_folders(cases, plugins.scenarios)
+    for note in said:
+        click.echo(f"bench: {note.message}", err=True)
+    warnings.filterwarnings("ignore", LEFT_OUT)  # said above
     for name in _FIXED if ctx.params["locked"] is not None else ():
         if options.is_given(ctx, name):
             raise InputError(f"--locked repeats a run as it was; {name} cannot be given with it")

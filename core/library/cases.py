@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 CaseLike: TypeAlias = "str | PathLike[str] | Case"
 Thing = TypeVar("Thing")
+LEFT_OUT = "left out: "
 
 
 def usable_plugins() -> Plugins:
@@ -256,12 +257,22 @@ def case_names(scenarios: Mapping[str, Scenario]) -> list[str]:
     return [*scenarios, *_groups(scenarios), *scenarios_of(scenarios)]
 
 
+def _at_hand(scenario: Scenario) -> list[tuple[str, Path]]:
+    """Return name and folder of its cases; warn of a scenario whose files are not there."""
+    try:
+        return [(case, scenario.folder(case)) for case in scenario.cases]
+    except InputError as fault:
+        warnings.warn(f"{LEFT_OUT}{scenario.name}, {fault}", stacklevel=2)
+        return []
+
+
 def _folders(word: str, scenarios: Mapping[str, Scenario]) -> Iterable[tuple[str | None, Path]]:
     """Return name and folder of every case that a word stands for."""
     groups, owners = _groups(scenarios), scenarios_of(scenarios)
-    if word in scenarios or word in groups:
-        named = [scenarios[name] for name in ([word] if word in scenarios else groups[word])]
-        return [(case, scenario.folder(case)) for scenario in named for case in scenario.cases]
+    if word in scenarios:
+        return [(case, scenarios[word].folder(case)) for case in scenarios[word].cases]
+    if word in groups:
+        return [found for name in groups[word] for found in _at_hand(scenarios[name])]
     if word in owners:
         return [(word, owners[word].folder(word))]
     path = Path(word)
