@@ -85,6 +85,7 @@ class Case(Shown):
         notes: what was understood otherwise than it stands in the files, one sentence each.
         matches: where each sensor that came with coordinates was taken to sit.
         lines: that draw the structure of the test, in m along the axes of the model, (k, 2, 3).
+        whole: the model as it came, where `model` is its reduction to groups; None elsewhere.
         frfs: measured frequency responses of the structure as tested; they hold the held-out modes
             too, and are drawn, never handed to a strategy.
     """
@@ -110,6 +111,7 @@ class Case(Shown):
     matches: tuple[Match, ...] = ()
     lines: FloatArray | None = None
     frfs: FrequencyResponses | None = None
+    whole: Model | None = None
 
     def rows(self) -> list[tuple[str, str]]:
         """Return where the case is from, its model, and what was measured on it."""

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 
 from femubench.core.case.faults import BadKey
 from femubench.core.case.frame_keys import Keys
-from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.case.nodes import DOF_COLUMNS, INTERNAL, MatrixGeometry
 from femubench.core.case.table_text import csv_bytes, number
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Place
@@ -84,10 +84,12 @@ def _three(mass: SparseArray, stiffness: SparseArray, geometry: MatrixGeometry) 
 
 def has_skew_dofs(model: Model) -> bool:
     """Tell whether a dof moves along another direction than the one that it is named after."""
-    if model.dofs.axes is None:
+    dofs = model.dofs
+    if dofs.axes is None:
         return False
-    named = np.eye(6)[[DIRECTIONS.index(name) for name in model.dofs.direction]]
-    return not np.array_equal(model.dofs.axes, named)
+    moved = ~dofs.internal
+    named = np.eye(6)[[DIRECTIONS.index(dofs.direction[i]) for i in np.flatnonzero(moved)]]
+    return not np.array_equal(dofs.axes[moved], named)
 
 
 def frame_geometry(model: Model) -> MatrixGeometry:
@@ -143,7 +145,7 @@ def frame_places(model: Model, places: Sequence[Place]) -> dict[Place, Place]:
 
 def dofs_csv(geometry: MatrixGeometry) -> bytes:
     """Return the table row,node,direction,x,y,z, nodes in the order of their names."""
-    dofs = geometry.dofs
+    dofs, internal = geometry.dofs, geometry.dofs.internal
     order = np.arange(len(dofs))
     if np.any(np.diff(np.unique(dofs.node, return_index=True)[1]) <= 0):
         order = np.argsort(dofs.node, kind="stable")  # nodes by their numbers
@@ -153,10 +155,12 @@ def dofs_csv(geometry: MatrixGeometry) -> bytes:
             geometry.names[dofs.node[i]],
             dofs.direction[i],
             *(number(v) for v in dofs.xyz[i]),
+            *([int(internal[i])] if internal.any() else []),
         ]
         for i in order
     ]
-    return csv_bytes(["row", "node", "direction", "x", "y", "z"], rows)
+    columns = [*DOF_COLUMNS, *([INTERNAL] if internal.any() else [])]
+    return csv_bytes(columns, rows)
 
 
 def matrix_keys(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -19,9 +19,11 @@ from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.model import Dofs, Model
 from femubench.core.fem.sensors import DIRECTIONS, Sensors, moved_names
-from femubench.core.typing import FloatArray, SparseArray
+from femubench.core.typing import BoolArray, FloatArray, SparseArray
 
 _MOST_DOFS = 1_000_000
+DOF_COLUMNS = ("row", "node", "direction", "x", "y", "z")
+INTERNAL = "internal"  # the column that marks what moves with no motion of the body
 
 
 @dataclass(frozen=True)
@@ -54,9 +56,12 @@ class MatrixGeometry:
 
     @cached_property
     def places(self) -> dict[str, FloatArray]:
-        """Return where the nodes are in m."""
-        first = np.unique(self.dofs.node, return_index=True)[1]
-        return dict(zip(self.names, self.dofs.xyz[first], strict=True))
+        """Return where the nodes that move with the body are in m, by name."""
+        outer = np.flatnonzero(~self.dofs.internal)
+        number, first = np.unique(self.dofs.node[outer], return_index=True)
+        return {
+            self.names[i]: xyz for i, xyz in zip(number, self.dofs.xyz[outer[first]], strict=True)
+        }
 
     @cached_property
     def points(self) -> FloatArray:
@@ -69,8 +74,8 @@ class MatrixGeometry:
         Arguments:
             xyz: in m, (k, 3).
         """
-        found = cKDTree(self.points).query(xyz)[1]
-        return [(self.names[i], self.points[i]) for i in np.atleast_1d(found)]
+        found, names = cKDTree(self.points).query(xyz)[1], tuple(self.places)
+        return [(names[i], self.points[i]) for i in np.atleast_1d(found)]
 
     def node(self, place: Place) -> str:
         """Return the node of a place; raises Misfit."""
@@ -101,8 +106,8 @@ class MatrixGeometry:
 
     def near(self, xyz: Vector | FloatArray) -> list[tuple[str, float]]:
         """Return the nodes within 1e-6 m of a point with their distances."""
-        gaps = np.linalg.norm(self.points - np.array(xyz), axis=1)
-        return [(self.names[i], float(gaps[i])) for i in np.flatnonzero(gaps <= ON_MEMBER)]
+        gaps, names = np.linalg.norm(self.points - np.array(xyz), axis=1), tuple(self.places)
+        return [(names[i], float(gaps[i])) for i in np.flatnonzero(gaps <= ON_MEMBER)]
 
     def row_at(self, xyz: FloatArray, direction: str) -> int:
         """Return the row that a sensor reads; raises Misfit."""
@@ -180,6 +185,7 @@ def matrix_model(
     directions: Sequence[str] | None = None,
     xyz: FloatArray | None = None,
     groups: Mapping[str, SparseArray] | None = None,
+    internal: BoolArray | None = None,
 ) -> Model:
     """Return a model of a pair of matrices with labelled rows.
 
@@ -190,6 +196,8 @@ def matrix_model(
         directions: one of x y z rx ry rz a row, (n,).
         xyz: position of every row's node, (n, 3); None or nan where it is not known.
         groups: named parts of the stiffness, (n, n) each.
+        internal: which rows no motion of the body moves, as those of nodes that a solver adds
+            inside elements, (n,); None for none.
 
     Raises:
         ModelError: when sizes differ, or a degree of freedom is there twice.
@@ -213,6 +221,8 @@ def matrix_model(
         raise ModelError("a degree of freedom is there twice")
     numbers = np.array([names[label] for label in labels], dtype=np.int64)
     dofs = Dofs(numbers, tuple(directions), places)
+    if internal is not None:
+        dofs = mark_internal(dofs, internal)
     parts = {name: sp.csc_array(part, dtype=float) for name, part in own.items()}
     return Model(
         mass=sp.csc_array(mass, dtype=float),
@@ -226,11 +236,13 @@ def matrix_model(
 def read_dofs(file: Path) -> MatrixGeometry:
     """Return the dofs of a CSV file row,node,direction,x,y,z; rows count from 0 or from 1.
 
+    A column `internal` has a 1 for rows that no motion of the body moves.
+
     Raises:
         InputError: for a row listed twice or left out, a dof listed twice, a node at two places.
     """
     table = read_table(file)
-    table.check_columns(("row", "node", "direction", "x", "y", "z"))
+    table.check_columns(DOF_COLUMNS, (INTERNAL,))
     if not table.rows or len(table.rows) > _MOST_DOFS:
         raise InputError(f"{len(table.rows)} rows", file=file, expected="a row for every dof")
     numbers = [row.whole("row") for row in table.rows]
@@ -239,6 +251,7 @@ def read_dofs(file: Path) -> MatrixGeometry:
     names: dict[str, int] = {}
     places: dict[str, Vector] = {}
     listed: dict[tuple[str, str], int] = {}
+    internal = np.zeros(count, dtype=bool)
     for number, row in zip(numbers, table.rows, strict=True):
         if number in seen or first > 1 or number - first >= count:
             expected = f"the numbers 1 to {count} (or 0 to {count - 1}), each once"
@@ -253,13 +266,22 @@ def read_dofs(file: Path) -> MatrixGeometry:
             raise row.error("x", f"node {node!r} lies at two places", f"{places[node]}")
         names.setdefault(node, len(names))
         listed[node, direction] = number - first
+        if row.cells.get(INTERNAL):
+            internal[number - first] = row.whole(INTERNAL) > 0
     order = sorted(listed, key=lambda key: listed[key])
     dofs = Dofs(
         node=np.array([names[node] for node, _ in order], dtype=np.int64),
         direction=tuple(direction for _, direction in order),
         xyz=np.array([places[node] for node, _ in order], dtype=float),
     )
-    return MatrixGeometry(tuple(names), dofs, first)
+    return MatrixGeometry(tuple(names), mark_internal(dofs, internal), first)
+
+
+def mark_internal(dofs: Dofs, internal: BoolArray) -> Dofs:
+    """Return degrees of freedom of which some move with no motion of the body, (n,)."""
+    if not internal.any():
+        return dofs
+    return replace(dofs, axes=np.where(internal[:, None], 0.0, dofs.motions))
 
 
 def read_nodes(file: Path) -> dict[str, Vector]:

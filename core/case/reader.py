@@ -29,6 +29,7 @@ from femubench.core.case.modes import (
     select_measured,
 )
 from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.case.reducing import reduce_case
 from femubench.core.case.repeats import with_covariance, with_repeats
 from femubench.core.case.response_files import read_responses
 from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, ModificationSpec
@@ -63,6 +64,7 @@ def read_case(
     readers: Sequence[Reader] = (),
     *,
     installed: bool = False,
+    reduced: bool = True,
 ) -> Case:
     """Read a case folder.
 
@@ -72,6 +74,7 @@ def read_case(
         readers: reader plugins for files other than CSV and Matrix Market.
         installed: whether the folder came with an installed package; some installers make such
             a folder of links that lead out of it.
+        reduced: whether a large model with groups is solved in a basis of these.
 
     Raises:
         InputError: for anything wrong in the folder.
@@ -84,7 +87,8 @@ def read_case(
     text, tables = read_text(files.case_file, LARGEST_CASE), FrameTables(files)
     try:
         spec = spec_of(text, files.case_file, CaseSpec, tables.spec)
-        return _Building(files, spec, readers).case(name)
+        case = _Building(files, spec, readers).case(name)
+        return reduce_case(case) if reduced else case
     except BadKey as fault:
         place = tables.place(fault.path)
         if place is None:

@@ -38,6 +38,7 @@ from femubench.core.case.matrix_files import (
 from femubench.core.case.modes import FREQUENCY_STD
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.reader import read_case
+from femubench.core.case.reducing import expand_model
 from femubench.core.case.response_files import responses_npz
 from femubench.core.case.table_text import (
     SHAPE_STD,
@@ -102,7 +103,7 @@ def check_written(fresh: Path, folder: Path, wanted: Case) -> None:
         InputError: when it cannot be read, or says something else.
     """
     try:
-        back = read_case(fresh)
+        back = read_case(fresh, reduced=False)
     except InputError as error:
         what = error.what.replace(str(fresh), str(folder))
         raise refuse_case(folder, what, error.key, error.expected) from None
@@ -200,7 +201,11 @@ def write_case(
     name = case.name if name is None else name
     title = (case.title if title is None else title) or name
     model = case.model if model is None else model
-    wanted = replace(case, name=name, title=title, model=model)
+    try:
+        model = expand_model(case, model)
+    except ModelError as error:
+        raise refuse_case(folder, str(error), "model", "factors of its groups") from None
+    wanted = replace(case, name=name, title=title, model=model, whole=None)
     lines = comment.splitlines() if isinstance(comment, str) else comment
     flat = [line for entry in lines for line in entry.splitlines() or [""]]
     try:

@@ -18,7 +18,7 @@ from femubench.core.fem.attaching import MatrixChange, attach, grow_matrix
 from femubench.core.fem.frame import Frame, GroundSpring, PointMass
 from femubench.core.fem.sensors import Sensors, unit_motions
 from femubench.core.fem.structure import Structure
-from femubench.core.typing import FloatArray, IntArray, SparseArray
+from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 _NEGLIGIBLE = 1e-14  # of the largest eigenvalue of a change
 
@@ -32,7 +32,8 @@ class Dofs:
         direction: one of x y z rx ry rz, (n,).
         xyz: position of every dof's node in m, (n, 3).
         axes: unit motion of every dof in (x, y, z, rx, ry, rz), (n, 6); None where it is the
-            direction itself. Flexible connections of skew members have dofs along the member.
+            direction itself. Flexible connections of skew members have dofs along the member;
+            zero where no motion of a body moves it, as of nodes inside an element.
     """
 
     node: IntArray
@@ -42,6 +43,11 @@ class Dofs:
 
     def __len__(self) -> int:
         return len(self.direction)
+
+    @property
+    def internal(self) -> BoolArray:
+        """Tell which dofs no motion of a body moves, (n,)."""
+        return np.zeros(len(self), dtype=bool) if self.axes is None else ~self.axes.any(axis=1)
 
     @property
     def motions(self) -> FloatArray:

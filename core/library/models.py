@@ -15,10 +15,11 @@ from femubench.core.case.model_files import (
     read_model as read_files,
     write_model as write_files,
 )
+from femubench.core.case.reducing import expand_model
 from femubench.core.case.schema import LengthUnit
 from femubench.core.case.units import METRES
 from femubench.core.case.writing import write_case
-from femubench.core.errors import InputError, NotApplicable, StrategyFailure
+from femubench.core.errors import InputError, ModelError, NotApplicable, StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.files import folder_made
 from femubench.core.library.cases import CaseLike, one_case, usable_plugins
@@ -138,5 +139,10 @@ def write_updated(case: Case, model: Model, folder: Path, plugins: Plugins) -> N
         write_case(folder, case, model, name=f"{case.name[:60]}-updated")
         return
     files, unit = found
+    try:
+        model = expand_model(case, model)
+    except ModelError as error:
+        what, expected = str(error), "a strategy that changes factors of groups"
+        raise InputError(what, file=folder, expected=expected) from None
     with folder_made(folder):
         write_files(model, folder, files, tuple(plugins.readers.values()), unit)

@@ -51,8 +51,9 @@ class CalculixReader(ProgramReader):
         groups = {name: _matrix(file, n) for name, file in _groups(path).items()}
         mass, stiffness = (_matrix(path.with_suffix(s), n) for s in (".mas", ".sti"))
         xyz = np.array([places.get(number, (np.nan,) * 3) for number in numbers])
+        added = np.isnan(xyz[:, 0])
         xyz = _with_inner_nodes(xyz, np.array(numbers), stiffness)
-        return matrix_model(mass, stiffness, numbers, along, xyz, groups)
+        return matrix_model(mass, stiffness, numbers, along, xyz, groups, internal=added)
 
     def model_files(self, path: Path) -> Sequence[Path]:
         """Return the files of a job in addition to the one named; raises InputError."""

@@ -1,0 +1,165 @@
+"""A large model in groups, reduced once when its case is read, and results taken back to it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench.core.case.case import Case
+from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.errors import ModelError
+from femubench.core.fem.model import Dofs, Model
+from femubench.core.modal.eigen import DENSE_LIMIT
+from femubench.core.modal.group_prior import QUARTILE, group_prior_std
+from femubench.core.modal.grouped_reduction import GroupedReduction, reduce_groups
+from femubench.core.typing import FloatArray, IntArray, SparseArray
+
+_INNER = "~"  # the node of coordinates that lie nowhere
+_MODES = 6  # that have to be right in addition to the measured ones
+_MOST_KEPT = DENSE_LIMIT // 2
+_LARGE = 2000  # degrees of freedom: up to here a basis takes as long as what it saves
+_SAME = 1e-9  # of the diagonal: what rounding makes of an unchanged entry
+TOLERANCE = 1e-3
+
+
+def reduce_case(case: Case, above: int = _LARGE) -> Case:
+    """Return a case with a small model of the same groups, where its own is large and has some.
+
+    The nodes of sensors and of attached masses and springs stay; what strategies and effects
+    change acts on the small model as on the whole, which `case.whole` keeps.
+
+    Arguments:
+        case: as it was read.
+        above: degrees of freedom from which a model is large.
+    """
+    model = case.model
+    if model.size <= above or not (model.groups or model.mass_groups):
+        return case
+    counts = [len(m.measurement) for m in (case, *case.modifications)]
+    try:
+        found = reduce_groups(model, _kept_rows(case), max(counts) + _MODES, tolerance=TOLERANCE)
+    except ModelError as error:
+        note = f"the model is not reduced to its groups: {error}"
+        return replace(case, notes=(*case.notes, note))
+    small = len(found.mass)
+    note = f"the model is solved in {small} coordinates instead of {model.size} degrees of freedom"
+    if found.moved > TOLERANCE:
+        note += f": with groups far from their values frequencies are {found.moved:.1%} off"
+    return replace(case, model=_small_model(model, found), whole=model, notes=(*case.notes, note))
+
+
+def _kept_rows(case: Case) -> IntArray:
+    """Return the rows of all nodes with sensors and attachments; where too many, those read."""
+    geometry = case.model.geometry
+    assert isinstance(geometry, MatrixGeometry)
+    read = np.unique(sp.csr_array(case.model.observe(case.measurement.sensors)).indices)
+    attached = [
+        geometry.rows_of[geometry.node(item.at)]
+        for change in case.modifications
+        for item in (*change.masses, *change.springs)
+    ]
+    whole = np.flatnonzero(np.isin(geometry.dofs.node, geometry.dofs.node[read]))
+    kept = np.concatenate([whole, *map(np.array, attached)]).astype(np.int64)
+    return np.unique(kept if len(kept) <= _MOST_KEPT else np.concatenate([read, *attached]))
+
+
+def _small_model(model: Model, found: GroupedReduction) -> Model:
+    """Return the reduced model, with nodes of their own names where rows were kept."""
+    geometry, dofs, count = model.geometry, model.dofs, len(found.mass)
+    assert isinstance(geometry, MatrixGeometry)
+    inner = count - len(found.kept)
+    nodes, numbers = np.unique(dofs.node[found.kept], return_inverse=True)
+    small = Dofs(
+        np.append(numbers, np.full(inner, len(nodes))),
+        (*(dofs.direction[i] for i in found.kept), *(str(i + 1) for i in range(inner))),
+        np.vstack([dofs.xyz[found.kept], np.tile(dofs.xyz.mean(axis=0), (inner, 1))]),
+        np.vstack([dofs.motions[found.kept], np.zeros((inner, 6))]),
+    )
+    names = (*(geometry.names[i] for i in nodes), *([_INNER] if inner else []))
+
+    def sparse(parts: dict[str, FloatArray]) -> dict[str, SparseArray]:
+        return {name: sp.csc_array(part) for name, part in parts.items()}
+
+    return replace(
+        model,
+        mass=sp.csc_array(found.mass),
+        stiffness=sp.csc_array(found.stiffness),
+        dofs=small,
+        geometry=MatrixGeometry(names, small),
+        group_priors={n: float(np.exp(QUARTILE * group_prior_std(model, n))) for n in found.groups},
+        groups=sparse(found.groups),
+        mass_groups=sparse(found.mass_groups),
+    )
+
+
+def expand_model(case: Case, updated: Model) -> Model:
+    """Return the whole model with what an update made of the reduced one.
+
+    Factors of groups are the same there, and what was added at kept nodes is added at these.
+
+    Arguments:
+        case: as it was read.
+        updated: on the rows of `case.model`.
+
+    Raises:
+        ModelError: where the matrices changed otherwise.
+    """
+    whole, small = case.whole, case.model
+    if whole is None or updated is small:
+        return updated if whole is None else whole
+    if updated.size != small.size or updated.mass_change or updated.stiffness_change:
+        raise ModelError(_AS_A_WHOLE)
+    geometry = small.geometry
+    assert isinstance(geometry, MatrixGeometry)
+    assert isinstance(whole.geometry, MatrixGeometry)
+    outer = np.flatnonzero(~small.dofs.internal)
+    rows = np.array([whole.geometry.rows[key] for key in geometry.rows if key[0] != _INNER])
+    found = {}
+    for matrix, kind in (("stiffness", "groups"), ("mass", "mass_groups")):
+        before, parts = getattr(small, matrix), getattr(small, kind)
+        bases = [part.toarray() for part in (before, *parts.values())]
+        change = getattr(updated, matrix).toarray() - bases[0]
+        factors, rest = _factors(bases, change, outer)
+        total, own = getattr(whole, matrix), getattr(whole, kind)
+        grown = (1.0 + factors[0]) * total
+        for factor, name in zip(factors[1:], parts, strict=True):
+            grown = grown + factor * own[name]
+        added = sp.coo_array(rest)
+        at = (rows[added.row], rows[added.col])
+        found[matrix] = sp.csc_array(grown + sp.coo_array((added.data, at), shape=total.shape))
+        scale = 1.0 + factors[0] + factors[1:]
+        found[kind] = {name: f * own[name] for f, name in zip(scale, parts, strict=True)}
+    return replace(whole, **found)
+
+
+_AS_A_WHOLE = "the matrices are changed as a whole, which a model that was reduced cannot take back"
+
+
+def _factors(
+    bases: list[FloatArray], change: FloatArray, outer: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return by how much a change multiplies matrices, and what is left of it at kept rows.
+
+    Arguments:
+        bases: the matrix and its groups, (N, N) each.
+        change: of the matrix, (N, N).
+        outer: the kept rows, (b,).
+
+    Raises:
+        ModelError: where something is left elsewhere.
+    """
+    inside = np.ones(change.shape, dtype=bool)
+    inside[np.ix_(outer, outer)] = False
+    columns = np.array([base[inside] for base in bases])
+    size = np.sqrt(np.einsum("ij,ij->i", columns, columns))
+    columns = columns[size > 0.0] / size[size > 0.0, None]
+    factors = np.zeros(len(bases))
+    factors[size > 0.0] = np.linalg.lstsq(columns.T, change[inside])[0] / size[size > 0.0]
+    rest = change - np.tensordot(factors, np.array(bases), axes=1)
+    size = np.sqrt(np.abs(bases[0].diagonal()) + np.abs(change.diagonal()))
+    large = np.abs(rest) > _SAME * np.outer(size, size)
+    if large[inside].any():
+        raise ModelError(_AS_A_WHOLE)
+    return factors, np.where(large, rest, 0.0)[np.ix_(outer, outer)]
