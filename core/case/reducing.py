@@ -37,7 +37,7 @@ def reduce_case(case: Case, above: int = _LARGE) -> Case:
     model = case.model
     if model.size <= above or not (model.groups or model.mass_groups):
         return case
-    counts = [len(m.measurement) for m in (case, *case.modifications)]
+    counts = [len(case.measurement), *(len(m.measurement) for m in case.modifications)]
     try:
         found = reduce_groups(model, _kept_rows(case), max(counts) + _MODES, tolerance=TOLERANCE)
     except ModelError as error:
@@ -56,9 +56,9 @@ def _kept_rows(case: Case) -> IntArray:
     assert isinstance(geometry, MatrixGeometry)
     read = np.unique(sp.csr_array(case.model.observe(case.measurement.sensors)).indices)
     attached = [
-        geometry.rows_of[geometry.node(item.at)]
+        geometry.rows_of[geometry.node(place)]
         for change in case.modifications
-        for item in (*change.masses, *change.springs)
+        for place in (*(m.at for m in change.masses), *(s.at for s in change.springs))
     ]
     whole = np.flatnonzero(np.isin(geometry.dofs.node, geometry.dofs.node[read]))
     kept = np.concatenate([whole, *map(np.array, attached)]).astype(np.int64)

@@ -47,7 +47,8 @@ class Dofs:
     @property
     def internal(self) -> BoolArray:
         """Tell which dofs no motion of a body moves, (n,)."""
-        return np.zeros(len(self), dtype=bool) if self.axes is None else ~self.axes.any(axis=1)
+        moved = np.ones(len(self)) if self.axes is None else np.abs(self.axes).sum(axis=1)
+        return np.asarray(moved == 0.0)
 
     @property
     def motions(self) -> FloatArray:
