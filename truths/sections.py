@@ -123,8 +123,9 @@ def round_bar(diameter: float, wall: float = 0.0, sides: int = 4) -> Section:
     lines = [-1.0, *lines, 1.0] if wall else lines
     area = sum(2 * np.sin(np.pi / 4 * (b - a)) for a, b in pairwise(lines)) / np.pi
     half = diameter / 2 / np.sqrt(area)
-    strips = [(a * half, b * half, -half, half, True) for a, b in pairwise(lines)]
-    strips += [(-half, half, a * half, b * half, True) for a, b in pairwise(lines)]
+    # The voids give the grid its planes across z; the strips along y fill them.
+    strips = [(-half, half, a * half, b * half, False) for a, b in pairwise(lines)]
+    strips += [(a * half, b * half, -half, half, True) for a, b in pairwise(lines)]
     void = [_box(2 * inner * half, 2 * inner * half, False)] if wall else []
     drawn: Drawn = {"shape": "solid-circle", "diameter": diameter}
     if wall:
