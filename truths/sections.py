@@ -109,16 +109,13 @@ def tee(width: float, height: float, web: float, flange: float) -> Section:
     return thin_walled(parts, web * height)
 
 
-def round_bar(diameter: float, wall: float = 0.0, sides: int = 4) -> Section:
+def round_bar(diameter: float, wall: float = 0.0) -> Section:
     """Return a square in strips that `rounded` turns into a circle; a tube where it has a wall.
 
-    The strips give the circle its facets, alike in every mesh; their polygon has its area.
-
-    Arguments:
-        sides: strips of a quarter.
+    Four strips a quarter give the circle its facets, alike in every mesh, and its area.
     """
     inner = 1 - 2 * wall / diameter if wall else 1.0
-    count = sides if inner == 1.0 else sides - 2
+    count = 2 if wall else 4
     lines = [inner * (2 * i / count - 1) for i in range(count + 1)]
     lines = [-1.0, *lines, 1.0] if wall else lines
     area = sum(2 * np.sin(np.pi / 4 * (b - a)) for a, b in pairwise(lines)) / np.pi

@@ -44,11 +44,11 @@ STRUCTURE = Structure(
         "soft feet",
     ),
     story="""
-A cast iron crank 20 mm thick with arms of 340 and 220 mm at a right angle around a boss of 70 x 70 x 60 mm; the arms
-narrow from 56 mm to 28 and 36 mm. A slot lightens the long arm, a web of 8 mm fills the inner corner, a fork
-end of 40 mm stands at the short arm. The boss sits on a bush, the long arm's end on a link. The drawing has two
-lengths of constant bar an arm from the pivot's centre on, bush and link with their catalogue stiffness, has
-the boss as a short bar across, and knows neither slot nor web nor the fork.
+A cast iron crank 20 mm thick with arms of 340 and 220 mm at a right angle around a boss of 70 x 70 x 60 mm;
+the arms narrow from 56 mm to 28 and 36 mm. A slot lightens the long arm, a web of 8 mm fills the inner
+corner, a fork end of 40 mm stands at the short arm. The boss sits on a bush, the long arm's end on a link.
+The drawing has two lengths of constant bar an arm from the pivot's centre on, bush and link with their
+catalogue stiffness, has the boss as a short bar across, and knows neither slot nor web nor the fork.
 """,
     materials={"iron": Material(120e9, 0.26, 7150.0)},
     sections={

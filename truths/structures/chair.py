@@ -55,10 +55,10 @@ STRUCTURE = Structure(
         "soft feet",
     ),
     story="""
-Posts of 34 mm square, seat rails of 20 x 60 mm, stretchers of 20 mm square in the shape of an H and two slats of
-20 x 60 mm across the back, all beech, tenoned and glued. The rear posts lean back above the seat and
-splay out under it. A seat board of 10 mm is glued into the rails, which the drawing leaves
-out. The drawing runs from centre line to centre line and has the rubber tips' catalogue stiffness.
+Posts of 34 mm square, seat rails of 20 x 60 mm, stretchers of 20 mm square in the shape of an H and two slats
+of 20 x 60 mm across the back, all beech, tenoned and glued. The rear posts lean back above the seat and splay
+out under it. A seat board of 10 mm is glued into the rails, which the drawing leaves out. The drawing runs
+from centre line to centre line and has the rubber tips' catalogue stiffness.
 """,
     materials={"beech": Material(12e9, 0.35, 700.0), "board": Material(7e9, 0.3, 650.0)},
     sections={

@@ -66,10 +66,9 @@ STRUCTURE = Structure(
     classes=("after the rule", "machine part", "stubby members", "open sections", "free"),
     story="""
 A forged steel rod, 360 mm between the centres of its eyes. The shank is an I of 52 x 30 mm at the big eye and
-34 x 30 mm at the small one; the eyes are square rings around cross-shaped
-openings of 68 and 36 mm;
-balancing lugs of 30 mm height stand on both. The drawing has four lengths of constant I on the centre line, each eye as a bar with the
-share of metal that its opening leaves, and the lugs on stiff links.
+34 x 30 mm at the small one; the eyes are square rings around cross-shaped openings of 68 and 36 mm; balancing
+lugs of 30 mm height stand on both. The drawing has four lengths of constant I on the centre line, each eye as
+a bar with the share of metal that its opening leaves, and the lugs on stiff links.
 """,
     materials={"steel": STEEL, "link": Material(2e11, 0.3, 1.0)},
     sections={

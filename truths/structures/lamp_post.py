@@ -61,10 +61,10 @@ STRUCTURE = Structure(
     ),
     story="""
 A post 4 m high, rolled of plate to 153 mm at its foot and 90 mm at its top, whose wall thins with it from 6.8
-to 4 mm; an arm of 60 x 60 x 3 mm, 0.9 m long, carries a lamp of 6 kg; two plates inside
-the post hold its shape there. Near the foot a door of 90 x 380 mm is
-cut out; the foot plate of 20 mm stands on 25 mm of mortar. The drawing has four lengths of constant round
-tube, clamped at the foot plate, without door and mortar.
+to 4 mm; an arm of 60 x 60 x 3 mm, 0.9 m long, carries a lamp of 6 kg; two plates inside the post hold its
+shape there. Near the foot a door of 90 x 380 mm is cut out; the foot plate of 20 mm stands on 25 mm of
+mortar. The drawing has four lengths of constant round tube, clamped at the foot plate, without door and
+mortar.
 """,
     materials={"steel": STEEL, "mortar": Material(2.5e9, 0.2, 2000.0)},
     sections={f"post-{i + 1}": _length(a, b) for i, (a, b) in enumerate(pairwise(STATIONS))}

@@ -40,11 +40,11 @@ STRUCTURE = Structure(
         "soft feet",
     ),
     story="""
-Two posts 60 x 60 x 3 mm pass a crossbeam of 60 x 50 x 3 mm that runs on as a cantilever at each side; the posts end
-250 mm above it. Stepped plates of 6 mm stand under the cantilevers at the posts, and the beam passes the
-posts through cut-outs, welded all around. The posts stand on plates of 130 x 130 x 12 mm over 20 mm of mortar. Insulators of
-3, 3 and 4 kg hang 120 mm under the ends and the middle. The drawing has centre lines clamped at the plates and the
-insulators at their heights, without plates and mortar.
+Two posts 60 x 60 x 3 mm pass a crossbeam of 60 x 50 x 3 mm that runs on as a cantilever at each side; the
+posts end 250 mm above it. Stepped plates of 6 mm stand under the cantilevers at the posts, and the beam
+passes the posts through cut-outs, welded all around. The posts stand on plates of 130 x 130 x 12 mm over 20
+mm of mortar. Insulators of 3, 3 and 4 kg hang 120 mm under the ends and the middle. The drawing has centre
+lines clamped at the plates and the insulators at their heights, without plates and mortar.
 """,
     materials={"steel": STEEL, "mortar": Material(1.5e9, 0.2, 1900.0)},
     sections={

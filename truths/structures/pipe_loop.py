@@ -38,8 +38,8 @@ STRUCTURE = Structure(
     title="Pipe with two bends in space between a flange and a hanger",
     classes=("after the rule", "piping", "curved members", "round sections", "clamped"),
     story="""
-A steel pipe of 60 x 3 mm with two bends of 130 mm radius in two planes. It is welded to a flange of 16 mm that
-is bolted to a wall over its whole face, and hangs on a spring at its far end. A clamp ring of 5 mm lies
+A steel pipe of 60 x 3 mm with two bends of 130 mm radius in two planes. It is welded to a flange of 16 mm
+that is bolted to a wall over its whole face, and hangs on a spring at its far end. A clamp ring of 5 mm lies
 around the middle length and carries a valve of 2.5 kg. The bends turn oval when they bend, the flange's neck
 stiffens the root: the drawing has straight pieces of round tube through points on the axis, a rigid root at
 the flange's face, the valve and the hanger's catalogue stiffness.

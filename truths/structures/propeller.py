@@ -57,10 +57,11 @@ STRUCTURE = Structure(
     title="Propeller of two twisted blades on a springy shaft",
     classes=("after the rule", "propeller", "blade", "twisted", "tapered members", "on springs"),
     story="""
-A propeller of 1.3 m diameter carved of beech in one piece: the hub is 120 mm long, 90 mm wide and 34 mm thick with steel
-discs of 90 x 90 x 6 mm on both faces; the blades are up to 112 mm wide, thin out to 7 mm and turn by the pitch of 450 mm. The
-hub sits on a shaft whose stiffness is in the drawing. The drawing has five lengths of constant bar for each blade, each turned to its
-middle, and knows the nut and spinner of 0.6 kg, not the discs.
+A propeller of 1.3 m diameter carved of beech in one piece: the hub is 120 mm long, 90 mm wide and 34 mm thick
+with steel discs of 90 x 90 x 6 mm on both faces; the blades are up to 112 mm wide, thin out to 7 mm and turn
+by the pitch of 450 mm. The hub sits on a shaft whose stiffness is in the drawing. The drawing has five
+lengths of constant bar for each blade, each turned to its middle, and knows the nut and spinner of 0.6 kg,
+not the discs.
 """,
     materials={"beech": Material(13.5e9, 0.33, 710.0), "steel": Material(206e9, 0.3, 7850.0)},
     sections={f"piece-{i}": _piece(a, b) for i, (a, b) in enumerate(pairwise(STATIONS), 1)},

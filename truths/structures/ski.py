@@ -59,9 +59,9 @@ STRUCTURE = Structure(
     story="""
 A ski 1.6 m long: a core of ash, 17 mm thick under the boot and 6 mm at the ends, between aluminium sheets of
 1.6 mm; 70 mm wide at its waist and up to 108 mm at the shovel, with a camber of 12 mm and an upturned tip. A
-binding plate of 300 x 60 x 5 mm is glued onto its middle. The drawing is a polygon of seven lengths, each with the
-handbook's stiffness and mass of its middle; it has the binding's two lumps without the plate. Only bending
-across the snow is tested.
+binding plate of 300 x 60 x 5 mm is glued onto its middle. The drawing is a polygon of seven lengths, each
+with the handbook's stiffness and mass of its middle; it has the binding's two lumps without the plate. Only
+bending across the snow is tested.
 """,
     materials={"aluminium": ALUMINIUM, "wood": WOOD},
     sections={f"piece-{i + 1}": _piece(a, b) for i, (a, b) in enumerate(pairwise(STATIONS))},

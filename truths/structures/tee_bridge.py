@@ -35,11 +35,11 @@ STRUCTURE = Structure(
     title="Model bridge of two T-girders with cross girders on bearings",
     classes=("after the rule", "bridge", "grid", "slab", "open sections", "on bearings"),
     story="""
-A bridge of micro-concrete, 2.4 m long: a slab 800 x 30 mm on two webs of 50 x 130 mm, 400 mm apart, with cross
-girders of 40 x 100 mm at both ends and in the middle; a kerb of 40 x 30 mm stands along
-each edge, which the drawing leaves out. Four rubber bearings carry the webs at their ends. The
-drawing is a grid: two T-girders on their centroids, joined by strips of slab at the quarter points and by
-cross girders of T shape, whose slab already weighs with the girders, on springs of the bearings' catalogue stiffness.
+A bridge of micro-concrete, 2.4 m long: a slab 800 x 30 mm on two webs of 50 x 130 mm, 400 mm apart, with
+cross girders of 40 x 100 mm at both ends and in the middle; a kerb of 40 x 30 mm stands along each edge,
+which the drawing leaves out. Four rubber bearings carry the webs at their ends. The drawing is a grid: two
+T-girders on their centroids, joined by strips of slab at the quarter points and by cross girders of T shape,
+whose slab already weighs with the girders, on springs of the bearings' catalogue stiffness.
 """,
     materials={"micro": Material(28e9, 0.2, 2200.0), "light": Material(28e9, 0.2, 1.0)},
     sections={

@@ -37,11 +37,11 @@ STRUCTURE = Structure(
         "clamped",
     ),
     story="""
-An aluminium bar 30 x 22 mm is bent to a U of 60 mm radius with tines of 500 mm. A stem of 24 x 24 mm,
-160 mm long below the bar's middle line, is welded under the crown with a fillet block of 50 mm; a jaw holds its last
-50 mm. The drawing clamps the stem where the jaw begins, takes the bend as four straight pieces, and has
-the screw of 80 g at one tine's end, but not the fillet nor the notch of 4 mm filed into the crown's
-inner side to tune it.
+An aluminium bar 30 x 22 mm is bent to a U of 60 mm radius with tines of 500 mm. A stem of 24 x 24 mm, 160 mm
+long below the bar's middle line, is welded under the crown with a fillet block of 50 mm; a jaw holds its last
+50 mm. The drawing clamps the stem where the jaw begins, takes the bend as four straight pieces, and has the
+screw of 80 g at one tine's end, but not the fillet nor the notch of 4 mm filed into the crown's inner side to
+tune it.
 """,
     materials={"aluminium": ALUMINIUM},
     sections={"bar": bar(WIDE, THICK), "stem": bar(0.024, 0.024)},
