@@ -65,8 +65,9 @@ def model_tables(structure: Structure) -> Iterator[str]:
             "section": member.section,
             "material": member.material,
         }
-        if structure.plane == "3d" and member.up is not None:
-            values["up"] = member.up
+        up = member.drawn_up or member.up
+        if structure.plane == "3d" and up is not None:
+            values["up"] = up
         yield table("[[model.members]]", values)
     for lump in structure.lumps:
         if lump.drawn:

@@ -43,6 +43,7 @@ class Member:
         up: a vector in the local x-z plane; by default global z, or x for an upright.
         extend: lengths in m by which the solid passes its joints, so that walls meet.
         weld: length in m of the layer at either end that a defect may change; 0 for none.
+        drawn_up: what the drawing has in place of `up` where a warp turns the section.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Member:
     up: Point | None = None
     extend: tuple[float, float] = (0.0, 0.0)
     weld: float = 0.0
+    drawn_up: Point | None = None
 
 
 @dataclass(frozen=True)
