@@ -9,7 +9,8 @@ import numpy as np
 from femubench.core.errors import InputError
 from femubench.core.plot.style import SOFT, check_kind, draw_curves, name_of, own_axes
 from femubench.core.schema.results import Run
-from femubench.core.score.predictive import Forecasts
+from femubench.core.score.predictive import stated_coverage
+from femubench.core.score.ranking import Scale
 from femubench.core.score.statistics import structures_of
 
 if TYPE_CHECKING:
@@ -38,13 +39,11 @@ def calibration(run: Run, *, ax: Axes | None = None) -> Axes:
         'level of the interval'
     """
     check_kind(run, (Run,), "strategies")
-    structures = structures_of(run)
+    scale, structures = Scale.of(run.meta), structures_of(run)
     curves = []
     for name in dict.fromkeys(result.strategy for result in run.ranked):
-        fine = [r for r in run.ranked if r.strategy == name and r.status == "ok"]
-        found = Forecasts.of(fine, structures)
-        if found.stated.any():
-            observed = np.array([found.coverage(level) for level in _LEVELS])
+        own = [r for r in run.ranked if r.strategy == name]
+        if (observed := stated_coverage(own, scale, structures, _LEVELS)) is not None:
             curves.append((name_of(name), "predicted", _LEVELS, observed))
     if not curves:
         raise InputError(

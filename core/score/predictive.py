@@ -1,123 +1,235 @@
-"""How good predictive distributions of unseen frequencies are: coverage, CRPS, log score.
+"""The predictive board: CRPS and coverage of what models say of unseen frequencies, by band.
 
-A prediction is a normal distribution about the model's frequency, or the mere frequency. All is in
-percent of the measured frequency. A measured mode without partner, or with an imaginary one, counts
-as an error of 100 % without a distribution: covered by no interval.
+A prediction is a normal distribution of ln f about the model's. A measured mode without partner, or
+with an imaginary one, is in no interval, and its CRPS is the cap of the rule, which none exceeds.
 
-Source: Gneiting & Raftery (2007), J. Am. Stat. Assoc. 102, 359-378: both scores are proper.
+Source: Gneiting & Raftery (2007), J. Am. Stat. Assoc. 102, 359-378: the score is proper.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+import math
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import chain
-from operator import attrgetter
+from typing import Any
 
 import numpy as np
 from scipy.special import ndtr
 
-from femubench.core.schema.results import UNSEEN, JobResult
+from femubench.core.garbage import pause_collection
+from femubench.core.schema.paired_modes import PairedMode
+from femubench.core.schema.results import UNSEEN, Block, JobResult, Run
+from femubench.core.score.bounded_gain import MeasuredModes, bound_gain
+from femubench.core.score.leaderboard import GainTable, mean_known
+from femubench.core.score.ranking import Scale
+from femubench.core.score.statistics import FEWEST, interval_of_mean
 from femubench.core.typing import BoolArray, FloatArray, IntArray
 
-COLUMNS = ("coverage90", "crps_percent", "log_score")
+# Higher modes and modified ones above the highest given frequency, and modified ones below it.
+BANDS = ("above", "band")
+FIGURES = ("crps_percent", "coverage90", "skill")
 LEVEL = 0.9
-LOST_PERCENT = 100.0  # the error of a mode that the model does not have
-# A forecast never excludes the rest: it is mixed with so much of anything within 100 %. A lost mode
-# then has a log score too, and one mode that is 50 deviations off does not outweigh all others.
-ANYTHING = 0.01
+# Of ln f; from the repeatability of a test to more than any pairing allows. A step of 6 % changes
+# the mean CRPS near its least value by less than 0.1 %.
+_DEVIATIONS = np.geomspace(1e-3, 1.0, 121)
 
 
 @dataclass(frozen=True)
 class Forecasts:
-    """Predictions of unseen modes and what was measured.
+    """What a model predicts of the m unseen modes of a case.
+
+    Candidates follow the partner of their mode, as in the rule of the ranks: n in all.
 
     Arguments:
-        error: predicted minus measured frequency in percent of the measured one, (n,).
-        std: of the prediction in the same unit, nan where none was given, (n,).
-        stated: whether the strategy gave an uncertainty with that model, (n,).
-        structure: number of the structure, (n,).
+        error: ln(f_p / f_m), nan without a partner of a real frequency, (n,).
+        std: of ln f, nan where none was given, (n,).
+        weight: 1 in total for every mode, (n,).
+        mode: place of the measured mode, (n,).
+        above: whether a mode is above the given band, (m,).
+        cap: largest CRPS.
     """
 
     error: FloatArray
     std: FloatArray
-    stated: BoolArray
-    structure: IntArray
+    weight: FloatArray
+    mode: IntArray
+    above: BoolArray
+    cap: float
 
     @classmethod
-    def of(
-        cls,
-        results: Iterable[JobResult],
-        structures: Mapping[str, str],
-        blocks: Collection[str] = UNSEEN,
-    ) -> Forecasts:
-        """Return the forecasts of the unseen modes of jobs that are ok.
+    def of(cls, modes: MeasuredModes, blocks: Mapping[str, Block]) -> Forecasts:
+        """Return the forecasts of a model.
 
         Arguments:
-            results: of one strategy.
-            structures: by case; one that is not named is a structure of its own.
-            blocks: those of them whose modes are taken.
+            modes: that were measured of the case.
+            blocks: what the model predicts.
         """
-        listed = list(results)
-        found = [result.blocks.get(name) for result in listed for name in UNSEEN]
-        modes = [block.modes if block else () for block in found]
-        hertz = np.array(list(map(_HERTZ, chain(*modes))), dtype=float).reshape(-1, 3).T
-        counts = np.array(list(map(len, modes)), dtype=int)
-        owner = np.repeat(np.arange(len(modes)) // len(UNSEEN), counts)
-        stated = np.bincount(owner, ~np.isnan(hertz[2]), len(listed)) > 0.0
-        numbers: dict[str, int] = {}
-        names = (structures.get(result.case, result.case) for result in listed)
-        places = np.array([numbers.setdefault(name, len(numbers)) for name in names], dtype=int)
-        wanted = np.array([name in blocks for name in UNSEEN] * len(listed), dtype=bool)
-        taken = np.repeat(wanted, counts)
-        error, std = _percent(hertz[:, taken])
-        return cls(error, std, stated[owner[taken]], places[owner[taken]])
+        listed = [(name, m) for name in UNSEEN if name in blocks for m in blocks[name].modes]
+        rows = [row for k, (_, mode) in enumerate(listed) for row in _rows_of(modes, k, mode)]
+        error, std, weight, place = np.array(rows, dtype=float).reshape(-1, 4).T
+        above = np.array([modes.band_of(*item) != "band" for item in listed], dtype=bool)
+        return cls(error, std, weight, place.astype(int), above, modes.rule.cap)
 
     @property
-    def weight(self) -> FloatArray:
-        """Return weights of 1 in total, the same for all structures and all modes of one, (n,)."""
-        counts = np.bincount(self.structure)
-        return np.asarray(1.0 / (counts[self.structure] * np.count_nonzero(counts)))
+    def stated(self) -> bool:
+        """Return whether the strategy gave an uncertainty with the model."""
+        return bool(np.isfinite(self.std).any())
 
-    @property
-    def uncertain(self) -> Forecasts:
-        """Return those of models that came with an uncertainty."""
-        own = self.stated
-        return Forecasts(self.error[own], self.std[own], own[own], self.structure[own])
+    def crps(self, common: FloatArray) -> FloatArray:
+        """Return the CRPS of every mode, the weighted mean over what may stand for it, (m,).
 
-    @property
-    def level(self) -> FloatArray:
-        """Return the level of the central interval that just reaches the measured value, (n,).
-
-        2 for a mode that no interval covers.
+        Arguments:
+            common: deviation of ln f for a model without an uncertainty, by band, (2,).
         """
+        score = np.minimum(crps_normal(self.error, self._std(common)), self.cap)
+        score = np.where(np.isnan(self.error), self.cap, score)
+        return np.bincount(self.mode, score * self.weight, len(self.above))
+
+    def level(self, common: FloatArray | None = None) -> FloatArray:
+        """Return the level of the central interval that just reaches the measured value, (m,).
+
+        The interval is the partner's, for which it was stated; 2 where none covers a mode.
+
+        Arguments:
+            common: as for `crps`; without it only what was stated counts.
+        """
+        first = np.flatnonzero(np.diff(self.mode, prepend=-1))
+        error = np.abs(self.error[first])
+        std = (self.std if common is None else self._std(common))[first]
         with np.errstate(divide="ignore", invalid="ignore"):
-            reached = 2.0 * ndtr(np.abs(self.error) / self.std) - 1.0
-        reached = np.where((self.std == 0.0) & (self.error == 0.0), 0.0, reached)
-        return np.asarray(np.where(np.isnan(self.std), 2.0, reached))
+            reached = np.where((error == 0.0) & (std == 0.0), 0.0, 2.0 * ndtr(error / std) - 1.0)
+        return np.asarray(np.where(np.isnan(error) | np.isnan(std), 2.0, reached))
 
-    def coverage(self, level: float = LEVEL) -> float:
-        """Return the share of modes in the central interval of a level; nan without any."""
-        found = self.uncertain
-        return float(found.weight @ (found.level <= level)) if len(found.error) else np.nan
+    def figures(self, common: FloatArray) -> FloatArray:
+        """Return mean CRPS, and share in the 90 % intervals, by band; nan where unknown, (2, 2)."""
+        score, inside = self.crps(common), self.level(common) <= LEVEL
+        known = [self.stated or np.isfinite(std) for std in common]
+        parts = (self.above, ~self.above)
+        found = np.full((2, 2), math.nan)
+        for row, part, there in zip(found, parts, known, strict=True):
+            if there and part.any():
+                row[:] = score[part].mean(), inside[part].mean()
+        return found
+
+    def _std(self, common: FloatArray) -> FloatArray:
+        own = np.where(self.above[self.mode], *common)
+        return self.std if self.stated else np.asarray(own)
 
 
-def scores(results: Iterable[JobResult], structures: Mapping[str, str]) -> dict[str, float]:
-    """Return coverage of 90 % intervals, CRPS in percent and log score of one strategy.
-
-    Each is the mean over unseen modes, every structure with the same weight. Coverage and log
-    score are those of models that came with an uncertainty, nan where none did; without one the
-    CRPS is the absolute error.
+@dataclass(frozen=True)
+class PredictiveBoard:
+    """How good the stated uncertainties of a run are, apart from its ranks.
 
     Arguments:
-        results: of the strategy.
-        structures: by case.
+        rows: one a strategy, the best skill above the given band first.
+        common: by band the least and largest deviation of ln f, in percent, that stood for one not
+            stated; nan where there are too few structures to learn it from.
     """
-    found = Forecasts.of(results, structures)
-    some = found.uncertain
-    crps = float(found.weight @ crps_normal(found.error, found.std)) if len(found.error) else np.nan
-    log = float(some.weight @ log_score(some.error, some.std)) if len(some.error) else np.nan
-    return dict(zip(COLUMNS, (found.coverage(), crps, log), strict=True))
+
+    rows: tuple[dict[str, Any], ...]
+    common: Mapping[str, tuple[float, float]]
+
+    @classmethod
+    @pause_collection()
+    def of(cls, run: Run) -> PredictiveBoard:
+        """Return the predictive board of a run.
+
+        Means over seeds, then over the cases of a structure, then over structures: `crps_percent`
+        of ln f, `coverage90`, and `skill`, the bounded gain of the CRPS over that of the textbook
+        model with the common deviation, with `low` and `high`, its 95 % interval over structures;
+        each with `above_` and `band_` before it. `stated` of `total` jobs gave an uncertainty. A
+        job without a possible model counts as the textbook one with the common deviation.
+
+        Raises:
+            InputError: when the run keeps too little to be scored.
+        """
+        table = GainTable.of(run, (), run.nominals[0])
+        scale, cases = table.scale, {case: k for k, case in enumerate(table.cases)}
+        textbook = {case: Forecasts.of(scale.modes[case], scale.blocks[case]) for case in cases}
+        if not cases:
+            return cls((), {})
+        common = learn_deviations(table, textbook)
+        lines = {case: textbook[case].figures(common[k]) for case, k in cases.items()}
+        found: dict[tuple[str, str, int], list[FloatArray]] = defaultdict(list)
+        stated: Counter[str] = Counter()
+        for result in run.ranked:
+            if result.case in cases:
+                own = Forecasts.of(scale.modes[result.case], result.blocks)
+                own = own if result.answered else textbook[result.case]
+                stated[result.strategy] += own.stated
+                figures = own.figures(common[cases[result.case]])
+                found[result.strategy, result.case, result.seed].append(figures)
+        rows = []
+        for name in table.names:
+            values = np.array([
+                np.mean([_with_skill(own, lines[case], scale) for own in listed], axis=0)
+                for case in cases
+                for seed in table.seeds
+                for listed in [found.get((name, case, seed)) or [lines[case]]]
+            ]).reshape(len(cases), len(table.seeds), len(BANDS) * len(FIGURES))  # fmt: skip
+            means = mean_known(np.moveaxis(table.by_structure(values), 1, 0))
+            yardstick = (run.meta.get("yardsticks") or {}).get(name, "")
+            row = {"strategy": name, "yardstick": yardstick, "stated": stated[name]}
+            row["total"] = len(cases) * len(table.seeds)
+            for band, part in zip(BANDS, np.split(means, len(BANDS), axis=1), strict=True):
+                figures = dict(zip(FIGURES, mean_known(part).tolist(), strict=True))
+                known = part[np.isfinite(part[:, -1]), -1]
+                ends = interval_of_mean(known) if len(known) >= FEWEST else (math.nan, math.nan)
+                figures |= dict(zip(("low", "high"), ends, strict=True))
+                row |= {f"{band}_{key}": value for key, value in figures.items()}
+            rows.append(row)
+        rows.sort(key=lambda row: (-np.nan_to_num(row["above_skill"], nan=-2.0), row["strategy"]))
+        ends = zip(100.0 * common.min(axis=0), 100.0 * common.max(axis=0), strict=True)
+        return cls(tuple(rows), dict(zip(BANDS, ends, strict=True)))
+
+
+def learn_deviations(table: GainTable, textbook: Mapping[str, Forecasts]) -> FloatArray:
+    """Return by case and band the one deviation of ln f for all that state none, (cases, 2).
+
+    It gives the textbook models of all other structures the least mean CRPS; nan with fewer than
+    five of them. Of the textbook models, and not of the pooled errors of those that state none: a
+    figure must not depend on who else runs, and in a run of one strategy the pool would be its own
+    errors, so that it would be measured by what it has been fitted to.
+
+    Arguments:
+        table: of the run.
+        textbook: forecasts of the textbook model by case.
+    """
+    scores = np.full((len(table.cases), len(_DEVIATIONS), 2), math.nan)
+    for k, case in enumerate(table.cases):
+        own = textbook[case]
+        for place, std in enumerate(_DEVIATIONS):
+            scores[k, place] = own.figures(np.array([std, std]))[:, 0]
+    units = table.by_structure(scores)
+    best = np.full((len(units), 2), math.nan)
+    for k in range(len(units)):
+        others = np.delete(units, k, axis=0)
+        enough = np.isfinite(others[:, 0]).sum(axis=0) >= FEWEST - 1
+        least = np.nan_to_num(mean_known(others)).argmin(axis=0)
+        best[k] = np.where(enough, _DEVIATIONS[least], math.nan)
+    return best[[table.units.index(name) for name in table.structures]].reshape(-1, 2)
+
+
+def stated_coverage(
+    results: Iterable[JobResult], scale: Scale, structures: Mapping[str, str], levels: FloatArray
+) -> FloatArray | None:
+    """Return the share of unseen modes in stated intervals by level, every structure alike.
+
+    None where no job stated an uncertainty.
+
+    Arguments:
+        results: of one strategy; those that are ok count.
+        structures: by case; one that is not named is a structure of its own.
+        levels: of the intervals, (k,).
+    """
+    found: dict[str, list[FloatArray]] = defaultdict(list)
+    for result in results:
+        own = Forecasts.of(scale.modes[result.case], result.blocks)
+        if result.status == "ok" and own.stated:
+            found[structures.get(result.case, result.case)].append(own.level())
+    shares = [(np.concatenate(r)[:, None] <= levels).mean(axis=0) for r in found.values()]
+    return np.asarray(np.mean(shares, axis=0)) if shares else None
 
 
 def crps_normal(error: FloatArray, std: FloatArray) -> FloatArray:
@@ -139,31 +251,21 @@ def crps_normal(error: FloatArray, std: FloatArray) -> FloatArray:
     return np.asarray(np.where(point, np.abs(error), spread))
 
 
-def log_score(error: FloatArray, std: FloatArray) -> FloatArray:
-    """Return -ln of the density of what was measured, per percent; lower is better, 9.9 the worst.
-
-    The density is that of the forecast with a share of 0.01 of anything within 100 %. A std of
-    nan stands for no forecast.
-
-    Arguments:
-        error: in percent, (n,).
-        std: in percent, (n,).
-    """
-    s = np.where(std > 0.0, std, np.inf)
-    density = np.exp(-0.5 * np.square(error / s)) / (np.sqrt(2.0 * np.pi) * s)
-    return np.asarray(-np.log((1.0 - ANYTHING) * density + ANYTHING / (2.0 * LOST_PERCENT)))
+def _rows_of(
+    modes: MeasuredModes, place: int, mode: PairedMode
+) -> list[tuple[float, float, float, int]]:
+    """Return error, std, weight and place of the partner of a mode and of what may stand for it."""
+    hz = mode.predicted_hz
+    if hz is None or hz <= 0.0:
+        return [(math.nan, math.nan, 1.0, place)]
+    std = math.nan if mode.predicted_std_hz is None else mode.predicted_std_hz / hz
+    pairs = [(hz, 1.0), *((one.hz, one.weight) for one in modes.candidates_of(mode))]
+    total = sum(weight for _, weight in pairs)
+    return [(math.log(f / mode.measured_hz), std, w / total, place) for f, w in pairs]
 
 
-_HERTZ = attrgetter("measured_hz", "predicted_hz", "predicted_std_hz")
-
-
-def _percent(hertz: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return errors and std of modes in percent of the measured frequencies.
-
-    Arguments:
-        hertz: measured and predicted frequency and std, nan where there is none, (3, n).
-    """
-    measured, predicted, std = hertz
-    there = predicted > 0.0
-    error = np.where(there, 100.0 * (predicted / measured - 1.0), LOST_PERCENT)
-    return error, np.where(there, 100.0 * std / measured, np.nan)
+def _with_skill(own: FloatArray, line: FloatArray, scale: Scale) -> FloatArray:
+    """Return CRPS in percent, coverage and skill, a band after the other."""
+    rows = zip(own.tolist(), line[:, 0].tolist(), strict=True)
+    parts = [(100.0 * crps, c, bound_gain(crps, bar, scale.rule)) for (crps, c), bar in rows]
+    return np.array(parts).ravel()
