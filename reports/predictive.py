@@ -20,17 +20,18 @@ _COLUMNS = {
     "band_coverage90": Column("in\n90 %", 4, digits=2),
     "band_skill": Column("skill", 6, digits=3),
 }
-_LEGEND = [
-    (
-        "above, in band",
-        "unseen modes above the highest given frequency, and modified ones below it, where the "
-        "given frequencies nearly are the answer",
-    ),
-    ("CRPS", "continuous ranked probability score of ln f, less is better"),
-    ("in 90 %", "share of the modes in 90 % intervals, near 0.90 where these are right"),
-    ("skill", "gain of the CRPS over that of the textbook model, -1 to 1"),
-    ("±", "states an uncertainty of its own; =: yardstick that knows nothing of the structure"),
-]
+_LEGEND = {
+    "above, in band": "unseen modes above the highest given frequency, and modified ones below "
+    "it, where the given frequencies nearly are the answer",
+    "CRPS": "continuous ranked probability score of ln f, less is better",
+    "in 90 %": "share of the modes in 90 % intervals, near 0.90 where these are right",
+    "skill": "gain of the CRPS over that of the textbook model, -1 to 1",
+    "±": "states an uncertainty of its own; =: yardstick that knows nothing of the structure",
+}
+_COMMON = (
+    "For others, and jobs without a possible model, which count as the textbook one, stands the "
+    "deviation that is best for the textbook models of all other structures: "
+)
 
 
 class PredictiveReporter:
@@ -41,18 +42,12 @@ class PredictiveReporter:
 
     def render(self, run: Run) -> str:
         """Return the table in 80 columns."""
-        return to_terminal([Passage("", predictive_blocks(PredictiveBoard.of(run)))])
+        return to_terminal([Passage("", predictive_blocks(run))])
 
 
-def predictive_blocks(board: PredictiveBoard) -> list[Block]:
+def predictive_blocks(run: Run) -> list[Block]:
     """Return the predictive board and what its columns mean, or why there is none."""
-    if (table := predictive_table(board)) is None:
-        return ["No uncertainty is stated, and to learn a common one takes 6 structures or more."]
-    return [table, Items(list_remarks(board))]
-
-
-def predictive_table(board: PredictiveBoard) -> Table | None:
-    """Return the table without columns of which nothing is known; None where no score is."""
+    board = PredictiveBoard.of(run)
     rows: list[dict[str, Any]] = [
         {
             **row,
@@ -63,31 +58,21 @@ def predictive_table(board: PredictiveBoard) -> Table | None:
     ]
     heads = {k: h for k, h in _COLUMNS.items() if {h.text(r[k]) for r in rows} - {NOTHING, ""}}
     if not any(name.endswith("crps_percent") for name in heads):
-        return None
-    return Table(list(heads.values()), [[row[key] for key in heads] for row in rows])
+        return ["No uncertainty is stated, and to learn a common one takes 6 structures or more."]
+    table = Table(list(heads.values()), [[row[key] for key in heads] for row in rows])
+    return [table, Items(list(_LEGEND.items())), _describe_common(board)]
 
 
-def list_remarks(board: PredictiveBoard) -> list[tuple[str, str]]:
-    """Return what the columns mean, and what stands for an uncertainty that is not stated."""
-    parts = [
-        f"{low:.1f} to {high:.1f} % {where}"
-        for where, (low, high) in zip(("above", "in band"), board.common.values(), strict=True)
-        if low == low
-    ]
-    common = (
-        "the standard deviation that is best for the textbook models of all other structures "
-        f"({', '.join(parts)}); a job without a possible model counts as the textbook one with it"
-    )
-    few = "fewer than 6 structures: no score"
-    return [*_LEGEND, ("where none is stated", common if parts else few)]
-
-
-def predictive_json(board: PredictiveBoard) -> dict[str, Any]:
+def predictive_json(run: Run) -> dict[str, Any]:
     """Return the predictive board as plain data."""
-    rows = [
-        {name: clean(value) for name, value in row.items()}
-        | {"yardstick": row["yardstick"] or None}
-        for row in board.rows
-    ]
+    board = PredictiveBoard.of(run)
     common = {band: list(map(clean, ends)) for band, ends in board.common.items()}
-    return {"common_percent": common, "rows": rows}
+    rows = [{name: clean(value) for name, value in row.items()} for row in board.rows]
+    return {"common_percent": common, "common": _describe_common(board), "rows": rows}
+
+
+def _describe_common(board: PredictiveBoard) -> str:
+    """Return what stands for an uncertainty that is not stated."""
+    ends = zip(("above", "in band"), board.common.values(), strict=False)
+    parts = [f"{low:.1f} to {high:.1f} % {where}" for where, (low, high) in ends if low == low]
+    return f"{_COMMON}{', '.join(parts) or 'none with fewer than 6 structures'}."

@@ -31,7 +31,6 @@ from femubench.reports.twins import MEANING, describe_twins, suspicions
 from femubench.results import (
     JobResult,
     PairedMode,
-    PredictiveBoard,
     Run,
     Standings,
     StudyAxes,
@@ -265,7 +264,7 @@ def _document(run: Run) -> Iterator[Passage]:
     about = Table([Column("", 9, left=True)] * 2, list(header(run)))
     yield Passage("", [about, *([Items(notes)] if notes else [])])
     yield from _board(run, "Leaderboard")
-    yield Passage("Predictive board", predictive_blocks(PredictiveBoard.of(run)))
+    yield Passage("Predictive board", predictive_blocks(run))
     rows: list[list[Cell]] = []
     for name in strategies_of(run):
         found = [result.status for result in run.results if result.strategy == name]

@@ -310,19 +310,14 @@ def find_gain(own: ModelErrors, textbook: ModelErrors, rule: Rule) -> CaseGain:
         own, textbook: their errors on one case.
     """
     parts = [
-        bound_gain(own.error, textbook.error, rule),
-        bound_gain(own.change, textbook.change, rule),
+        (r - e) / max(r, e, rule.floor)
+        for e, r in ((own.error, textbook.error), (own.change, textbook.change))
     ]
     shares = (1.0 - rule.change_share, rule.change_share)
     known = [(part, share) for part, share in zip(parts, shares, strict=True) if part == part]
     total = sum(share for _, share in known)
     gain = sum(part * share for part, share in known) / total if total else math.nan
     return CaseGain(gain, *parts)
-
-
-def bound_gain(own: float, textbook: float, rule: Rule) -> float:
-    """Return the part of the textbook model's error that a model removes, in [-1, 1]."""
-    return (textbook - own) / max(textbook, own, rule.floor)
 
 
 def _mean_error(mode: PairedMode, others: Sequence[PartnerCandidate], cap: float) -> float:

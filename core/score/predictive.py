@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,35 +18,31 @@ import numpy as np
 from scipy.special import ndtr
 
 from femubench.core.garbage import pause_collection
-from femubench.core.schema.paired_modes import PairedMode
-from femubench.core.schema.results import UNSEEN, Block, JobResult, Run
-from femubench.core.score.bounded_gain import MeasuredModes, bound_gain
+from femubench.core.schema.results import UNSEEN, Block, Run
+from femubench.core.score.bounded_gain import MeasuredModes
 from femubench.core.score.leaderboard import GainTable, mean_known
-from femubench.core.score.ranking import Scale
 from femubench.core.score.statistics import FEWEST, interval_of_mean
-from femubench.core.typing import BoolArray, FloatArray, IntArray
+from femubench.core.typing import FloatArray, IntArray
 
 # Higher modes and modified ones above the highest given frequency, and modified ones below it.
 BANDS = ("above", "band")
 FIGURES = ("crps_percent", "coverage90", "skill")
 LEVEL = 0.9
-# Of ln f; from the repeatability of a test to more than any pairing allows. A step of 6 % changes
-# the mean CRPS near its least value by less than 0.1 %.
+# Of ln f, from what a test repeats to what no pairing allows; a step of 6 % changes the mean CRPS
+# near its least value by less than 0.1 %.
 _DEVIATIONS = np.geomspace(1e-3, 1.0, 121)
+_LOST = (math.nan, math.nan, 1.0)
 
 
 @dataclass(frozen=True)
 class Forecasts:
-    """What a model predicts of the m unseen modes of a case.
-
-    Candidates follow the partner of their mode, as in the rule of the ranks: n in all.
+    """What a model predicts of the m unseen modes of a case, by partners and candidates, n in all.
 
     Arguments:
-        error: ln(f_p / f_m), nan without a partner of a real frequency, (n,).
-        std: of ln f, nan where none was given, (n,).
-        weight: 1 in total for every mode, (n,).
-        mode: place of the measured mode, (n,).
-        above: whether a mode is above the given band, (m,).
+        error, std: ln(f_p / f_m) and its standard deviation, nan where there is none, (n,).
+        weight: 1 in total for every mode, as in the rule of the ranks, (n,).
+        mode: place of the measured mode; its partner comes first, (n,).
+        band: place among `BANDS`, (m,).
         cap: largest CRPS.
     """
 
@@ -54,7 +50,7 @@ class Forecasts:
     std: FloatArray
     weight: FloatArray
     mode: IntArray
-    above: BoolArray
+    band: IntArray
     cap: float
 
     @classmethod
@@ -65,56 +61,52 @@ class Forecasts:
             modes: that were measured of the case.
             blocks: what the model predicts.
         """
-        listed = [(name, m) for name in UNSEEN if name in blocks for m in blocks[name].modes]
-        rows = [row for k, (_, mode) in enumerate(listed) for row in _rows_of(modes, k, mode)]
-        error, std, weight, place = np.array(rows, dtype=float).reshape(-1, 4).T
-        above = np.array([modes.band_of(*item) != "band" for item in listed], dtype=bool)
-        return cls(error, std, weight, place.astype(int), above, modes.rule.cap)
+        rows, owners, bands = [], [], []
+        for name, mode in ((n, m) for n in UNSEEN if n in blocks for m in blocks[n].modes):
+            hz, own = mode.predicted_hz or 0.0, [_LOST]
+            if hz > 0.0:
+                own_std = mode.predicted_std_hz
+                std = math.nan if own_std is None else max(own_std / hz, 1e-9)
+                pairs = [(hz, 1.0), *((c.hz, c.weight) for c in modes.candidates_of(mode))]
+                total = sum(weight for _, weight in pairs)
+                own = [(math.log(f / mode.measured_hz), std, w / total) for f, w in pairs]
+            owners += [len(bands)] * len(own)
+            bands.append(int(modes.band_of(name, mode) == "band"))
+            rows += own
+        columns = np.array(rows, dtype=float).reshape(-1, 3).T
+        return cls(*columns, np.array(owners, int), np.array(bands, int), modes.rule.cap)
 
     @property
     def stated(self) -> bool:
         """Return whether the strategy gave an uncertainty with the model."""
         return bool(np.isfinite(self.std).any())
 
-    def crps(self, common: FloatArray) -> FloatArray:
-        """Return the CRPS of every mode, the weighted mean over what may stand for it, (m,).
+    def level(self, std: FloatArray) -> FloatArray:
+        """Return the level of the partner's interval that just reaches what was measured, (m,).
+
+        2 where no interval does.
 
         Arguments:
-            common: deviation of ln f for a model without an uncertainty, by band, (2,).
-        """
-        score = np.minimum(crps_normal(self.error, self._std(common)), self.cap)
-        score = np.where(np.isnan(self.error), self.cap, score)
-        return np.bincount(self.mode, score * self.weight, len(self.above))
-
-    def level(self, common: FloatArray | None = None) -> FloatArray:
-        """Return the level of the central interval that just reaches the measured value, (m,).
-
-        The interval is the partner's, for which it was stated; 2 where none covers a mode.
-
-        Arguments:
-            common: as for `crps`; without it only what was stated counts.
+            std: of the forecasts, (n,).
         """
         first = np.flatnonzero(np.diff(self.mode, prepend=-1))
-        error = np.abs(self.error[first])
-        std = (self.std if common is None else self._std(common))[first]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            reached = np.where((error == 0.0) & (std == 0.0), 0.0, 2.0 * ndtr(error / std) - 1.0)
-        return np.asarray(np.where(np.isnan(error) | np.isnan(std), 2.0, reached))
+        return np.nan_to_num(2.0 * ndtr(np.abs(self.error[first]) / std[first]) - 1.0, nan=2.0)
 
     def figures(self, common: FloatArray) -> FloatArray:
-        """Return mean CRPS, and share in the 90 % intervals, by band; nan where unknown, (2, 2)."""
-        score, inside = self.crps(common), self.level(common) <= LEVEL
-        known = [self.stated or np.isfinite(std) for std in common]
-        parts = (self.above, ~self.above)
-        found = np.full((2, 2), math.nan)
-        for row, part, there in zip(found, parts, known, strict=True):
-            if there and part.any():
-                row[:] = score[part].mean(), inside[part].mean()
-        return found
+        """Return by band mean CRPS and share in the 90 % intervals, nan where unknown, (2, 2).
 
-    def _std(self, common: FloatArray) -> FloatArray:
-        own = np.where(self.above[self.mode], *common)
-        return self.std if self.stated else np.asarray(own)
+        Arguments:
+            common: deviation of ln f for a model that came with none, by band, (2,).
+        """
+        std = self.std if self.stated else common[self.band[self.mode]]
+        each, found = np.fmin(crps_normal(self.error, std), self.cap), np.full((2, 2), math.nan)
+        score = np.bincount(self.mode, each * self.weight, len(self.band))
+        inside = self.level(std) <= LEVEL
+        for place in np.unique(self.band):
+            if self.stated or math.isfinite(common[place]):
+                part = self.band == place
+                found[place] = score[part].mean(), inside[part].mean()
+        return found
 
 
 @dataclass(frozen=True)
@@ -145,42 +137,43 @@ class PredictiveBoard:
             InputError: when the run keeps too little to be scored.
         """
         table = GainTable.of(run, (), run.nominals[0])
-        scale, cases = table.scale, {case: k for k, case in enumerate(table.cases)}
-        textbook = {case: Forecasts.of(scale.modes[case], scale.blocks[case]) for case in cases}
-        if not cases:
+        scale, places = table.scale, {case: k for k, case in enumerate(table.cases)}
+        if not places:
             return cls((), {})
+        textbook = {case: Forecasts.of(scale.modes[case], scale.blocks[case]) for case in places}
         common = learn_deviations(table, textbook)
-        lines = {case: textbook[case].figures(common[k]) for case, k in cases.items()}
-        found: dict[tuple[str, str, int], list[FloatArray]] = defaultdict(list)
+        lines = np.array([textbook[case].figures(common[k]) for case, k in places.items()])
+        found: dict[tuple[str, int, int], list[FloatArray]] = defaultdict(list)
         stated: Counter[str] = Counter()
-        for result in run.ranked:
-            if result.case in cases:
+        for result in (result for result in run.ranked if result.case in places):
+            place, own = places[result.case], textbook[result.case]
+            if result.answered:
                 own = Forecasts.of(scale.modes[result.case], result.blocks)
-                own = own if result.answered else textbook[result.case]
-                stated[result.strategy] += own.stated
-                figures = own.figures(common[cases[result.case]])
-                found[result.strategy, result.case, result.seed].append(figures)
+            stated[result.strategy] += own.stated
+            job = result.strategy, place, table.seeds.index(result.seed)
+            found[job].append(own.figures(common[place]))
         rows = []
         for name in table.names:
-            values = np.array([
-                np.mean([_with_skill(own, lines[case], scale) for own in listed], axis=0)
-                for case in cases
-                for seed in table.seeds
-                for listed in [found.get((name, case, seed)) or [lines[case]]]
-            ]).reshape(len(cases), len(table.seeds), len(BANDS) * len(FIGURES))  # fmt: skip
-            means = mean_known(np.moveaxis(table.by_structure(values), 1, 0))
-            yardstick = (run.meta.get("yardsticks") or {}).get(name, "")
-            row = {"strategy": name, "yardstick": yardstick, "stated": stated[name]}
-            row["total"] = len(cases) * len(table.seeds)
-            for band, part in zip(BANDS, np.split(means, len(BANDS), axis=1), strict=True):
-                figures = dict(zip(FIGURES, mean_known(part).tolist(), strict=True))
+            values = np.repeat(lines[:, None], len(table.seeds), axis=1)
+            for case, seed in np.ndindex(values.shape[:2]):
+                if listed := found.get((name, case, seed)):
+                    values[case, seed] = np.mean(listed, axis=0)
+            score, line = values[..., :1], lines[:, None, :, :1]
+            skill = (line - score) / np.maximum(np.maximum(line, score), scale.rule.floor)
+            score *= 100.0  # a view of the values
+            by_structure = table.by_structure(np.concatenate([values, skill], axis=-1))
+            line_of = (run.meta.get("yardsticks") or {}).get(name)
+            row: dict[str, Any] = {"strategy": name, "yardstick": line_of, "stated": stated[name]}
+            row["total"] = len(places) * len(table.seeds)
+            for k, band in enumerate(BANDS):
+                part = mean_known(np.moveaxis(by_structure[:, :, k], 1, 0))
+                row |= zip([f"{band}_{key}" for key in FIGURES], mean_known(part), strict=True)
                 known = part[np.isfinite(part[:, -1]), -1]
                 ends = interval_of_mean(known) if len(known) >= FEWEST else (math.nan, math.nan)
-                figures |= dict(zip(("low", "high"), ends, strict=True))
-                row |= {f"{band}_{key}": value for key, value in figures.items()}
+                row[f"{band}_low"], row[f"{band}_high"] = ends
             rows.append(row)
         rows.sort(key=lambda row: (-np.nan_to_num(row["above_skill"], nan=-2.0), row["strategy"]))
-        ends = zip(100.0 * common.min(axis=0), 100.0 * common.max(axis=0), strict=True)
+        ends = zip(*(100.0 * np.array([common.min(axis=0), common.max(axis=0)])), strict=True)
         return cls(tuple(rows), dict(zip(BANDS, ends, strict=True)))
 
 
@@ -196,76 +189,25 @@ def learn_deviations(table: GainTable, textbook: Mapping[str, Forecasts]) -> Flo
         table: of the run.
         textbook: forecasts of the textbook model by case.
     """
-    scores = np.full((len(table.cases), len(_DEVIATIONS), 2), math.nan)
-    for k, case in enumerate(table.cases):
-        own = textbook[case]
-        for place, std in enumerate(_DEVIATIONS):
-            scores[k, place] = own.figures(np.array([std, std]))[:, 0]
-    units = table.by_structure(scores)
-    best = np.full((len(units), 2), math.nan)
-    for k in range(len(units)):
+    scores = [[textbook[c].figures(np.full(2, s))[:, 0] for s in _DEVIATIONS] for c in table.cases]
+    units, best = table.by_structure(np.array(scores)), {}
+    for k, name in enumerate(table.units):
         others = np.delete(units, k, axis=0)
         enough = np.isfinite(others[:, 0]).sum(axis=0) >= FEWEST - 1
         least = np.nan_to_num(mean_known(others)).argmin(axis=0)
-        best[k] = np.where(enough, _DEVIATIONS[least], math.nan)
-    return best[[table.units.index(name) for name in table.structures]].reshape(-1, 2)
-
-
-def stated_coverage(
-    results: Iterable[JobResult], scale: Scale, structures: Mapping[str, str], levels: FloatArray
-) -> FloatArray | None:
-    """Return the share of unseen modes in stated intervals by level, every structure alike.
-
-    None where no job stated an uncertainty.
-
-    Arguments:
-        results: of one strategy; those that are ok count.
-        structures: by case; one that is not named is a structure of its own.
-        levels: of the intervals, (k,).
-    """
-    found: dict[str, list[FloatArray]] = defaultdict(list)
-    for result in results:
-        own = Forecasts.of(scale.modes[result.case], result.blocks)
-        if result.status == "ok" and own.stated:
-            found[structures.get(result.case, result.case)].append(own.level())
-    shares = [(np.concatenate(r)[:, None] <= levels).mean(axis=0) for r in found.values()]
-    return np.asarray(np.mean(shares, axis=0)) if shares else None
+        best[name] = np.where(enough, _DEVIATIONS[least], math.nan)
+    return np.array([best[name] for name in table.structures])
 
 
 def crps_normal(error: FloatArray, std: FloatArray) -> FloatArray:
-    """Return the continuous ranked probability score of normal forecasts, in the unit of both.
-
-    Lower is better. A std of nan or 0 stands for a point: the score is the absolute error.
+    """Return the continuous ranked probability score of normal forecasts; lower is better, (n,).
 
     Arguments:
         error: forecast mean minus what was measured, (n,).
-        std: of the forecast, (n,).
+        std: of the forecast, in the same unit, (n,).
 
     Source: Gneiting & Raftery (2007), section 4.2.
     """
-    point = ~(std > 1e-12 * np.abs(error))
-    s = np.where(point, 1.0, std)
-    z = error / s
+    z = error / std
     density = np.exp(-0.5 * np.square(z)) / np.sqrt(2.0 * np.pi)
-    spread = s * (z * (2.0 * ndtr(z) - 1.0) + 2.0 * density - 1.0 / np.sqrt(np.pi))
-    return np.asarray(np.where(point, np.abs(error), spread))
-
-
-def _rows_of(
-    modes: MeasuredModes, place: int, mode: PairedMode
-) -> list[tuple[float, float, float, int]]:
-    """Return error, std, weight and place of the partner of a mode and of what may stand for it."""
-    hz = mode.predicted_hz
-    if hz is None or hz <= 0.0:
-        return [(math.nan, math.nan, 1.0, place)]
-    std = math.nan if mode.predicted_std_hz is None else mode.predicted_std_hz / hz
-    pairs = [(hz, 1.0), *((one.hz, one.weight) for one in modes.candidates_of(mode))]
-    total = sum(weight for _, weight in pairs)
-    return [(math.log(f / mode.measured_hz), std, w / total, place) for f, w in pairs]
-
-
-def _with_skill(own: FloatArray, line: FloatArray, scale: Scale) -> FloatArray:
-    """Return CRPS in percent, coverage and skill, a band after the other."""
-    rows = zip(own.tolist(), line[:, 0].tolist(), strict=True)
-    parts = [(100.0 * crps, c, bound_gain(crps, bar, scale.rule)) for (crps, c), bar in rows]
-    return np.array(parts).ravel()
+    return np.asarray(std * (z * (2.0 * ndtr(z) - 1.0) + 2.0 * density - 1.0 / np.sqrt(np.pi)))

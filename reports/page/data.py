@@ -13,7 +13,7 @@ from femubench.reports.csvs import CsvReporter
 from femubench.reports.jsons import JsonReporter
 from femubench.reports.page.papers import list_drawn_frequencies, papers_of
 from femubench.reports.page.rounding import clean, compact_json, plain_data, round_figures
-from femubench.reports.predictive import list_remarks, predictive_blocks, predictive_table
+from femubench.reports.predictive import predictive_json
 from femubench.reports.summary import (
     cases_of,
     finding,
@@ -30,7 +30,6 @@ from femubench.results import (
     TIE,
     Forecasts,
     JobResult,
-    PredictiveBoard,
     Reporter,
     Run,
     Scale,
@@ -121,7 +120,7 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
             for found in run.results
         ],
         "board": list(map(_cleaned, board)),
-        "predictive": _predictive(run),
+        "predictive": predictive_json(run),
         "statistics": {
             "pairs": [
                 [strategies.index(a), strategies.index(b), round_figures(p, 4)]
@@ -138,16 +137,6 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
         "papers": papers_of(run),
         "downloads": downloads,
     }
-
-
-def _predictive(run: Run) -> dict[str, Any]:
-    """Return heads, cells and remarks of the predictive board."""
-    board = PredictiveBoard.of(run)
-    if (table := predictive_table(board)) is None:
-        return {"heads": [], "rows": [], "said": predictive_blocks(board)}
-    heads = [column.title.replace("\n", " ") for column in table.columns]
-    rows = [[c.text(v) for c, v in zip(table.columns, row, strict=True)] for row in table.rows]
-    return {"heads": heads, "rows": rows, "said": [f"{k}: {v}." for k, v in list_remarks(board)]}
 
 
 def _cleaned(figures: _Named) -> dict[str, Any]:
@@ -223,7 +212,7 @@ def _levels(result: JobResult, scale: Scale) -> list[float] | None:
     They are rounded up, so that a mode lies in no interval that does not hold it.
     """
     found = Forecasts.of(scale.modes[result.case], result.blocks)
-    return [math.ceil(1e6 * v) / 1e6 for v in found.level()] if found.stated else None
+    return [math.ceil(1e6 * v) / 1e6 for v in found.level(found.std)] if found.stated else None
 
 
 def _details(

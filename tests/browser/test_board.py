@@ -20,7 +20,7 @@ KEYS = (
     *("rank", "gain", "error_percent", "better_share", "worse_share", "error_gain", "change_gain"),
     *("gain_tests", "band_percent", "shape_error", "false_modes"),
     *("used_percent", "higher_percent", "modified_percent"),
-    *("coverage90", "crps_percent", "parameters", "seconds"),
+    *("parameters", "seconds"),
 )
 
 

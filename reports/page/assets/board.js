@@ -139,10 +139,18 @@
 
   // Return the predictive board of the whole run, which has no ranks.
   function predictive() {
-    const { heads, rows, said } = data.predictive;
-    const lines = rows.map((row) => row.map((text, k) => el(k ? "td" : "th", k ? { class: "right" } : { scope: "row" }, text)));
-    const table = rows.length > 0 && bench.scroll(bench.table("Predictive board", heads, lines, "predictive"));
-    return el("section", { id: "predictive" }, el("h2", {}, "Predictive board"), table, said.map((text) => el("p", { class: "soft" }, text)));
+    const { rows, common } = data.predictive;
+    const name = ({ strategy, yardstick, stated }) => el("th", { scope: "row" }, `${yardstick ? "= " : ""}${stated ? "± " : ""}${strategy}`);
+    const parts = [["Above", "above"], ["In band", "band"]].flatMap(([title, band]) => {
+      const [low, high, ...figures] = ["low", "high", "crps_percent", "coverage90", "skill"].map((key) => `${band}_${key}`);
+      const range = (row) => el("td", { class: "right" }, row[low] === null ? "–" : `${share(row[low])} to ${share(row[high])}`);
+      return [...["CRPS, %", "in 90 %", "skill"].map((head, k) => [`${title}: ${head}`, (row) => cell(row[figures[k]], k ? share : small)]), ["95 % interval", range]];
+    });
+    const known = rows.some((row) => row.above_crps_percent !== null || row.band_crps_percent !== null);
+    const lines = rows.map((row) => [name(row), ...parts.map(([, make]) => make(row))]);
+    return el("section", { id: "predictive" }, el("h2", {}, "Predictive board"), known && bench.scroll(bench.table("Predictive board", ["Strategy", ...parts.map(([head]) => head)], lines)),
+      known && el("p", { class: "soft" }, "Of the whole run. Above: unseen modes above the highest given frequency; in band: modified ones below it. CRPS: continuous ranked probability score of ln f, less is better. In 90 %: share of the modes in 90 % intervals, near 0.90 where these are right. Skill: gain of the CRPS over that of the textbook model, -1 to 1. ±: states an uncertainty of its own."),
+      el("p", { class: "soft" }, known ? common : "No uncertainty is stated, and to learn a common one takes 6 structures or more."));
   }
 
   bench.board = {

@@ -57,9 +57,9 @@
     return grid.whole && given ? { ...row, ...Object.fromEntries(own.map((name) => [name, given[name]])) } : row;
   }
   // Return the share of unseen modes in the central interval of a level that a strategy states, of
-  // every structure, then their mean.
+  // every job, then means over structures.
   function covered(row, level) {
-    const inside = (all) => d3.mean(all.flatMap(({ levels }) => levels), (reached) => Number(reached <= level));
+    const inside = (all) => d3.mean(all, ({ levels }) => d3.mean(levels, (reached) => Number(reached <= level)));
     return mean(d3.rollups(row.stated, inside, ({ c }) => structureOf(c)).map(([, value]) => value));
   }
   // Return the median over cases of the median over seeds.
