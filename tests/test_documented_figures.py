@@ -139,15 +139,14 @@ def test_what_the_readme_says_of_the_board(rows: dict[str, dict[str, Any]]) -> N
 
 def test_the_stated_uncertainties(run: Run) -> None:
     pattern = (
-        r"above the given band (\d+) % lie in the 90 % intervals of `bayesian-sampling`.{0,80}those "
-        r"of `bayesian` and `diagnosed`, which do not, (\d+) % and (\d+) %"
+        r"above the given band (\d+) % lie in the 90 % intervals of `bayesian-sampling`.{0,80}"
+        r"those of `bayesian` and `diagnosed`, which do not, (\d+) % and (\d+) %"
     )
     rows = {row["strategy"]: row for row in PredictiveBoard.of(run).rows}
     said = only(pattern, "README.md")
     names = ("bayesian-sampling", "bayesian", "diagnosed")
-    assert [as_printed(text) for text in said] == [
-        100.0 * rows[n]["above_coverage90"] for n in names
-    ]
+    found = [100.0 * rows[name]["above_coverage90"] for name in names]
+    assert [as_printed(text) for text in said] == found
 
 
 @pytest.mark.parametrize(("part", "count"), [("Matrix strategies", 6), ("Element strategies", 5)])
