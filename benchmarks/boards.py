@@ -1,7 +1,7 @@
 """The leaderboards that README and docs print: run, kept in docs/figures, put into the pages.
 
 python benchmarks/boards.py default      # README.md; minutes on two cores
-python benchmarks/boards.py suite        # docs/scenarios.md
+python benchmarks/boards.py suite        # docs/scenarios.md, the predictive board: docs/scoring.md
 python benchmarks/boards.py default --from run.json    # of a run that is there
 """
 
@@ -18,6 +18,7 @@ import femubench
 from femubench import Run
 from femubench.core.display import count_noun
 from femubench.core.schema.run_options import StartModels
+from femubench.reports.predictive import PredictiveReporter
 from femubench.reports.runs import board_text
 from femubench.reports.summary import finding
 from femubench.results import list_rows, run_to_json
@@ -117,6 +118,8 @@ def main() -> None:
     file_of(words.board).write_text(text.replace('{"case"', '\n{"case"') + "\n", encoding="utf-8")
     if words.board == "suite":
         put("suite-finding", said_of_the_suite(run), ROOT / "README.md")
+        text = PredictiveReporter().render(run)
+        put("predictive", f"```\n{text}\n```", ROOT / "docs" / "scoring.md")
     put("leaderboard", f"```\n{board_text(run)}\n```", ROOT / board.page)
     print(f"{count_noun(len(run.results), 'job')} in {file_of(words.board)}")
 

@@ -15,7 +15,6 @@ from femubench.core.run.runner import run_jobs as run_jobs
 from femubench.core.run.store import Store as Store, note_missing_jobs as note_missing_jobs
 from femubench.core.schema.paired_modes import PairedMode as PairedMode
 from femubench.core.schema.results import Block as Block, JobResult as JobResult, Run as Run
-from femubench.core.score import predictive as predictive
 from femubench.core.score.bounded_gain import Rule as Rule
 from femubench.core.score.leaderboard import (
     Standings as Standings,
@@ -24,6 +23,10 @@ from femubench.core.score.leaderboard import (
     is_test as is_test,
     leaderboard as leaderboard,
     list_rows as list_rows,
+)
+from femubench.core.score.predictive import (
+    Forecasts as Forecasts,
+    PredictiveBoard as PredictiveBoard,
 )
 from femubench.core.score.ranking import (
     TIE as TIE,

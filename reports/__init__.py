@@ -12,6 +12,7 @@ CLASSES = {
     "modes-csv": "csvs:ModesCsvReporter",
     "json": "jsons:JsonReporter",
     "jsonl": "jsons:JsonLinesReporter",
+    "predictive": "predictive:PredictiveReporter",
     "parquet": "parquets:ParquetReporter",
 }
 

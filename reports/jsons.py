@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 from femubench.reports.page.rounding import clean
+from femubench.reports.predictive import predictive_json
 from femubench.reports.summary import finding
 from femubench.reports.twins import twins_by_strategy
 from femubench.results import (
@@ -18,19 +19,12 @@ from femubench.results import (
 )
 
 # Columns of the leaderboard that are figures, under the names of the contract.
-_FIGURES = {
-    **{
-        name: name
-        for name in (
-            *("error_percent", "textbook_percent", "better_share", "worse_share", "error_gain"),
-            *("change_gain", "gain_drawn", "gain_tests", "band_percent", "shape_error"),
-            *("false_modes", "higher_percent", "modified_percent", "crps_percent", "coverage90"),
-            *("answered", "ok"),
-        )
-    },
-    "given_percent": "used_percent",
-    "of": "total",
-}
+_SAME = (
+    *("error_percent", "textbook_percent", "better_share", "worse_share", "error_gain"),
+    *("change_gain", "gain_drawn", "gain_tests", "band_percent", "shape_error", "false_modes"),
+    *("higher_percent", "modified_percent", "answered", "ok"),
+)
+_FIGURES = {**dict(zip(_SAME, _SAME, strict=True)), "given_percent": "used_percent", "of": "total"}
 
 
 class JsonReporter:
@@ -43,6 +37,7 @@ class JsonReporter:
         """Return strict JSON: what is not a finite number is null."""
         board = board_of(run)
         plain = {**run_to_json(run), "finding": finding(run, list_rows(run)), "leaderboard": board}
+        plain["predictive"] = predictive_json(run)
         if StudyAxes.from_run(run) is not None:
             cells = gain_by(run).to_dict("records")
             plain["cells"] = [{str(name): clean(v) for name, v in row.items()} for row in cells]

@@ -13,6 +13,7 @@ from femubench.reports.blocks import Block, Cell, Column, Items, Passage, Table
 from femubench.reports.cells import NOTHING, hertz, interval, plain, whole
 from femubench.reports.markdown import escape, to_markdown
 from femubench.reports.page.papers import list_drawn_frequencies, papers_of
+from femubench.reports.predictive import predictive_blocks
 from femubench.reports.summary import (
     cases_of,
     failures,
@@ -57,8 +58,6 @@ _FIGURES = {
     "shape_error": Column("1-MAC", 5, digits=3),
     "false_modes": Column("false\nmodes", 5, digits=2),
     "used_percent": Column("given\n%", 5, digits=2),
-    "coverage90": Column("in\n90 %", 4, digits=2),
-    "crps_percent": Column("CRPS\n%", 4, digits=2),
     "parameters": Column("par.", 5),
     "seconds": Column("s", 4, digits=3),
     "better_than": Column("above", 5),
@@ -74,9 +73,6 @@ _LEGEND = {
     "the given frequencies nearly are the answer; shapes; modes that a test would see and did not",
     "given": "rms error in percent of the modes that were given; median over the cases, as are "
     "par. and s: unknowns that were free, wall time",
-    "in 90 %, CRPS": "unseen modes inside the stated 90 % interval, and the continuous ranked "
-    "probability score in percent of the frequency, less is better, without a stated uncertainty "
-    "the absolute error; means over structures",
     "above, below": "number of lines that it is shown to be better and worse than",
     "=": "yardstick that knows nothing of the structure; without rank",
     "!": "some models lost rigid-body modes or have negative eigenvalues",
@@ -268,6 +264,7 @@ def _document(run: Run) -> Iterator[Passage]:
     about = Table([Column("", 9, left=True)] * 2, list(header(run)))
     yield Passage("", [about, *([Items(notes)] if notes else [])])
     yield from _board(run, "Leaderboard")
+    yield Passage("Predictive board", predictive_blocks(run))
     rows: list[list[Cell]] = []
     for name in strategies_of(run):
         found = [result.status for result in run.results if result.strategy == name]

@@ -12,11 +12,9 @@ from printed_boards import as_printed, assert_board_is_that_of, assert_same_erro
 
 import femubench
 from femubench import Run, read_case
-from femubench.core.schema.results import UNSEEN
-from femubench.core.score.predictive import Forecasts
 from femubench.core.score.scoring import reference_of
 from femubench.reports.summary import finding, lead
-from femubench.results import leaderboard, list_rows, structures_of
+from femubench.results import PredictiveBoard, leaderboard, list_rows
 from truths.published import write_garteur
 
 ROOT = Path(__file__).parents[1]
@@ -65,16 +63,31 @@ def test_the_board_of_all_structures_is_that_of_the_run_kept() -> None:
     assert_board_is_that_of(run, "docs/scenarios.md")
 
 
-def test_the_stated_uncertainties() -> None:
+def test_the_predictive_board_and_what_the_documents_say_of_it() -> None:
     run = stored("suite")
     text = (ROOT / "docs" / "scoring.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| `([a-z-]+)` \| (\S+) \| (\S+) \| (\S+) \| \S+ % \|", text, re.M)
-    assert len(rows) == 3
-    for name, *said in rows:
-        own = [r for r in run.ranked if r.strategy == name and r.status == "ok"]
-        for blocks, cell in zip((UNSEEN, UNSEEN[:1], UNSEEN[1:]), said, strict=True):
-            found = Forecasts.of(own, structures_of(run), blocks).coverage()
-            assert found == as_printed(cell), (name, blocks)
+    rows = re.findall(
+        r"^(?:= )?(?:± )?([a-z…-]+) +(\S+) +(\S+) +(\S+) +(\S+) to (\S+) +(\S+) +(\S+) +(\S+)$",
+        text.partition("predictive -->")[2].partition("<!--")[0],
+        re.M,
+    )
+    board = {row["strategy"]: row for row in PredictiveBoard.of(run).rows}
+    names = ("crps_percent", "coverage90", "skill")
+    keys = [f"above_{key}" for key in (*names, "low", "high")] + [f"band_{key}" for key in names]
+    for (name, *cells), own in zip(rows, board.values(), strict=True):
+        assert own["strategy"].startswith(name.rstrip("…"))
+        for key, cell in zip(keys, cells, strict=True):
+            assert own[key] == as_printed(cell), (name, key)
+    said = re.findall(r"`([a-z-]+)`,? (?:has )?(\d+) %", text.partition("- Above the band")[2])
+    percent = {"diagnosed": 25, "bayesian": 37, "bayesian-sampling": 76}
+    assert {name: int(number) for name, number in said} == percent
+    for name, number in percent.items():
+        assert 100.0 * board[name]["above_coverage90"] == as_printed(str(number))
+    pattern = r"(\d+) % of the modes above the given band and (\d+) % .{30,80}, (\d+) % and (\d+) %"
+    (shares,) = re.findall(pattern, text_of("docs/strategies.md"))
+    owners = [board[name] for name in ("bayesian-sampling", "bayesian")]
+    found = [100.0 * own[f"{band}_coverage90"] for own in owners for band in ("above", "band")]
+    assert found == [as_printed(share) for share in shares]
 
 
 def test_what_the_documents_say_of_the_board() -> None:

@@ -1,15 +1,17 @@
-"""What a strategy says of its model's error, from its result to coverage, CRPS and log score."""
+"""What a strategy says of its model's error, from its result to the predictive board."""
 
 from __future__ import annotations
 
 import inspect
 import pickle
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import harness_toys as toys
 import numpy as np
 import pytest
+from msgspec import structs
 from numpy.random import Generator
 from scipy.integrate import quad
 from scipy.stats import norm
@@ -19,10 +21,17 @@ from femubench import Measurement, Model, Strategy, StrategyFailure, UpdateResul
 from femubench.core.run.answers import pack_outcome, read_report, unpack_outcome
 from femubench.core.run.jobs import Job, JobOutcome, execute, seed_words
 from femubench.core.run.judging import judge_outcome
-from femubench.core.schema.paired_modes import PairedMode
-from femubench.core.schema.results import Block, JobResult
-from femubench.core.score import predictive
+from femubench.core.schema.paired_modes import PairedMode, PartnerCandidate
+from femubench.core.schema.results import Block, JobResult, Run
+from femubench.core.score.leaderboard import GainTable
 from femubench.core.score.predicted_spread import Spread
+from femubench.core.score.predictive import (
+    Forecasts,
+    PredictiveBoard,
+    crps_normal,
+    learn_deviations,
+)
+from femubench.core.score.ranking import list_models
 from femubench.core.score.scoring import judge, reference_of
 from femubench.fem import FloatArray
 from femubench.results import leaderboard
@@ -71,22 +80,14 @@ def test_samples_take_three_lines_more() -> None:
     run = femubench.rank(CASE, [Point(), Sampled()])
     board = leaderboard(run).set_index("strategy")
     assert board["gain"].nunique() == 1
-    assert board.notna()["coverage90"].to_dict() == {"sampled": True, "point": False}
-    assert board.notna()["log_score"].to_dict() == {"sampled": True, "point": False}
-    assert board["crps_percent"].notna().all()
+    rows = {row["strategy"]: row for row in PredictiveBoard.of(run).rows}
+    assert {name: row["stated"] for name, row in rows.items()} == {"sampled": 1, "point": 0}
+    # One structure teaches no common deviation, and has no interval.
+    assert np.isfinite(rows["sampled"]["above_crps_percent"])
+    assert np.isnan([rows["point"]["above_crps_percent"], rows["sampled"]["above_skill"]]).all()
     for result in run.results:
         stds = [m.predicted_std_hz for b in result.blocks.values() for m in b.modes]
         assert all((std is not None) == (result.strategy == "sampled") for std in stds)
-
-
-def test_a_point_is_scored_by_its_absolute_error() -> None:
-    (result,) = femubench.rank(CASE, [Point()], nominal="drawn").results
-    unseen = [m for name in ("higher", "modified") for m in result.blocks[name].modes]
-    errors = [abs(m.predicted_hz / m.measured_hz - 1.0) for m in unseen if m.predicted_hz]
-    found = predictive.scores([result], {})
-    assert found["crps_percent"] == pytest.approx(100.0 * np.mean(errors), rel=1e-12)
-    assert np.isnan(found["coverage90"])
-    assert np.isnan(found["log_score"])
 
 
 def test_spread_is_that_of_samples_solved_in_full() -> None:
@@ -244,59 +245,128 @@ def test_crps_is_the_integral_that_defines_it(error: float, std: float) -> None:
 
     ends = min(error, 0.0) - 12.0 * std, max(error, 0.0) + 12.0 * std
     expected = quad(square, ends[0], 0.0)[0] + quad(square, 0.0, ends[1])[0]
-    found = predictive.crps_normal(np.array([error]), np.array([std]))
+    found = crps_normal(np.array([error]), np.array([std]))
     assert found[0] == pytest.approx(expected, rel=1e-7)
 
 
-def test_log_score_is_bounded_and_that_of_the_mixture() -> None:
-    error, std = np.array([0.0, 1.0, 90.0, 100.0]), np.array([1.0, 2.0, 0.1, np.nan])
-    density = 0.99 * norm.pdf([0.0, 1.0], 0.0, [1.0, 2.0]) + 0.01 / 200.0
-    worst = -np.log(0.01 / 200.0)
-    expected = [*-np.log(density), worst, worst]
-    assert predictive.log_score(error, std) == pytest.approx(expected, rel=1e-12)
+Modes = list[PairedMode]
+COUNT = 8  # structures
 
 
-def simulated(claimed: float, cases: Sequence[str], count: int = 2000) -> list[JobResult]:
-    """Forecasts with errors of 1 % and a claimed standard deviation."""
-    rng = np.random.default_rng(11)
-    results = []
-    for case in cases:
-        modes = tuple(
-            PairedMode(k, 100.0, 100.0 + rng.standard_normal(), 1.0, None, claimed)
-            for k in range(count)
-        )
-        results.append(JobResult(case, "s", 0, "ok", blocks={"higher": Block(1.0, 1.0, modes)}))
-    return results
+def modes(errors: Iterable[float], std: float | None = None) -> Modes:
+    """Return modes from 200 Hz on with errors of ln f, above a given one of 100 Hz."""
+    hz = [(200.0 + k, (200.0 + k) * np.exp(e)) for k, e in enumerate(errors)]
+    return [PairedMode(k, m, p, 1.0, None, std and std * p) for k, (m, p) in enumerate(hz)]
+
+
+def drawn(sigma: float, std: float | None = None, count: int = 400, seed: int = 3) -> list[Modes]:
+    rng = np.random.default_rng(seed)
+    return [modes(sigma * rng.standard_normal(count), std) for _ in range(COUNT)]
+
+
+def run_with(textbook: list[Modes], **strategies: list[Modes | None]) -> Run:
+    """Return a run on a structure for each list of modes; None stands for a failure."""
+    used = Block(0.0, 1.0, (PairedMode(0, 100.0, 100.0, 1.0),))
+    named = {f"s{k}": {"used": used, "higher": Block(1.0, 1.0, tuple(m))}
+             for k, m in enumerate(textbook)}  # fmt: skip
+    models = list_models({case: {"drawn": blocks} for case, blocks in named.items()})
+    results = [
+        JobResult(case, name, 0, "failed", "no model")
+        if own is None
+        else JobResult(case, name, 0, "ok", blocks={"used": used, "higher": Block(1, 1, (*own,))})
+        for name, listed in strategies.items()
+        for case, own in zip(named, listed, strict=True)
+    ]
+    return Run({"models": models, "seeds": [0], "strategies": [*strategies]}, tuple(results))
+
+
+def board_of(run: Run) -> dict[str, dict[str, Any]]:
+    return {row["strategy"]: row for row in PredictiveBoard.of(run).rows}
 
 
 def test_calibrated_forecasts_cover_nine_in_ten_and_others_do_not() -> None:
-    found = {std: predictive.scores(simulated(std, "a"), {}) for std in (0.3, 1.0, 3.0)}
-    assert found[1.0]["coverage90"] == pytest.approx(0.9, abs=0.02)
-    assert found[0.3]["coverage90"] < 0.45
-    assert found[3.0]["coverage90"] > 0.99
-    for name in ("crps_percent", "log_score"):  # proper: the true distribution is the best
-        assert found[1.0][name] < min(found[0.3][name], found[3.0][name])
+    stds = {"narrow": 0.003, "right": 0.01, "wide": 0.03}
+    found = board_of(run_with(drawn(0.1), **{n: drawn(0.01, std) for n, std in stds.items()}))
+    assert found["right"]["above_coverage90"] == pytest.approx(0.9, abs=0.02)
+    assert found["narrow"]["above_coverage90"] < 0.45
+    assert found["wide"]["above_coverage90"] > 0.99
+    # Proper: the true distribution is the best.
+    scores = {name: row["above_crps_percent"] for name, row in found.items()}
+    assert min(scores, key=lambda name: scores[name]) == "right"
+    assert scores["right"] == pytest.approx(1.0 / np.sqrt(np.pi), rel=0.05)
+    assert next(iter(found)) == "right"
+
+
+def test_who_states_nothing_gets_the_deviation_of_the_textbook_models_elsewhere() -> None:
+    textbook, points = drawn(0.05), drawn(0.05, seed=4)
+    textbook[0] = modes(0.2 * np.ones(50))
+    run = run_with(textbook, point=points, lost=[None] * COUNT)
+    table = GainTable.of(run, (), "drawn")
+    known = {
+        case: Forecasts.of(table.scale.modes[case], table.scale.blocks[case])
+        for case in table.cases
+    }
+    found = learn_deviations(table, known)[:, 0]
+    assert found[0] == pytest.approx(0.05, rel=0.08)  # its own errors have no part in it
+    assert (found[1:] > found[0]).all()
+    rows = board_of(run)
+    assert rows["point"]["stated"] == 0
+    inside = 2.0 * norm.cdf(norm.ppf(0.95) * found / 0.05) - 1.0
+    assert rows["point"]["above_coverage90"] == pytest.approx(inside.mean(), abs=0.01)
+    # A job without a model counts as the textbook model with that deviation.
+    assert [rows["lost"][f"above_{key}"] for key in ("skill", "low", "high")] == [0.0, 0.0, 0.0]
+    first, std = known["s0"], np.full(50, found[0])
+    assert rows["lost"]["above_crps_percent"] > rows["point"]["above_crps_percent"]
+    own = crps_normal(first.error, std)
+    assert first.figures(np.full(2, found[0]))[0].tolist() == pytest.approx([own.mean(), 0.0])
+    few = board_of(run_with(textbook[:5], point=points[:5]))["point"]
+    assert np.isnan([few[f"above_{key}"] for key in ("crps_percent", "coverage90", "skill")]).all()
 
 
 def test_structures_weigh_alike_however_many_modes_they_have() -> None:
-    many, few = simulated(1e9, "a", 50)[0], simulated(1e-9, "b", 2)[0]
-    assert predictive.scores([many, few], {})["coverage90"] == pytest.approx(0.5)
-    one = predictive.scores([many, few], {"a": "x", "b": "x"})
-    assert one["coverage90"] == pytest.approx(50 / 52)
+    own = [modes([0.0] * 50, 0.1), *[modes([0.1] * 2, 1e-6)] * (COUNT - 1)]
+    run = run_with(drawn(0.1), sure=own)
+    assert board_of(run)["sure"]["above_coverage90"] == pytest.approx(1.0 / COUNT)
+    run.meta["structures"] = {f"s{k}": "one" for k in range(COUNT - 1)}
+    assert board_of(run)["sure"]["above_coverage90"] == pytest.approx(0.5 / (COUNT - 1))
 
 
-def test_a_lost_mode_is_covered_by_nothing_and_counts_a_hundred_percent() -> None:
-    modes = (
-        PairedMode(1, 100.0, 100.0, 1.0, None, 1.0),
-        PairedMode(2, 200.0, None, None),
-        PairedMode(3, 300.0, -5.0, 0.9),
-    )
-    result = JobResult("a", "s", 0, "ok", blocks={"higher": Block(1.0, 1.0, modes)})
-    forecasts = predictive.Forecasts.of([result], {})
-    assert forecasts.coverage() == pytest.approx(1 / 3)
-    assert forecasts.coverage(1.0) == pytest.approx(1 / 3)
-    own = predictive.crps_normal(np.zeros(1), np.ones(1))[0]
-    assert predictive.scores([result], {})["crps_percent"] == pytest.approx((own + 200.0) / 3)
+def test_a_lost_mode_costs_the_cap_and_no_mode_costs_more() -> None:
+    lost = [PairedMode(2, 210.0, None, None), PairedMode(3, 220.0, -5.0, 0.9)]
+    (far,) = modes([0.6], 0.01)
+    run = run_with(drawn(0.1), own=[[*modes([0.0], 0.01), *lost, far]] * COUNT)
+    row, cap = board_of(run)["own"], np.log(1.4)
+    exact = crps_normal(np.zeros(1), np.full(1, 0.01))[0]
+    assert row["above_crps_percent"] == pytest.approx(25.0 * (exact + 3.0 * cap))
+    assert row["above_coverage90"] == pytest.approx(0.25)
+
+
+def test_what_else_may_stand_for_a_mode_shares_its_score() -> None:
+    """A second mode that the sensors see as well, ten percent off, halves what the first earns."""
+    (one,) = modes([0.0], 0.01)
+    two = structs.replace(one, candidates=(PartnerCandidate(200.0 * np.exp(0.1), 1.0, 1.0),))
+    textbook = [[*m, PairedMode(9999, 900.0, 900.0, 1.0)] for m in drawn(0.1)]
+    found = board_of(run_with(textbook, one=[[one]] * COUNT, two=[[two]] * COUNT))
+    parts = crps_normal(np.array([0.0, 0.1]), np.full(2, 0.01))
+    for name, expected in (("one", parts[0]), ("two", parts.mean())):
+        assert found[name]["above_crps_percent"] == pytest.approx(100.0 * expected)
+        assert found[name]["above_coverage90"] == 1.0
+
+
+def test_modified_modes_in_the_given_band_stand_apart() -> None:
+    run = run_with(drawn(0.1), own=drawn(0.01, 0.01))
+    for k in range(COUNT):
+        below = {"mode": 1, "measured_hz": 90.0, "predicted_hz": 91.8, "mac": 1.0}
+        block = {"rms_percent": 2.0, "modes": [{**below, "modification": "mass"}]}
+        run.meta["models"][f"s{k}"]["drawn"]["modified"] = block
+        better = PairedMode(1, 90.0, 90.0, 1.0, "mass", 0.09)
+        run.results[k].blocks["modified"] = Block(0.0, 1.0, (better,))  # type: ignore[index]
+    row = board_of(run)["own"]
+    exact = crps_normal(np.zeros(1), np.full(1, 0.001))[0]
+    assert row["band_crps_percent"] == pytest.approx(100.0 * exact)
+    bar = board_of(run_with(drawn(0.1), own=drawn(0.01, 0.01)))["own"]
+    assert row["above_crps_percent"] == bar["above_crps_percent"]
+    assert row["band_skill"] > 0.9
 
 
 def test_a_built_in_strategy_says_how_sure_it_is() -> None:

@@ -9,8 +9,10 @@ import numpy as np
 from femubench.core.errors import InputError
 from femubench.core.plot.style import SOFT, check_kind, draw_curves, name_of, own_axes
 from femubench.core.schema.results import Run
+from femubench.core.score.bounded_gain import MeasuredModes, Rule
 from femubench.core.score.predictive import Forecasts
 from femubench.core.score.statistics import structures_of
+from femubench.core.typing import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,20 +41,23 @@ def calibration(run: Run, *, ax: Axes | None = None) -> Axes:
     """
     check_kind(run, (Run,), "strategies")
     structures = structures_of(run)
-    curves = []
-    for name in dict.fromkeys(result.strategy for result in run.ranked):
-        fine = [r for r in run.ranked if r.strategy == name and r.status == "ok"]
-        found = Forecasts.of(fine, structures)
-        if found.stated.any():
-            observed = np.array([found.coverage(level) for level in _LEVELS])
-            curves.append((name_of(name), "predicted", _LEVELS, observed))
-    if not curves:
+    reached: dict[str, dict[str, list[FloatArray]]] = {}
+    for result in (result for result in run.ranked if result.status == "ok"):
+        found = Forecasts.of(MeasuredModes.of(result.blocks, Rule()), result.blocks)
+        if found.stated:
+            own = reached.setdefault(result.strategy, {})
+            own.setdefault(structures.get(result.case, result.case), []).append(
+                (found.level(found.std)[:, None] <= _LEVELS).mean(axis=0)
+            )
+    if not reached:
         raise InputError(
             "no strategy of the run says how sure it is", expected="results with an uncertainty"
         )
     ax = own_axes(ax, (5.4, 5.0))
     ax.plot([0.0, 1.0], [0.0, 1.0], color=SOFT, linewidth=0.8, label="calibrated")
-    draw_curves(ax, curves)
+    curves = [(name, np.mean([np.mean(u, axis=0) for u in own.values()], axis=0))
+              for name, own in reached.items()]  # fmt: skip
+    draw_curves(ax, [(name_of(name), "predicted", _LEVELS, share) for name, share in curves])
     ax.set(xlabel="level of the interval", ylabel="share of unseen modes in it", ylim=(-0.02, 1.02))
     ax.legend(fontsize=8.5)
     return ax

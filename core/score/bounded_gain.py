@@ -252,10 +252,8 @@ class MeasuredModes:
         shapes = []
         for name in ("used", "higher", "modified"):
             for mode in _modes(blocks, name):
-                in_band = mode.measured_hz <= self.top
-                where = name if name != "modified" else "band" if in_band else "above"
-                others = self._others(mode) if mode.candidates else []
-                parts[where].append(_mean_error(mode, others, rule.cap))
+                others = self.candidates_of(mode)
+                parts[self.band_of(name, mode)].append(_mean_error(mode, others, rule.cap))
                 false |= {(mode.modification, c.hz) for c in others if c.weight >= rule.visible}
                 if name != "used" and mode.mac is not None:
                     shapes.append(1.0 - mode.mac)
@@ -266,8 +264,14 @@ class MeasuredModes:
         error = _mean([_mean(part) for part in unseen])
         return ModelErrors(error, change, _mean(parts["band"]), _mean(shapes), len(false))
 
-    def _others(self, mode: PairedMode) -> list[PartnerCandidate]:
+    def band_of(self, block: str, mode: PairedMode) -> str:
+        """Return where a mode counts: modified ones in the given ``band`` or ``above`` it."""
+        return block if block != "modified" else "band" if mode.measured_hz <= self.top else "above"
+
+    def candidates_of(self, mode: PairedMode) -> list[PartnerCandidate]:
         """Return what else of the model than its partner may stand for a measured mode."""
+        if not mode.candidates:
+            return []
         rule = self.rule
         highest = self.limits.get(mode.modification, rule.above * mode.measured_hz)
         return [

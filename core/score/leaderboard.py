@@ -14,7 +14,6 @@ import numpy as np
 
 from femubench.core.garbage import pause_collection
 from femubench.core.schema.results import BLOCKS, JobResult, Nominal, Run, origins_of
-from femubench.core.score import predictive
 from femubench.core.score.bounded_gain import ModelErrors
 from femubench.core.score.ranking import TIE, Scale, rank_items
 from femubench.core.score.statistics import (
@@ -43,7 +42,6 @@ COLUMNS = (
     *("error_gain", "change_gain"),
     *("gain_drawn", "gain_tests", "band_percent", "shape_error", "false_modes"),
     *(f"{block}_percent" for block in BLOCKS),
-    *predictive.COLUMNS,
     *("rigid_modes_lost", "negative_eigenvalues", "parameters", "evaluations", "seconds"),
     *("answered", "ok", "not_applicable", "total", "unphysical", "better_than", "worse_than"),
 )
@@ -247,7 +245,6 @@ def leaderboard(run: Run) -> pd.DataFrame:
     rms errors, medians over cases of the medians over seeds, of jobs that are ok; so are
     `parameters`, `evaluations` and `seconds`. Rigid-body modes lost and negative eigenvalues are
     sums. `better_than` and `worse_than` are the strategies of which a difference is shown.
-    `coverage90`, `crps_percent` and `log_score` are those of docs/scoring.md.
 
     Arguments:
         run: with `rule`, `models`, `seeds` and `strategies` in its meta.
@@ -359,7 +356,6 @@ def _row(
         for name, value in zip(_COUNTS, attrgetter(*_COUNTS)(result), strict=True):
             if value is not None:
                 medians[name][result.case].append(value)
-    owners = dict(zip(table.cases, table.structures, strict=True))
     return {
         "strategy": strategy,
         "yardstick": (run.meta.get("yardsticks") or {}).get(strategy, ""),
@@ -374,7 +370,6 @@ def _row(
         if 0 < len(tests) < len(table.cases)
         else math.nan,
         **{f"{block}_percent": _median(medians[block]) for block in BLOCKS},
-        **predictive.scores(fine, owners),
         "rigid_modes_lost": sum(result.rigid_modes_lost for result in fine),
         "negative_eigenvalues": sum(result.negative_eigenvalues or 0 for result in fine),
         "parameters": _median(medians["parameter_count"]),

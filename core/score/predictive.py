@@ -1,169 +1,213 @@
-"""How good predictive distributions of unseen frequencies are: coverage, CRPS, log score.
+"""The predictive board: CRPS and coverage of what models say of unseen frequencies, by band.
 
-A prediction is a normal distribution about the model's frequency, or the mere frequency. All is in
-percent of the measured frequency. A measured mode without partner, or with an imaginary one, counts
-as an error of 100 % without a distribution: covered by no interval.
+A prediction is a normal distribution of ln f about the model's. A measured mode without partner, or
+with an imaginary one, is in no interval, and its CRPS is the cap of the rule, which none exceeds.
 
-Source: Gneiting & Raftery (2007), J. Am. Stat. Assoc. 102, 359-378: both scores are proper.
+Source: Gneiting & Raftery (2007), J. Am. Stat. Assoc. 102, 359-378: the score is proper.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+import math
+from collections import Counter, defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import chain
-from operator import attrgetter
+from typing import Any
 
 import numpy as np
 from scipy.special import ndtr
 
-from femubench.core.schema.results import UNSEEN, JobResult
-from femubench.core.typing import BoolArray, FloatArray, IntArray
+from femubench.core.garbage import pause_collection
+from femubench.core.schema.results import UNSEEN, Block, Run
+from femubench.core.score.bounded_gain import MeasuredModes
+from femubench.core.score.leaderboard import GainTable, mean_known
+from femubench.core.score.statistics import FEWEST, interval_of_mean
+from femubench.core.typing import FloatArray, IntArray
 
-COLUMNS = ("coverage90", "crps_percent", "log_score")
+# Higher modes and modified ones above the highest given frequency, and modified ones below it.
+BANDS = ("above", "band")
+FIGURES = ("crps_percent", "coverage90", "skill")
 LEVEL = 0.9
-LOST_PERCENT = 100.0  # the error of a mode that the model does not have
-# A forecast never excludes the rest: it is mixed with so much of anything within 100 %. A lost mode
-# then has a log score too, and one mode that is 50 deviations off does not outweigh all others.
-ANYTHING = 0.01
+# Of ln f, from what a test repeats to what no pairing allows; a step of 6 % changes the mean CRPS
+# near its least value by less than 0.1 %.
+_DEVIATIONS = np.geomspace(1e-3, 1.0, 121)
+_LOST = (math.nan, math.nan, 1.0)
 
 
 @dataclass(frozen=True)
 class Forecasts:
-    """Predictions of unseen modes and what was measured.
+    """What a model predicts of the m unseen modes of a case, by partners and candidates, n in all.
 
     Arguments:
-        error: predicted minus measured frequency in percent of the measured one, (n,).
-        std: of the prediction in the same unit, nan where none was given, (n,).
-        stated: whether the strategy gave an uncertainty with that model, (n,).
-        structure: number of the structure, (n,).
+        error, std: ln(f_p / f_m) and its standard deviation, nan where there is none, (n,).
+        weight: 1 in total for every mode, as in the rule of the ranks, (n,).
+        mode: place of the measured mode; its partner comes first, (n,).
+        band: place among `BANDS`, (m,).
+        cap: largest CRPS.
     """
 
     error: FloatArray
     std: FloatArray
-    stated: BoolArray
-    structure: IntArray
+    weight: FloatArray
+    mode: IntArray
+    band: IntArray
+    cap: float
 
     @classmethod
-    def of(
-        cls,
-        results: Iterable[JobResult],
-        structures: Mapping[str, str],
-        blocks: Collection[str] = UNSEEN,
-    ) -> Forecasts:
-        """Return the forecasts of the unseen modes of jobs that are ok.
+    def of(cls, modes: MeasuredModes, blocks: Mapping[str, Block]) -> Forecasts:
+        """Return the forecasts of a model.
 
         Arguments:
-            results: of one strategy.
-            structures: by case; one that is not named is a structure of its own.
-            blocks: those of them whose modes are taken.
+            modes: that were measured of the case.
+            blocks: what the model predicts.
         """
-        listed = list(results)
-        found = [result.blocks.get(name) for result in listed for name in UNSEEN]
-        modes = [block.modes if block else () for block in found]
-        hertz = np.array(list(map(_HERTZ, chain(*modes))), dtype=float).reshape(-1, 3).T
-        counts = np.array(list(map(len, modes)), dtype=int)
-        owner = np.repeat(np.arange(len(modes)) // len(UNSEEN), counts)
-        stated = np.bincount(owner, ~np.isnan(hertz[2]), len(listed)) > 0.0
-        numbers: dict[str, int] = {}
-        names = (structures.get(result.case, result.case) for result in listed)
-        places = np.array([numbers.setdefault(name, len(numbers)) for name in names], dtype=int)
-        wanted = np.array([name in blocks for name in UNSEEN] * len(listed), dtype=bool)
-        taken = np.repeat(wanted, counts)
-        error, std = _percent(hertz[:, taken])
-        return cls(error, std, stated[owner[taken]], places[owner[taken]])
+        rows, owners, bands = [], [], []
+        for name, mode in ((n, m) for n in UNSEEN if n in blocks for m in blocks[n].modes):
+            hz, own = mode.predicted_hz or 0.0, [_LOST]
+            if hz > 0.0:
+                own_std = mode.predicted_std_hz
+                std = math.nan if own_std is None else max(own_std / hz, 1e-9)
+                pairs = [(hz, 1.0), *((c.hz, c.weight) for c in modes.candidates_of(mode))]
+                total = sum(weight for _, weight in pairs)
+                own = [(math.log(f / mode.measured_hz), std, w / total) for f, w in pairs]
+            owners += [len(bands)] * len(own)
+            bands.append(int(modes.band_of(name, mode) == "band"))
+            rows += own
+        columns = np.array(rows, dtype=float).reshape(-1, 3).T
+        return cls(*columns, np.array(owners, int), np.array(bands, int), modes.rule.cap)
 
     @property
-    def weight(self) -> FloatArray:
-        """Return weights of 1 in total, the same for all structures and all modes of one, (n,)."""
-        counts = np.bincount(self.structure)
-        return np.asarray(1.0 / (counts[self.structure] * np.count_nonzero(counts)))
+    def stated(self) -> bool:
+        """Return whether the strategy gave an uncertainty with the model."""
+        return bool(np.isfinite(self.std).any())
 
-    @property
-    def uncertain(self) -> Forecasts:
-        """Return those of models that came with an uncertainty."""
-        own = self.stated
-        return Forecasts(self.error[own], self.std[own], own[own], self.structure[own])
+    def level(self, std: FloatArray) -> FloatArray:
+        """Return the level of the partner's interval that just reaches what was measured, (m,).
 
-    @property
-    def level(self) -> FloatArray:
-        """Return the level of the central interval that just reaches the measured value, (n,).
+        2 where no interval does.
 
-        2 for a mode that no interval covers.
+        Arguments:
+            std: of the forecasts, (n,).
         """
-        with np.errstate(divide="ignore", invalid="ignore"):
-            reached = 2.0 * ndtr(np.abs(self.error) / self.std) - 1.0
-        reached = np.where((self.std == 0.0) & (self.error == 0.0), 0.0, reached)
-        return np.asarray(np.where(np.isnan(self.std), 2.0, reached))
+        first = np.flatnonzero(np.diff(self.mode, prepend=-1))
+        return np.nan_to_num(2.0 * ndtr(np.abs(self.error[first]) / std[first]) - 1.0, nan=2.0)
 
-    def coverage(self, level: float = LEVEL) -> float:
-        """Return the share of modes in the central interval of a level; nan without any."""
-        found = self.uncertain
-        return float(found.weight @ (found.level <= level)) if len(found.error) else np.nan
+    def figures(self, common: FloatArray) -> FloatArray:
+        """Return by band mean CRPS and share in the 90 % intervals, nan where unknown, (2, 2).
+
+        Arguments:
+            common: deviation of ln f for a model that came with none, by band, (2,).
+        """
+        std = self.std if self.stated else common[self.band[self.mode]]
+        each, found = np.fmin(crps_normal(self.error, std), self.cap), np.full((2, 2), math.nan)
+        score = np.bincount(self.mode, each * self.weight, len(self.band))
+        inside = self.level(std) <= LEVEL
+        for place in np.unique(self.band):
+            if self.stated or math.isfinite(common[place]):
+                part = self.band == place
+                found[place] = score[part].mean(), inside[part].mean()
+        return found
 
 
-def scores(results: Iterable[JobResult], structures: Mapping[str, str]) -> dict[str, float]:
-    """Return coverage of 90 % intervals, CRPS in percent and log score of one strategy.
-
-    Each is the mean over unseen modes, every structure with the same weight. Coverage and log
-    score are those of models that came with an uncertainty, nan where none did; without one the
-    CRPS is the absolute error.
+@dataclass(frozen=True)
+class PredictiveBoard:
+    """How good the stated uncertainties of a run are, apart from its ranks.
 
     Arguments:
-        results: of the strategy.
-        structures: by case.
+        rows: one a strategy, the best skill above the given band first.
+        common: by band the least and largest deviation of ln f, in percent, that stood for one not
+            stated; nan where there are too few structures to learn it from.
     """
-    found = Forecasts.of(results, structures)
-    some = found.uncertain
-    crps = float(found.weight @ crps_normal(found.error, found.std)) if len(found.error) else np.nan
-    log = float(some.weight @ log_score(some.error, some.std)) if len(some.error) else np.nan
-    return dict(zip(COLUMNS, (found.coverage(), crps, log), strict=True))
+
+    rows: tuple[dict[str, Any], ...]
+    common: Mapping[str, tuple[float, float]]
+
+    @classmethod
+    @pause_collection()
+    def of(cls, run: Run) -> PredictiveBoard:
+        """Return the predictive board of a run.
+
+        Means over seeds, then over the cases of a structure, then over structures: `crps_percent`
+        of ln f, `coverage90`, and `skill`, the bounded gain of the CRPS over that of the textbook
+        model with the common deviation, with `low` and `high`, its 95 % interval over structures;
+        each with `above_` and `band_` before it. `stated` of `total` jobs gave an uncertainty. A
+        job without a possible model counts as the textbook one with the common deviation.
+
+        Raises:
+            InputError: when the run keeps too little to be scored.
+        """
+        table = GainTable.of(run, (), run.nominals[0])
+        scale, places = table.scale, {case: k for k, case in enumerate(table.cases)}
+        if not places:
+            return cls((), {})
+        textbook = {case: Forecasts.of(scale.modes[case], scale.blocks[case]) for case in places}
+        common = learn_deviations(table, textbook)
+        lines = np.array([textbook[case].figures(common[k]) for case, k in places.items()])
+        found: dict[tuple[str, int, int], list[FloatArray]] = defaultdict(list)
+        stated: Counter[str] = Counter()
+        for result in (result for result in run.ranked if result.case in places):
+            place, own = places[result.case], textbook[result.case]
+            if result.answered:
+                own = Forecasts.of(scale.modes[result.case], result.blocks)
+            stated[result.strategy] += own.stated
+            job = result.strategy, place, table.seeds.index(result.seed)
+            found[job].append(own.figures(common[place]))
+        rows = []
+        for name in table.names:
+            values = np.repeat(lines[:, None], len(table.seeds), axis=1)
+            for case, seed in np.ndindex(values.shape[:2]):
+                if listed := found.get((name, case, seed)):
+                    values[case, seed] = np.mean(listed, axis=0)
+            score, line = values[..., :1], lines[:, None, :, :1]
+            skill = (line - score) / np.maximum(np.maximum(line, score), scale.rule.floor)
+            score *= 100.0  # a view of the values
+            by_structure = table.by_structure(np.concatenate([values, skill], axis=-1))
+            line_of = (run.meta.get("yardsticks") or {}).get(name)
+            row: dict[str, Any] = {"strategy": name, "yardstick": line_of, "stated": stated[name]}
+            row["total"] = len(places) * len(table.seeds)
+            for k, band in enumerate(BANDS):
+                part = mean_known(np.moveaxis(by_structure[:, :, k], 1, 0))
+                row |= zip([f"{band}_{key}" for key in FIGURES], mean_known(part), strict=True)
+                known = part[np.isfinite(part[:, -1]), -1]
+                ends = interval_of_mean(known) if len(known) >= FEWEST else (math.nan, math.nan)
+                row[f"{band}_low"], row[f"{band}_high"] = ends
+            rows.append(row)
+        rows.sort(key=lambda row: (-np.nan_to_num(row["above_skill"], nan=-2.0), row["strategy"]))
+        ends = zip(*(100.0 * np.array([common.min(axis=0), common.max(axis=0)])), strict=True)
+        return cls(tuple(rows), dict(zip(BANDS, ends, strict=True)))
+
+
+def learn_deviations(table: GainTable, textbook: Mapping[str, Forecasts]) -> FloatArray:
+    """Return by case and band the one deviation of ln f for all that state none, (cases, 2).
+
+    It gives the textbook models of all other structures the least mean CRPS; nan with fewer than
+    five of them. Of the textbook models, and not of the pooled errors of those that state none: a
+    figure must not depend on who else runs, and in a run of one strategy the pool would be its own
+    errors, so that it would be measured by what it has been fitted to.
+
+    Arguments:
+        table: of the run.
+        textbook: forecasts of the textbook model by case.
+    """
+    scores = [[textbook[c].figures(np.full(2, s))[:, 0] for s in _DEVIATIONS] for c in table.cases]
+    units, best = table.by_structure(np.array(scores)), {}
+    for k, name in enumerate(table.units):
+        others = np.delete(units, k, axis=0)
+        enough = np.isfinite(others[:, 0]).sum(axis=0) >= FEWEST - 1
+        least = np.nan_to_num(mean_known(others)).argmin(axis=0)
+        best[name] = np.where(enough, _DEVIATIONS[least], math.nan)
+    return np.array([best[name] for name in table.structures])
 
 
 def crps_normal(error: FloatArray, std: FloatArray) -> FloatArray:
-    """Return the continuous ranked probability score of normal forecasts, in the unit of both.
-
-    Lower is better. A std of nan or 0 stands for a point: the score is the absolute error.
+    """Return the continuous ranked probability score of normal forecasts; lower is better, (n,).
 
     Arguments:
         error: forecast mean minus what was measured, (n,).
-        std: of the forecast, (n,).
+        std: of the forecast, in the same unit, (n,).
 
     Source: Gneiting & Raftery (2007), section 4.2.
     """
-    point = ~(std > 1e-12 * np.abs(error))
-    s = np.where(point, 1.0, std)
-    z = error / s
+    z = error / std
     density = np.exp(-0.5 * np.square(z)) / np.sqrt(2.0 * np.pi)
-    spread = s * (z * (2.0 * ndtr(z) - 1.0) + 2.0 * density - 1.0 / np.sqrt(np.pi))
-    return np.asarray(np.where(point, np.abs(error), spread))
-
-
-def log_score(error: FloatArray, std: FloatArray) -> FloatArray:
-    """Return -ln of the density of what was measured, per percent; lower is better, 9.9 the worst.
-
-    The density is that of the forecast with a share of 0.01 of anything within 100 %. A std of
-    nan stands for no forecast.
-
-    Arguments:
-        error: in percent, (n,).
-        std: in percent, (n,).
-    """
-    s = np.where(std > 0.0, std, np.inf)
-    density = np.exp(-0.5 * np.square(error / s)) / (np.sqrt(2.0 * np.pi) * s)
-    return np.asarray(-np.log((1.0 - ANYTHING) * density + ANYTHING / (2.0 * LOST_PERCENT)))
-
-
-_HERTZ = attrgetter("measured_hz", "predicted_hz", "predicted_std_hz")
-
-
-def _percent(hertz: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return errors and std of modes in percent of the measured frequencies.
-
-    Arguments:
-        hertz: measured and predicted frequency and std, nan where there is none, (3, n).
-    """
-    measured, predicted, std = hertz
-    there = predicted > 0.0
-    error = np.where(there, 100.0 * (predicted / measured - 1.0), LOST_PERCENT)
-    return error, np.where(there, 100.0 * std / measured, np.nan)
+    return np.asarray(std * (z * (2.0 * ndtr(z) - 1.0) + 2.0 * density - 1.0 / np.sqrt(np.pi)))

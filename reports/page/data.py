@@ -13,6 +13,7 @@ from femubench.reports.csvs import CsvReporter
 from femubench.reports.jsons import JsonReporter
 from femubench.reports.page.papers import list_drawn_frequencies, papers_of
 from femubench.reports.page.rounding import clean, compact_json, plain_data, round_figures
+from femubench.reports.predictive import predictive_json
 from femubench.reports.summary import (
     cases_of,
     finding,
@@ -27,6 +28,7 @@ from femubench.reports.twins import suspicions, twins_by_strategy
 from femubench.results import (
     FEWEST,
     TIE,
+    Forecasts,
     JobResult,
     Reporter,
     Run,
@@ -36,7 +38,6 @@ from femubench.results import (
     interval_tail,
     is_test,
     list_rows,
-    predictive,
     rank_results,
     structures_of,
     unsteady,
@@ -119,6 +120,7 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
             for found in run.results
         ],
         "board": list(map(_cleaned, board)),
+        "predictive": predictive_json(run),
         "statistics": {
             "pairs": [
                 [strategies.index(a), strategies.index(b), round_figures(p, 4)]
@@ -200,22 +202,17 @@ def _result(result: JobResult, case: int, strategy: int, scale: Scale) -> dict[s
         "negative": result.negative_eigenvalues or 0,
         "unphysical": result.unphysical,
         "mac": [None if block is None else round_figures(block.mean_mac, 5) for block in blocks],
-        "forecast": [_forecast(result, name) for name in BLOCKS],
+        "levels": _levels(result, scale),
     }
 
 
-def _forecast(result: JobResult, name: str) -> dict[str, Any] | None:
-    """Return of a block's unseen modes the number, the summed CRPS, and what intervals reach them.
+def _levels(result: JobResult, scale: Scale) -> list[float] | None:
+    """Return the levels of the stated intervals that just reach the unseen modes.
 
-    The level of the interval that just reaches a mode is rounded up, so that it lies in no interval
-    that does not hold it.
+    They are rounded up, so that a mode lies in no interval that does not hold it.
     """
-    found = predictive.Forecasts.of([result], {}, blocks=(name,))
-    if not len(found.error):
-        return None
-    levels = [math.ceil(1e6 * level) / 1e6 for level in found.level] if found.stated.any() else None
-    crps = float(predictive.crps_normal(found.error, found.std).sum())
-    return {"modes": len(found.error), "levels": levels, "crps": clean(crps)}
+    found = Forecasts.of(scale.modes[result.case], result.blocks)
+    return [math.ceil(1e6 * v) / 1e6 for v in found.level(found.std)] if found.stated else None
 
 
 def _details(

@@ -13,14 +13,21 @@ from synthetic_run import synthetic_run
 
 from femubench.core.schema.records import read_run
 from femubench.reports.summary import finding
-from femubench.results import Run, leaderboard, list_rows, rank_results, run_to_json
+from femubench.results import (
+    PredictiveBoard,
+    Run,
+    leaderboard,
+    list_rows,
+    rank_results,
+    run_to_json,
+)
 
 ROUNDED = {"seconds": 1e-3}  # figures that the page holds with fewer digits
 KEYS = (
     *("rank", "gain", "error_percent", "better_share", "worse_share", "error_gain", "change_gain"),
     *("gain_tests", "band_percent", "shape_error", "false_modes"),
     *("used_percent", "higher_percent", "modified_percent"),
-    *("coverage90", "crps_percent", "parameters", "seconds"),
+    *("parameters", "seconds"),
 )
 
 
@@ -224,6 +231,12 @@ def test_intervals_of_a_part_are_over_its_structures(
         rows = leaderboard(whole).to_dict("records")
         return {row["strategy"]: [row["gain_low"], row["gain_high"]] for row in rows}
 
+    # No strategy states an uncertainty; the common one is learned from twelve structures.
+    lines = page.locator("#predictive tbody tr").all_inner_texts()
+    for line, row in zip(lines, PredictiveBoard.of(run).rows, strict=True):
+        assert line.split("\t")[0] == "= " * bool(row["yardstick"]) + row["strategy"]
+        assert float(line.split("\t")[1]) == pytest.approx(row["above_crps_percent"], rel=5e-3)
+        assert float(line.split("\t")[3]) == pytest.approx(row["above_skill"], abs=6e-4)
     assert "over structures" in page.locator("#board-table thead").inner_text()
     assert intervals() == {name: pytest.approx(ends) for name, ends in expected(run).items()}
     tick(page, "scenarios", "scenario-03")

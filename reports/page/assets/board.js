@@ -31,8 +31,6 @@
     known("shape_error") && figure("shape_error", "1 - MAC", "of the unseen modes, mean", share),
     figure("false_modes", "False modes", "modes that a test would see and did not, mean over the structures", small),
     ...data.blocks.map((block, k) => figure(`${block}_percent`, `${bench.blockName(k)} rms, %`, `rms frequency error of the ${block === "used" ? "modes that were given; no part of the gain" : `${block} modes`}; median over the cases`, small, { block: k })),
-    figure("coverage90", "In 90 %", "share of unseen modes in the 90 % interval that the strategy states", share),
-    figure("crps_percent", "CRPS, %", "continuous ranked probability score of unseen modes in percent of the frequency, mean over the structures; the absolute error where no uncertainty is stated", small),
     { key: "flags", title: "Flags", cell: flagCell },
     { key: "coverage", title: "Answered", hint: "jobs that gave a possible model", cell: coverageCell },
     { key: "better_than", title: "Above", right: true, down: true, hint: "lines of the board that it is shown to be better than, after correction for all pairs", cell: (row) => cell(row.better_than.length, count, { title: row.better_than.join(", ") }) },
@@ -139,6 +137,22 @@
     parts.status.classList.toggle("changed", changed || fewer);
   }
 
+  // Return the predictive board of the whole run, which has no ranks.
+  function predictive() {
+    const { rows, common } = data.predictive;
+    const name = ({ strategy, yardstick, stated }) => el("th", { scope: "row" }, `${yardstick ? "= " : ""}${stated ? "± " : ""}${strategy}`);
+    const parts = [["Above", "above"], ["In band", "band"]].flatMap(([title, band]) => {
+      const [low, high, ...figures] = ["low", "high", "crps_percent", "coverage90", "skill"].map((key) => `${band}_${key}`);
+      const range = (row) => el("td", { class: "right" }, row[low] === null ? "–" : `${share(row[low])} to ${share(row[high])}`);
+      return [...["CRPS, %", "in 90 %", "skill"].map((head, k) => [`${title}: ${head}`, (row) => cell(row[figures[k]], k ? share : small)]), ["95 % interval", range]];
+    });
+    const known = rows.some((row) => row.above_crps_percent !== null || row.band_crps_percent !== null);
+    const lines = rows.map((row) => [name(row), ...parts.map(([, make]) => make(row))]);
+    return el("section", { id: "predictive" }, el("h2", {}, "Predictive board"), known && bench.scroll(bench.table("Predictive board", ["Strategy", ...parts.map(([head]) => head)], lines)),
+      known && el("p", { class: "soft" }, "Of the whole run. Above: unseen modes above the highest given frequency; in band: modified ones below it. CRPS: continuous ranked probability score of ln f, less is better. In 90 %: share of the modes in 90 % intervals, near 0.90 where these are right. Skill: gain of the CRPS over that of the textbook model, -1 to 1. ±: states an uncertainty of its own."),
+      el("p", { class: "soft" }, known ? common : "No uncertainty is stated, and to learn a common one takes 6 structures or more."));
+  }
+
   bench.board = {
     rows: () => state.rows,
     // Return the page of the leaderboard.
@@ -154,7 +168,7 @@
       const [first, ...rest] = data.finding;
       const page = el("section", { id: "board" }, el("h1", { tabindex: "-1" }, first ?? "Leaderboard"), rest.length > 0 && el("p", { class: "finding" }, rest.join(" ")), parts.top,
         el("h2", {}, "Leaderboard"), el("p", { class: "lead" }, data.lead, " Every rms is over the modes of a block, and the median over the cases."),
-        bench.filters(update), parts.status, bench.scroll(table), parts.matrix, el("h2", {}, "How the strategies compare"), parts.figures);
+        bench.filters(update), parts.status, bench.scroll(table), predictive(), parts.matrix, el("h2", {}, "How the strategies compare"), parts.figures);
       update({});
       return page;
     },

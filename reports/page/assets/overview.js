@@ -36,7 +36,7 @@
   function calibration(rows) {
     const shown = rows.filter((row) => row.stated.length).slice(0, MOST_CURVES);
     if (!shown.length) return null;
-    const modes = new Set(d3.extent(shown, (row) => d3.sum(row.stated, (f) => f.modes)));
+    const modes = new Set(d3.extent(shown, (row) => d3.sum(row.stated, ({ levels }) => levels.length)));
     return bench.draw({
       kind: "calibration", title: "Are stated uncertainties true?",
       note: `Share of unseen modes inside the interval of each level that a strategy states; over ${[...modes].join(" to ")} modes, every structure counts alike. On the diagonal: true; below it: too sure; above: too cautious.`,

@@ -36,7 +36,6 @@
     const results = (byStrategy.get(s) ?? []).filter((r) => place.has(r.c));
     const fine = results.filter((r) => r.status === "ok");
     const { name: strategy, yardstick } = data.strategies[s];
-    const forecasts = fine.flatMap((r) => d3.range(data.blocks.length).flatMap((k) => (r.forecast[k] ? [{ c: r.c, ...r.forecast[k] }] : [])));
     const given = data.board.find((own) => own.strategy === strategy);
     const row = {
       index: s, strategy, yardstick, rank: null, gain_low: null, gain_high: null, gain_drawn: null,
@@ -51,21 +50,17 @@
       gains: cases.map((c) => mean(seeds.map((seed) => (resultAt(s, c, seed) ?? data.cases[c].start).gain))),
       perStructure: per.gain, perSeed: seeds.map((seed) => mean(counted.map((c) => (resultAt(s, c, seed) ?? data.cases[c].start).gain))),
       results, cases, structures,
-      stated: forecasts.filter(({ levels }) => levels), crps_percent: overStructure(forecasts, ({ crps }) => crps),
+      stated: fine.filter(({ levels }) => levels?.length),
     };
-    row.coverage90 = covered(row, 0.9);
     // Twins, which may lower a gain, are in the run's own figures alone.
     const own = [...FIGURES, "gain_drawn", "gain_tests", "better_share", "worse_share", "better_than", "worse_than"];
     return grid.whole && given ? { ...row, ...Object.fromEntries(own.map((name) => [name, given[name]])) } : row;
   }
-  // Return the mean over the modes of every structure, then over structures; null without any.
-  function overStructure(forecasts, total) {
-    const own = d3.rollups(forecasts, (all) => d3.sum(all, total) / d3.sum(all, ({ modes }) => modes), ({ c }) => structureOf(c));
-    return own.length ? d3.mean(own, ([, value]) => value) : null;
-  }
-  // Return the share of unseen modes in the central interval of a level that a strategy states.
+  // Return the share of unseen modes in the central interval of a level that a strategy states, of
+  // every job, then means over structures.
   function covered(row, level) {
-    return overStructure(row.stated, ({ levels }) => levels.filter((reached) => reached <= level).length);
+    const inside = (all) => d3.mean(all, ({ levels }) => d3.mean(levels, (reached) => Number(reached <= level)));
+    return mean(d3.rollups(row.stated, inside, ({ c }) => structureOf(c)).map(([, value]) => value));
   }
   // Return the median over cases of the median over seeds.
   function middle(results, value) {

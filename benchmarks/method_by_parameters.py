@@ -1,0 +1,150 @@
+"""How much of a gain is the method, and how much are the parameters that it fits.
+
+python benchmarks/method_by_parameters.py --store DIR    # docs/data/method-by-parameters.csv
+python benchmarks/method_by_parameters.py    # of that table: docs/figures and docs/strategies.md
+
+Every method fits every set of changes on the same structures: the first 20 of the suite by name
+that have members, joints and sections with factors. A job without a possible model has the gain of
+the model that was given, 0, so that the layout is balanced.
+"""
+
+from __future__ import annotations
+
+import argparse
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from boards import put
+from tabulate import tabulate
+
+import femubench
+from femubench import NotApplicable, plot
+from femubench.fem import FloatArray
+from femubench.plot import Axis, Chart
+from femubench.results import rank_results
+from femubench.update import ParametricStrategy, element_sets
+
+ROOT = Path(__file__).parents[1]
+DATA = ROOT / "docs" / "data" / "method-by-parameters.csv"
+# Those whose unknowns are the factors of a list of changes and nothing else, or a prior on them.
+METHODS = ("bayesian", "cross-model", "eigensensitivity", "global")
+METHODS += ("multi-start", "physical", "sparse", "strain-energy")
+SETS, FACTORS = ("own", "members", "joints", "sections"), ("structure", "method", "parameters")
+COUNT, RESAMPLES = 20, 1999
+
+
+def structures() -> list[str]:
+    """Return the structures on which every set of changes exists."""
+    found = []
+    for name in sorted(n for n in femubench.cases if n.startswith("suite/")):
+        try:
+            for word in SETS[1:]:
+                element_sets(femubench.cases[name].model.frame_structure, word)
+        except NotApplicable:
+            continue
+        found.append(name)
+    return found[:COUNT]
+
+
+def run(store: str) -> pd.DataFrame:
+    """Run every method with every set, and return a row a job."""
+    # What the baselines of a list of changes have by themselves are the members.
+    alike = [n for n in METHODS if isinstance(femubench.strategies[n].base, ParametricStrategy)]
+    pairs = [(method, name) for name in SETS for method in METHODS]
+    words = [f"{m}:changes={name}" for m, name in pairs if name != "own" or m not in alike]
+    options = femubench.RunOptions(nominal="textbook", resume=True)
+    found = femubench.rank(structures(), words, options, jobs=1, store=store)
+    rows = [
+        {
+            "structure": result.case,
+            "method": result.strategy.partition(":")[0],
+            "parameters": result.strategy.partition("changes=")[2] or "own",
+            "gain": round(result.gain or 0.0, 6),
+            "status": "unphysical" if result.unphysical else result.status,
+        }
+        for result in rank_results(found.results, found.meta)
+    ]
+    table = pd.DataFrame(rows)
+    twice = table[table["method"].isin(alike) & (table["parameters"] == "members")]
+    table = pd.concat([table, twice.assign(parameters="own")])
+    return table.sort_values(list(FACTORS), ignore_index=True)
+
+
+def analyse(gains: FloatArray) -> dict[str, tuple[int, float]]:
+    """Return degrees of freedom and sum of squares of every source of a balanced layout.
+
+    Structures are blocks. What is left is the interaction of all three factors.
+
+    Arguments:
+        gains: by structure, method and set.
+
+    Source: Montgomery (2017), Design and Analysis of Experiments, chapter 5.
+    """
+    parts: dict[tuple[int, ...], FloatArray] = {(): np.full((1, 1, 1), gains.mean())}
+    found = {}
+    for axes in (axes for size in (1, 2, 3) for axes in combinations(range(3), size)):
+        others = tuple(axis for axis in range(3) if axis not in axes)
+        below = [part for key, part in parts.items() if set(key) < set(axes)]
+        parts[axes] = gains.mean(axis=others, keepdims=True) - sum(below)
+        squares = np.broadcast_to(np.square(parts[axes]), gains.shape).sum()
+        freedom = int(np.prod([gains.shape[axis] - 1 for axis in axes]))
+        name = " x ".join(FACTORS[axis] for axis in axes) if others else "remainder"
+        found[name] = freedom, float(squares)
+    return found
+
+
+def summarise(gains: FloatArray) -> pd.DataFrame:
+    """Return what every source has of the variance, with 95 % intervals over structures.
+
+    `eta2` is the part of the sum of squares; `omega2` that without what chance adds to it.
+    Structures that are drawn twice add to all parts but the remainder: the intervals are therefore
+    reflected about the estimate (basic bootstrap; Davison & Hinkley 1997, section 5.2).
+    """
+    freedom, squares = np.array(list(analyse(gains).values())).T
+    random, drawn = np.random.default_rng(0), []
+    for _ in range(RESAMPLES):
+        again = analyse(gains[random.integers(0, len(gains), len(gains))])
+        own = np.array([size for _, size in again.values()])
+        drawn.append(own / own.sum())
+    shares = squares / squares.sum()
+    low, high = 2.0 * shares - np.quantile(drawn, (0.975, 0.025), axis=0)
+    error = squares[-1] / freedom[-1]
+    omega = (squares - freedom * error) / (squares.sum() + error)
+    omega[-1] = np.nan
+    return pd.DataFrame(
+        {"source": list(analyse(gains)), "df": freedom.astype(int),
+         "eta2": shares, "low": low.clip(0.0), "high": high, "omega2": omega}
+    )  # fmt: skip
+
+
+def draw(gains: FloatArray) -> str:
+    """Return the mean gains by method and set as SVG."""
+    title, values = "Mean gain by method and set of changes", gains.mean(axis=0).tolist()
+    x, y = Axis("set of changes", names=SETS), Axis("method", names=METHODS)
+    value = Axis("gain over the textbook model")
+    chart = Chart("cells", title, x, y, values=tuple(map(tuple, values)), value=value)
+    said = f"Means over {len(gains)} structures of the suite; 0 is the textbook model."
+    return plot.svg(lambda ax: chart.draw(ax), name="method", title=title, caption=said)
+
+
+def main() -> None:
+    """Run, or analyse and print what was run."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--store", help="run, and keep the results there")
+    if store := parser.parse_args().store:
+        run(store).to_csv(DATA, index=False, lineterminator="\n")
+    gains = pd.read_csv(DATA).set_index(list(FACTORS))["gain"].unstack(["method", "parameters"])
+    cells = gains[[(m, name) for m in METHODS for name in SETS]].to_numpy()
+    cells = cells.reshape(-1, len(METHODS), len(SETS))
+    table = summarise(cells).astype({"df": str})
+    text = tabulate(table, [*table], "github", ".3f", missingval="", showindex=False)
+    put("method-by-parameters", text, ROOT / "docs" / "strategies.md")
+    file = ROOT / "docs" / "figures" / "method-by-parameters.svg"
+    file.write_text(draw(cells) + "\n", encoding="utf-8")
+    print(text, pd.DataFrame(cells.mean(axis=0), METHODS, SETS).round(3), sep="\n\n")
+
+
+if __name__ == "__main__":
+    main()
