@@ -11,6 +11,7 @@ the model that was given, 0, so that the layout is balanced.
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
 from itertools import combinations
 from pathlib import Path
 
@@ -28,6 +29,7 @@ from femubench.update import ParametricStrategy, element_sets
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data" / "method-by-parameters.csv"
+FIGURE = ROOT / "docs" / "figures" / "method-by-parameters.svg"
 # Those whose unknowns are the factors of a list of changes and nothing else, or a prior on them.
 METHODS = ("bayesian", "cross-model", "eigensensitivity", "global")
 METHODS += ("multi-start", "physical", "sparse", "strain-energy")
@@ -39,12 +41,9 @@ def structures() -> list[str]:
     """Return the structures on which every set of changes exists."""
     found = []
     for name in sorted(n for n in femubench.cases if n.startswith("suite/")):
-        try:
-            for word in SETS[1:]:
-                element_sets(femubench.cases[name].model.frame_structure, word)
-        except NotApplicable:
-            continue
-        found.append(name)
+        with suppress(NotApplicable):
+            frame = femubench.cases[name].model.frame_structure
+            found += [name] * all(element_sets(frame, word) for word in SETS[1:])
     return found[:COUNT]
 
 
@@ -72,10 +71,15 @@ def run(store: str) -> pd.DataFrame:
     return table.sort_values(list(FACTORS), ignore_index=True)
 
 
-def analyse(gains: FloatArray) -> dict[str, tuple[int, float]]:
-    """Return degrees of freedom and sum of squares of every source of a balanced layout.
+def read_gains() -> FloatArray:
+    """Return the gains that are kept, by structure, method and set."""
+    gains = pd.read_csv(DATA).set_index(list(FACTORS))["gain"].unstack(["method", "parameters"])
+    cells = gains[[(method, name) for method in METHODS for name in SETS]].to_numpy()
+    return cells.reshape(-1, len(METHODS), len(SETS))
 
-    Structures are blocks. What is left is the interaction of all three factors.
+
+def analyse(gains: FloatArray) -> dict[str, tuple[int, float]]:
+    """Return degrees of freedom and squares of every source of a balanced layout of blocks.
 
     Arguments:
         gains: by structure, method and set.
@@ -103,12 +107,10 @@ def summarise(gains: FloatArray) -> pd.DataFrame:
     reflected about the estimate (basic bootstrap; Davison & Hinkley 1997, section 5.2).
     """
     freedom, squares = np.array(list(analyse(gains).values())).T
-    random, drawn = np.random.default_rng(0), []
-    for _ in range(RESAMPLES):
-        again = analyse(gains[random.integers(0, len(gains), len(gains))])
-        own = np.array([size for _, size in again.values()])
-        drawn.append(own / own.sum())
+    random = np.random.default_rng(0).integers(0, len(gains), (RESAMPLES, len(gains)))
+    drawn = np.array([[size for _, size in analyse(gains[own]).values()] for own in random])
     shares = squares / squares.sum()
+    drawn /= drawn.sum(axis=1, keepdims=True)
     low, high = 2.0 * shares - np.quantile(drawn, (0.975, 0.025), axis=0)
     error = squares[-1] / freedom[-1]
     omega = (squares - freedom * error) / (squares.sum() + error)
@@ -131,18 +133,15 @@ def draw(gains: FloatArray) -> str:
 
 def main() -> None:
     """Run, or analyse and print what was run."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser = argparse.ArgumentParser()
     parser.add_argument("--store", help="run, and keep the results there")
     if store := parser.parse_args().store:
         run(store).to_csv(DATA, index=False, lineterminator="\n")
-    gains = pd.read_csv(DATA).set_index(list(FACTORS))["gain"].unstack(["method", "parameters"])
-    cells = gains[[(m, name) for m in METHODS for name in SETS]].to_numpy()
-    cells = cells.reshape(-1, len(METHODS), len(SETS))
-    table = summarise(cells).astype({"df": str})
-    text = tabulate(table, [*table], "github", ".3f", missingval="", showindex=False)
+    cells = read_gains()
+    table = summarise(cells).astype(object)
+    text = tabulate(table.where(table.notna(), ""), "keys", "github", ".3f", showindex=False)
     put("method-by-parameters", text, ROOT / "docs" / "strategies.md")
-    file = ROOT / "docs" / "figures" / "method-by-parameters.svg"
-    file.write_text(draw(cells) + "\n", encoding="utf-8")
+    FIGURE.write_text(draw(cells) + "\n", encoding="utf-8")
     print(text, pd.DataFrame(cells.mean(axis=0), METHODS, SETS).round(3), sep="\n\n")
 
 

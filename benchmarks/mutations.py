@@ -99,7 +99,7 @@ core/score/bounded_gain.py :: bounded_gain
     & ~taken => & True
     c.weight >= rule.visible => c.weight >= 0.0
 core/score/predictive.py :: uncertainty
-    ANYTHING = 0.01 => ANYTHING = 0.1
+    np.delete(units, k, axis=0) => units
     2.0 * density - 1.0 / np.sqrt(np.pi) => 2.0 * density - 1.0 / np.pi
 core/score/twin_gain.py :: twins
     frozenset({"timeout", "crashed"}) => frozenset({"crashed"})

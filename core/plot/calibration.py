@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,23 +42,21 @@ def calibration(run: Run, *, ax: Axes | None = None) -> Axes:
     """
     check_kind(run, (Run,), "strategies")
     structures = structures_of(run)
-    reached: dict[str, dict[str, list[FloatArray]]] = {}
+    reached: dict[str, dict[str, list[FloatArray]]] = defaultdict(lambda: defaultdict(list))
     for result in (result for result in run.ranked if result.status == "ok"):
         found = Forecasts.of(MeasuredModes.of(result.blocks, Rule()), result.blocks)
         if found.stated:
-            own = reached.setdefault(result.strategy, {})
-            own.setdefault(structures.get(result.case, result.case), []).append(
-                (found.level(found.std)[:, None] <= _LEVELS).mean(axis=0)
-            )
+            own = (found.level(found.std)[:, None] <= _LEVELS).mean(axis=0)
+            reached[result.strategy][structures.get(result.case, result.case)].append(own)
     if not reached:
         raise InputError(
             "no strategy of the run says how sure it is", expected="results with an uncertainty"
         )
     ax = own_axes(ax, (5.4, 5.0))
     ax.plot([0.0, 1.0], [0.0, 1.0], color=SOFT, linewidth=0.8, label="calibrated")
-    curves = [(name, np.mean([np.mean(u, axis=0) for u in own.values()], axis=0))
-              for name, own in reached.items()]  # fmt: skip
-    draw_curves(ax, [(name_of(name), "predicted", _LEVELS, share) for name, share in curves])
+    means = {n: [np.mean(one, axis=0) for one in own.values()] for n, own in reached.items()}
+    curves = [(name_of(n), "predicted", _LEVELS, np.mean(m, axis=0)) for n, m in means.items()]
+    draw_curves(ax, curves)
     ax.set(xlabel="level of the interval", ylabel="share of unseen modes in it", ylim=(-0.02, 1.02))
     ax.legend(fontsize=8.5)
     return ax

@@ -61,7 +61,8 @@ class Forecasts:
             modes: that were measured of the case.
             blocks: what the model predicts.
         """
-        rows, owners, bands = [], [], []
+        rows: list[tuple[float, ...]] = []
+        bands: list[int] = []
         for name, mode in ((n, m) for n in UNSEEN if n in blocks for m in blocks[n].modes):
             hz, own = mode.predicted_hz or 0.0, [_LOST]
             if hz > 0.0:
@@ -70,11 +71,11 @@ class Forecasts:
                 pairs = [(hz, 1.0), *((c.hz, c.weight) for c in modes.candidates_of(mode))]
                 total = sum(weight for _, weight in pairs)
                 own = [(math.log(f / mode.measured_hz), std, w / total) for f, w in pairs]
-            owners += [len(bands)] * len(own)
+            rows += [(*row, len(bands)) for row in own]
             bands.append(int(modes.band_of(name, mode) == "band"))
-            rows += own
-        columns = np.array(rows, dtype=float).reshape(-1, 3).T
-        return cls(*columns, np.array(owners, int), np.array(bands, int), modes.rule.cap)
+        errors, stds, weights, places = np.array(rows, dtype=float).reshape(-1, 4).T
+        band = np.array(bands, dtype=int)
+        return cls(errors, stds, weights, places.astype(int), band, modes.rule.cap)
 
     @property
     def stated(self) -> bool:
@@ -90,7 +91,8 @@ class Forecasts:
             std: of the forecasts, (n,).
         """
         first = np.flatnonzero(np.diff(self.mode, prepend=-1))
-        return np.nan_to_num(2.0 * ndtr(np.abs(self.error[first]) / std[first]) - 1.0, nan=2.0)
+        reached = 2.0 * ndtr(np.abs(self.error[first]) / std[first]) - 1.0
+        return np.asarray(np.nan_to_num(reached, nan=2.0))
 
     def figures(self, common: FloatArray) -> FloatArray:
         """Return by band mean CRPS and share in the 90 % intervals, nan where unknown, (2, 2).
@@ -173,8 +175,8 @@ class PredictiveBoard:
                 row[f"{band}_low"], row[f"{band}_high"] = ends
             rows.append(row)
         rows.sort(key=lambda row: (-np.nan_to_num(row["above_skill"], nan=-2.0), row["strategy"]))
-        ends = zip(*(100.0 * np.array([common.min(axis=0), common.max(axis=0)])), strict=True)
-        return cls(tuple(rows), dict(zip(BANDS, ends, strict=True)))
+        least, most = (100.0 * common.min(axis=0)).tolist(), (100.0 * common.max(axis=0)).tolist()
+        return cls(tuple(rows), {band: (least[k], most[k]) for k, band in enumerate(BANDS)})
 
 
 def learn_deviations(table: GainTable, textbook: Mapping[str, Forecasts]) -> FloatArray:
