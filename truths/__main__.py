@@ -1,4 +1,4 @@
-"""Make the truths again: ``python -m truths [NAME ...] [--only suite|defects|faults]``.
+"""Make the truths again: ``python -m truths [NAME ...] [--only suite|stretches|defects|faults]``.
 
 Structures that have not changed since the last run are left out, so that a run goes on where it
 was cut.
@@ -17,7 +17,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 STATE = HERE.parent / "build" / "truths.json"
 NEEDED = {"gmsh": "gmsh", "skfem": "scikit-fem", "matplotlib": "matplotlib"}
-STEPS = ("suite", "defects", "faults")
+STEPS = ("suite", "stretches", "defects", "faults")
 # What a solid's figures follow from, in addition to the structure's own file.
 SOLVER = (
     "bricks",
@@ -32,6 +32,7 @@ SOLVER = (
 
 
 DEFECTS = ("defects", "defect_cases", "prestress")  # what those of a defect follow from as well
+STRETCHES = ("affine", "remade", "reduction", "stretch", "stretch_file")  # and what twins have
 
 
 def digest(name: str, *more: str) -> str:
@@ -102,6 +103,33 @@ def make_suite(names: list[str], again: bool) -> bool:
     return sound
 
 
+def make_stretches(names: list[str], again: bool) -> bool:
+    """Write the files that twins have their truth from; tell whether all could be made."""
+    from truths.stretch_file import FILE, write, write_table
+    from truths.suite import SUITE, structures
+
+    sound, known = True, structures()
+    for name in names or known:
+        what, file = digest(name, *STRETCHES), SUITE / name / FILE
+        if not (again or names) and made_before().get(f"{name} stretched") == what:
+            continue
+        began = time.perf_counter()
+        try:
+            found = write(known[name], file.parent)
+        except ValueError as fault:
+            print(f"{fault}", file=sys.stderr)
+            sound = False
+            continue
+        print(
+            f"{name}: {time.perf_counter() - began:.0f} s, {file.stat().st_size / 1024:.0f} KiB, "
+            f"frequencies within {100 * found.error:.4f} %, MAC from {found.alike:.5f}",
+            flush=True,
+        )
+        note(f"{name} stretched", what)
+    write_table()
+    return sound
+
+
 def main() -> int:
     """Run the steps that are asked for; return the exit status."""
     parser = argparse.ArgumentParser(prog="python -m truths", description=__doc__)
@@ -123,6 +151,8 @@ def main() -> int:
     sound = True
     if options.only in (None, "suite"):
         sound = make_suite(options.names, options.again)
+    if options.only in (None, "stretches"):
+        sound = make_stretches(options.names, options.again) and sound
     if options.only in (None, "defects"):
         sound = make_defects(options.names, options.again) and sound
     if options.only in (None, "faults") and not options.names:
