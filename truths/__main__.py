@@ -12,7 +12,12 @@ import importlib.util
 import json
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from truths.structure import Structure
 
 HERE = Path(__file__).parent
 STATE = HERE.parent / "build" / "truths.json"
@@ -75,27 +80,41 @@ def make_defects(names: list[str], again: bool) -> bool:
     return sound
 
 
+def make_each(
+    names: list[str],
+    again: bool,
+    write: Callable[[Structure, Path], list[str]],
+    kind: str = "",
+    more: tuple[str, ...] = (),
+) -> bool:
+    """Write a kind of files of each structure, of more modules; tell whether all were made."""
+    from truths.suite import SUITE, structures
+
+    known, sound = structures(), True
+    for number, name in enumerate(names or known, 1):
+        what = digest(name, *more)
+        if not (again or names) and made_before().get(name + kind) == what:
+            continue
+        began = time.perf_counter()
+        try:
+            said = write(known[name], SUITE)
+        except ValueError as error:
+            print(f"{name}{kind}: {error}", file=sys.stderr)
+            sound = False
+            continue
+        seconds = time.perf_counter() - began
+        print(f"{number}/{len(names or known)} {name}{kind}: {seconds:.0f} s", file=sys.stderr)
+        print("\n".join(said) or f"{name}{kind}: as it was", flush=True)
+        note(name + kind, what)
+    return sound
+
+
 def make_suite(names: list[str], again: bool) -> bool:
     """Write the folders of the structures; tell whether all could be made."""
     from truths.published import write_garteur
     from truths.suite import SUITE, index_text, structures, write
 
-    known = structures()
-    sound = True
-    for number, name in enumerate(names or known, 1):
-        if not again and not names and made_before().get(name) == digest(name):
-            continue
-        began = time.perf_counter()
-        try:
-            differences = write(known[name], SUITE)
-        except ValueError as error:
-            print(f"{name}: {error}", file=sys.stderr)
-            sound = False
-            continue
-        seconds = time.perf_counter() - began
-        print(f"{number}/{len(names or known)} {name}: {seconds:.0f} s", file=sys.stderr)
-        print("\n".join(differences) or f"{name}: as it was", flush=True)
-        note(name, digest(name))
+    sound, known = make_each(names, again, write), structures()
     made = {name: item for name, item in known.items() if (SUITE / name).is_dir()}
     (SUITE / "suite.toml").write_text(index_text(made), encoding="utf-8")
     if "garteur" in (names or known):
@@ -105,27 +124,9 @@ def make_suite(names: list[str], again: bool) -> bool:
 
 def make_stretches(names: list[str], again: bool) -> bool:
     """Write the files that twins have their truth from; tell whether all could be made."""
-    from truths.stretch_file import FILE, write, write_table
-    from truths.suite import SUITE, structures
+    from truths.stretch_file import write, write_table
 
-    sound, known = True, structures()
-    for name in names or known:
-        what, file = digest(name, *STRETCHES), SUITE / name / FILE
-        if not (again or names) and made_before().get(f"{name} stretched") == what:
-            continue
-        began = time.perf_counter()
-        try:
-            found = write(known[name], file.parent)
-        except ValueError as fault:
-            print(f"{fault}", file=sys.stderr)
-            sound = False
-            continue
-        print(
-            f"{name}: {time.perf_counter() - began:.0f} s, {file.stat().st_size / 1024:.0f} KiB, "
-            f"frequencies within {100 * found.error:.4f} %, MAC from {found.alike:.5f}",
-            flush=True,
-        )
-        note(f"{name} stretched", what)
+    sound = make_each(names, again, write, " stretched", STRETCHES)
     write_table()
     return sound
 

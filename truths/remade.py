@@ -21,15 +21,6 @@ from truths.structure import Structure
 Array = npt.NDArray[np.float64]
 
 
-def kinds_of(structure: Structure) -> dict[str, int]:
-    """Return the kind of each member that the solid has: by section, of one section by member."""
-    made = structure.solid_members
-    several = len({member.section for member in made}) > 1
-    keys = [member.section if several else member.name for member in made]
-    order = list(dict.fromkeys(keys))
-    return {m.name: order.index(key) % LENGTHS for m, key in zip(made, keys, strict=True)}
-
-
 @dataclass(frozen=True)
 class RemadeSolid:
     """A mesh of which mass and stiffness are known for other materials of its members.
@@ -46,8 +37,12 @@ class RemadeSolid:
 
     @cached_property
     def kinds(self) -> dict[str, int]:
-        """Return the kind of material of each member."""
-        return kinds_of(self.structure)
+        """Return the kind of each member that the solid has: by section, of one by member."""
+        made = self.structure.solid_members
+        several = len({member.section for member in made}) > 1
+        keys = [member.section if several else member.name for member in made]
+        order = list(dict.fromkeys(keys))
+        return {m.name: order.index(key) % LENGTHS for m, key in zip(made, keys, strict=True)}
 
     @cached_property
     def stretch(self) -> Stretch:

@@ -6,7 +6,7 @@ Each file is checked against a solid that was solved in full at a stretch it was
 from __future__ import annotations
 
 import io
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +19,7 @@ from truths.affine import Power, StretchedSolid
 from truths.eigenmodes import RIGID
 from truths.measurement import mac
 from truths.modes_of import Observed, mesh_of, modes_of
-from truths.reduction import (
-    KnownSolid,
-    basis_of,
-    drawn_factors,
-    seat_of,
-    snapshots,
-    stretched,
-)
+from truths.reduction import KnownSolid, basis_of, drawn_factors, seat_of, snapshots, stretched
 from truths.remade import RemadeSolid
 from truths.seats import DIRECTIONS
 from truths.stretch import sizes, stretch_of
@@ -35,7 +28,7 @@ from truths.suite import SUITE
 
 Array = npt.NDArray[np.float64]
 States = tuple[Change | None, ...]  # as built, and after changes
-Solved = list[tuple[Array, list[Observed]]]  # factors, and the states of the structure at them
+Solved = tuple[Array, list[Observed]]  # factors, and the states of the structure at them
 
 MOST_CORNERS = 2000  # of the finer mesh; of larger solids the coarser one is taken
 SAMPLES, MOST_SAMPLES = 4, 16  # stretches that snapshots are taken of, more until near enough
@@ -73,7 +66,7 @@ def file_of(structure: Structure, solid: KnownSolid, shapes: Array) -> dict[str,
     each, a sum over the factors. `members`, `materials`: factors of modulus and density of each
     that may be of another material. `sensors`: seat and direction. `lumps`, `springs`: state, seat,
     then mass in kg and offset in m, or direction and stiffness. `seat_...`: as `Seat` has them,
-    filled up with 0. `error`, `alike`: what `Distance` says, added when it is known.
+    filled up with 0. `error`, `alike`: what `distance` says, added when it is known.
     """
     stretch, upper = solid.stretch, np.triu_indices(shapes.shape[1])
     found: dict[str, Any] = {"names": np.array(stretch.names), "ranges": stretch.ranges}
@@ -160,45 +153,29 @@ def _filled(parts: tuple[Any, ...]) -> npt.NDArray[Any]:
     return found
 
 
-@dataclass(frozen=True)
-class Distance:
-    """How far a file is off at stretches it was not made from.
-
-    Arguments:
-        error: largest relative error of a listed frequency, as built and after each change.
-        alike: lowest MAC at the sensors.
-    """
-
-    error: float
-    alike: float
-
-
 def held_out(structure: Structure, solid: KnownSolid, seed: int, states: States) -> Solved:
     """Return factors and what the solid in full says at them in some states."""
-    count, found = structure.used + structure.held_out, []
-    for factors in drawn_factors(solid, 1, seed):
-        here, matrices = stretched(structure, solid, factors), solid.matrices(factors)
-        # Of a planar structure as many modes as are wanted may lie among those across its plane.
-        full = [modes_of(here, matrices, count + MORE, state) for state in states]
-        if min(len(state.frequencies) for state in full) < count:
-            raise ValueError(f"{structure.name}: fewer than {count} modes of a stretch were found")
-        found.append((factors, full))
-    return found
+    count, (factors,) = structure.used + structure.held_out, drawn_factors(solid, 1, seed)
+    here, matrices = stretched(structure, solid, factors), solid.matrices(factors)
+    # Of a planar structure as many modes as are wanted may lie among those across its plane.
+    full = [modes_of(here, matrices, count + MORE, state) for state in states]
+    if min(len(state.frequencies) for state in full) < count:
+        raise ValueError(f"{structure.name}: fewer than {count} modes of a stretch were found")
+    return factors, full
 
 
-def distance(solved: Solved, reduced: ReducedSolid, count: int) -> Distance:
-    """Return how far a file is off the first modes of solids in full."""
+def distance(solved: Solved, reduced: ReducedSolid, count: int) -> tuple[float, float]:
+    """Return the largest relative error of the first frequencies, and the lowest MAC at sensors."""
     errors, alike = [], []
-    for factors, states in solved:
-        for number, full in enumerate(states):
-            hertz, shapes = reduced.modes(factors, number, count)
-            errors.append(np.abs(hertz / full.frequencies[:count] - 1).max())
-            alike.append(mac(full.sensors[:count], shapes.T).diagonal().min())
-    return Distance(float(max(errors)), float(min(alike)))
+    for number, full in enumerate(solved[1]):
+        hertz, shapes = reduced.modes(solved[0], number, count)
+        errors.append(np.abs(hertz / full.frequencies[:count] - 1).max())
+        alike.append(mac(full.sensors[:count], shapes.T).diagonal().min())
+    return float(max(errors)), float(min(alike))
 
 
-def write(structure: Structure, folder: Path) -> Distance:
-    """Write the file of a structure into its folder, and return how far it is off.
+def write(structure: Structure, folder: Path) -> list[str]:
+    """Write the file of a structure into its folder in the suite, and return how far it is off.
 
     Raises:
         ValueError: where it is off by more than 0.05 % or a MAC is below 0.999; nothing is written.
@@ -210,20 +187,23 @@ def write(structure: Structure, folder: Path) -> Distance:
         taken += [snapshots(structure, solid, f) for f in drawn[len(taken) :][:SAMPLES]]
         for size in SIZES:
             arrays = file_of(structure, solid, basis_of(structure, solid, np.hstack(taken), size))
-            near = distance(chosen_by, ReducedSolid(arrays), count).error <= WANTED_ERROR
+            near = distance(chosen_by, ReducedSolid(arrays), count)[0] <= WANTED_ERROR
             if near:
                 break
     checked_by = held_out(structure, solid, HELD_OUT_SEED, (None, *structure.changes))
-    found = distance(checked_by, ReducedSolid(arrays), count)
-    if found.error > LARGEST_ERROR or found.alike < LEAST_MAC:
+    error, alike = distance(checked_by, ReducedSolid(arrays), count)
+    if error > LARGEST_ERROR or alike < LEAST_MAC:
         raise ValueError(
-            f"{structure.name}: {100 * found.error:.3f} % and MAC {found.alike:.4f} from solids "
+            f"{structure.name}: {100 * error:.3f} % and MAC {alike:.4f} from solids "
             f"in full, at most 0.05 % and at least 0.999 expected"
         )
     content = io.BytesIO()
-    np.savez_compressed(content, **arrays, error=found.error, alike=found.alike)
-    (folder / FILE).write_bytes(content.getvalue())
-    return found
+    np.savez_compressed(content, **arrays, error=error, alike=alike)
+    (folder / structure.name / FILE).write_bytes(content.getvalue())
+    return [
+        f"{structure.name}/{FILE}: {len(content.getvalue()) / 1024:.0f} KiB, frequencies within "
+        f"{100 * error:.4f} %, MAC from {alike:.5f}"
+    ]
 
 
 def write_table(page: Path = PAGE) -> None:
