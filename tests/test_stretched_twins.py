@@ -149,7 +149,7 @@ def test_there_are_files_and_they_stay_small() -> None:
     assert len(FILES) >= 2
     assert sum(file.stat().st_size for file in FILES) <= LARGEST
     for arrays in (ReducedSolid.read(file).arrays for file in FILES):
-        assert (float(arrays["error"]) <= 5e-4, float(arrays["alike"]) >= 0.999) == (True, True)
+        assert (float(arrays["error"]) <= 1e-3, float(arrays["alike"]) >= 0.999) == (True, True)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -161,7 +161,7 @@ def test_unstretched_a_file_gives_what_was_published(name: str) -> None:
     # Of a large solid the coarser of its two meshes is kept.
     meshes = mesh_differences(name)
     off = np.abs(found.measurement.frequencies / hertz - 1)
-    assert (off <= 5e-4 + 1.01 * meshes).all()
+    assert (off <= 1e-3 + 1.01 * meshes).all()
     structure = structures()[name]
     noise = 5 * max(structure.scatter, 1e-4) + meshes.max()
     for own, known in zip(

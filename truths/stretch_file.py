@@ -33,9 +33,9 @@ Solved = tuple[Array, list[Observed]]  # factors, and the states of the structur
 MOST_CORNERS = 2000  # of the finer mesh; of larger solids the coarser one is taken
 SAMPLES, MOST_SAMPLES = 4, 16  # stretches that snapshots are taken of, more until near enough
 SIZES = (45, 60, 75, 90, 110)  # of the basis, rigid motions aside: the first that is near enough
-LARGEST_ERROR, LEAST_MAC = 5e-4, 0.999
+LARGEST_ERROR, LEAST_MAC = 1e-3, 0.999  # a third of the scatter of a test
 MORE = 6  # modes of solids in full next to those listed
-WANTED_ERROR = 2e-4  # at the stretches by which the size is chosen
+WANTED_ERROR = 4e-4  # at the stretches by which the size is chosen
 _CHOICE_SEED, HELD_OUT_SEED = 7, 99
 PAGE = Path(__file__).parents[1] / "docs" / "scoring.md"
 MARK, END = "<!-- stretched -->", "<!-- /stretched -->"
@@ -178,7 +178,7 @@ def write(structure: Structure, folder: Path) -> list[str]:
     """Write the file of a structure into its folder in the suite, and return how far it is off.
 
     Raises:
-        ValueError: where it is off by more than 0.05 % or a MAC is below 0.999; nothing is written.
+        ValueError: where it is off by more than 0.1 % or a MAC is below 0.999; nothing is written.
     """
     solid, count = solid_of(structure), structure.used + structure.held_out
     chosen_by = held_out(structure, solid, _CHOICE_SEED, (None,))
@@ -195,7 +195,7 @@ def write(structure: Structure, folder: Path) -> list[str]:
     if error > LARGEST_ERROR or alike < LEAST_MAC:
         raise ValueError(
             f"{structure.name}: {100 * error:.3f} % and MAC {alike:.4f} from solids "
-            f"in full, at most 0.05 % and at least 0.999 expected"
+            f"in full, at most 0.1 % and at least 0.999 expected"
         )
     content = io.BytesIO()
     np.savez_compressed(content, **arrays, error=error, alike=alike)
