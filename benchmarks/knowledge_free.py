@@ -291,13 +291,14 @@ def remember(words: Sequence[str]) -> pd.DataFrame:
     run = femubench.rank(
         names, [*able, "meet", "shifted"], nominal="textbook", twins=TWINS, timeout=None
     )
-    board, rows = leaderboard(run).set_index("strategy")["gain"], []
-    for name, found in twin_gains(run).items():
-        rows.append(
-            {"strategy": name, "structures": len(names), "on cases": found.original_gain,
-             "on twins": found.gain, "on the board": board[name], "p": found.p,
-             "known": len(found.known), "marked": found.suspicious}
-        )  # fmt: skip
+    board, kinds = leaderboard(run).set_index("strategy")["gain"], run.meta["twins"]["kinds"]
+    stretched = {run.meta["twins"]["of"][twin] for twin in kinds if "stretched" in kinds[twin]}
+    rows = [
+        {"strategy": name, "structures": len(names), "stretched": len(stretched),
+         "cases": found.original_gain, "twins": found.gain, "board": board[name],
+         "p": found.p, "known": len(found.known), "marked": found.suspicious}
+        for name, found in twin_gains(run).items()
+    ]  # fmt: skip
     return pd.DataFrame(rows).round(4)
 
 
@@ -345,7 +346,13 @@ def main() -> None:
     parser.add_argument("--memory", nargs="*", metavar="CASE", help="who knows cases by heart")
     words = parser.parse_args()
     if words.memory is not None:
-        table = remember(words.memory or ["suite"])
+        files = sorted(TABLE.parents[2].glob("scenarios/suite/*/stretch.npz"))
+        sets = (
+            [words.memory]
+            if words.memory
+            else [["suite"], [f"suite/{f.parent.name}" for f in files]]
+        )
+        table = pd.concat([remember(names) for names in sets])
         print(table.to_string(index=False))
         if not words.memory:
             table.to_csv(MEMORY, index=False, lineterminator="\n")
