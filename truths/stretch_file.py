@@ -182,7 +182,8 @@ def write(structure: Structure, folder: Path) -> list[str]:
     """
     solid, count = solid_of(structure), structure.used + structure.held_out
     chosen_by = held_out(structure, solid, _CHOICE_SEED, (None,))
-    drawn, taken, near = drawn_factors(solid, MOST_SAMPLES), [], False
+    drawn, near = drawn_factors(solid, MOST_SAMPLES), False
+    taken: list[Array] = []
     while not near and len(taken) < MOST_SAMPLES:
         taken += [snapshots(structure, solid, f) for f in drawn[len(taken) :][:SAMPLES]]
         for size in SIZES:
