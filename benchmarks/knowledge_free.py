@@ -347,12 +347,9 @@ def main() -> None:
     words = parser.parse_args()
     if words.memory is not None:
         files = sorted(TABLE.parents[2].glob("scenarios/suite/*/stretch.npz"))
-        sets = (
-            [words.memory]
-            if words.memory
-            else [["suite"], [f"suite/{f.parent.name}" for f in files]]
-        )
-        table = pd.concat([remember(names) for names in sets])
+        whole = [["suite"], [f"suite/{file.parent.name}" for file in files]]
+        asked = [words.memory] if words.memory else whole
+        table = pd.concat([remember(names) for names in asked])
         print(table.to_string(index=False))
         if not words.memory:
             table.to_csv(MEMORY, index=False, lineterminator="\n")
