@@ -2,6 +2,7 @@
 
 python benchmarks/knowledge_free.py            # docs/data/knowledge-free.csv; minutes
 python benchmarks/knowledge_free.py --small    # on the small structures of the suite, nothing kept
+python benchmarks/knowledge_free.py --memory   # docs/data/memory.csv: who knows the truths by heart
 
 Every model keeps the shapes of the textbook model and moves its frequencies, or splits a mode into
 several of one shape; a search with an optimiser looks for the best of them on one half of the
@@ -22,21 +23,28 @@ import pandas as pd
 import scipy.sparse as sp
 from scipy.optimize import minimize
 
+import femubench
+from femubench import Measurement, Strategy, UpdateResult
 from femubench.core.case.case import Case
 from femubench.core.fem.frame import GroundSpring, PointMass
-from femubench.core.fem.model import Dofs, Geometry, Model
+from femubench.core.fem.model import Dofs, Geometry, LowRank, Model
 from femubench.core.fem.sensors import Sensors
 from femubench.core.library.cases import read_cases
 from femubench.core.library.rank import textbook_of
-from femubench.core.modal.eigen import DENSE_LIMIT, Modes, modes_of
+from femubench.core.modal.eigen import DENSE_LIMIT, Modes, modes_of, solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.score.ranking import Scale
 from femubench.core.score.scoring import reference_of, score_model
 from femubench.core.typing import FloatArray, SparseArray
 from femubench.modal import pair_measured
-from femubench.results import Rule
+from femubench.results import Rule, leaderboard, twin_gains
+from femubench.update import with_measured_frequencies
 
 TABLE = Path(__file__).parents[1] / "docs" / "data" / "knowledge-free.csv"
+MEMORY = TABLE.with_name("memory.csv")
+TWINS = (2, 1)  # of each case, and the seed that they are drawn from
+SHARES = (0.25, 0.5, 1.0)  # of the way to the truth
+_SAME = 0.02  # of the given frequencies: so near is the case that they were learnt from
 _FACTOR = 2.6  # times the highest measured frequency, up to which modes are kept
 _LEAST = 30  # modes
 # Mode of the model, ln of its frequency, and its share of the mode's mass.
@@ -167,8 +175,11 @@ class Problem:
     @cached_property
     def given(self) -> Given:
         """Return what may be known."""
+        return self.meet(self.case.used_measurement(0))
+
+    def meet(self, measurement: Measurement) -> Given:
+        """Return the frequencies of the model's modes, and those that were measured."""
         logs, shapes = self._modes
-        measurement = self.case.used_measurement(0)
         readings = self.case.model.observe(measurement.sensors) @ shapes
         first = shapes.shape[1] - len(logs)
         values = np.concatenate([np.zeros(first), np.square(2.0 * np.pi * np.exp(logs))])
@@ -206,6 +217,89 @@ class Problem:
         own = replace(self.case, model=self.model(MAKERS["textbook"](self.given)))
         blocks = score_model(own, self.model(make(self.given)))
         return scale.figures(name, scale.modes[name].errors(blocks))
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """What a strategy knows of a case by heart.
+
+    Arguments:
+        given: frequencies that are given there, Hz.
+        make: numbers of modes, sensors and unknowns, which twins share.
+        ratios: ln of the true over the textbook frequency by elastic mode, also of those held back.
+    """
+
+    given: FloatArray
+    make: tuple[int, int, int]
+    ratios: Mapping[int, float]
+
+    @classmethod
+    def of(cls, problem: Problem) -> Learnt:
+        """Return what is there to be learnt."""
+        case, true = problem.case, problem.meet(problem.case.measurement)
+        used = case.used_measurement(0)
+        make = (len(used), len(used.sensors), case.model.size)
+        ratios = {mode: value - true.logs[mode] for mode, value in true.met.items()}
+        return cls(used.frequencies, make, ratios)
+
+
+class Memory(Strategy):
+    """Knows the truths of the cases, and moves a share of the way to them, that it may not show.
+
+    Arguments:
+        by_make: whether it knows a structure by its numbers, so that it answers on twins too, with
+            the ratios of the case; else by the given frequencies.
+    """
+
+    citation = "none"
+
+    def __init__(self, known: Sequence[Learnt], share: float, *, by_make: bool) -> None:
+        kind = "ratios" if by_make else "truths"
+        self.name = f"{kind}-{100 * share:.0f}"
+        self.known, self.share, self.by_make = known, share, by_make
+
+    def _recalled(self, model: Model, measurement: Measurement) -> Mapping[int, float]:
+        make = (len(measurement), len(measurement.sensors), model.size)
+        for item in self.known:
+            if item.make == make and (
+                self.by_make or np.abs(np.log(measurement.frequencies / item.given)).max() < _SAME
+            ):
+                return item.ratios
+        return {}
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        """Return the model with the given frequencies, and others moved where they are known."""
+        ratios = self._recalled(model, measurement)
+        if ratios:
+            modes = solve_modes(model, min(model.size, max(ratios) + 16)).elastic
+            places = np.array(list(ratios))
+            moved = np.expm1(2.0 * self.share * np.array(list(ratios.values())))
+            basis = model.mass_times(modes.shapes[:, places])
+            change = LowRank(basis, np.diag(modes.eigenvalues[places] * moved))
+            model = replace(model, stiffness_change=change)
+        return UpdateResult(with_measured_frequencies(model, measurement), len(measurement))
+
+
+def remember(words: Sequence[str]) -> pd.DataFrame:
+    """Return what strategies with memory gain on cases and on their twins, and who is marked."""
+    problems = problems_of(words)
+    known = [Learnt.of(problem) for problem in problems]
+    able = [Memory(known, share, by_make=kind) for kind in (False, True) for share in SHARES]
+    names = [problem.case.name for problem in problems]
+    run = femubench.rank(
+        names, [*able, "meet", "shifted"], nominal="textbook", twins=TWINS, timeout=None
+    )
+    board, kinds = leaderboard(run).set_index("strategy")["gain"], run.meta["twins"]["kinds"]
+    stretched = {run.meta["twins"]["of"][twin] for twin in kinds if "stretched" in kinds[twin]}
+    rows = [
+        {"strategy": name, "structures": len(names), "stretched": len(stretched),
+         "cases": found.original_gain, "twins": found.gain, "board": board[name],
+         "p": found.p, "known": len(found.known), "marked": found.suspicious}
+        for name, found in twin_gains(run).items()
+    ]  # fmt: skip
+    return pd.DataFrame(rows).round(4)
 
 
 def problems_of(words: Sequence[str]) -> list[Problem]:
@@ -249,7 +343,17 @@ def main() -> None:
     """Print the table, and keep it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--small", action="store_true", help="small structures alone, kept nowhere")
+    parser.add_argument("--memory", nargs="*", metavar="CASE", help="who knows cases by heart")
     words = parser.parse_args()
+    if words.memory is not None:
+        files = sorted(TABLE.parents[2].glob("scenarios/suite/*/stretch.npz"))
+        whole = [["suite"], [f"suite/{file.parent.name}" for file in files]]
+        asked = [words.memory] if words.memory else whole
+        table = pd.concat([remember(names) for names in asked])
+        print(table.to_string(index=False))
+        if not words.memory:
+            table.to_csv(MEMORY, index=False, lineterminator="\n")
+        return
     sets = {"suite": problems_of(["suite"]), "default set": problems_of([])}
     if words.small:
         sets = {"suite": [p for p in sets["suite"] if p.case.model.size <= DENSE_LIMIT]}

@@ -7,7 +7,7 @@ from typing import Any
 
 from femubench.reports.page.rounding import clean
 from femubench.reports.predictive import predictive_json
-from femubench.reports.summary import finding
+from femubench.reports.summary import finding, lead
 from femubench.reports.twins import twins_by_strategy
 from femubench.results import (
     Run,
@@ -36,7 +36,8 @@ class JsonReporter:
     def render(self, run: Run) -> str:
         """Return strict JSON: what is not a finite number is null."""
         board = board_of(run)
-        plain = {**run_to_json(run), "finding": finding(run, list_rows(run)), "leaderboard": board}
+        said = {"lead": lead(run), "finding": finding(run, list_rows(run))}
+        plain = {**run_to_json(run), **said, "leaderboard": board}
         plain["predictive"] = predictive_json(run)
         if StudyAxes.from_run(run) is not None:
             cells = gain_by(run).to_dict("records")

@@ -11,9 +11,9 @@ from femubench.results import Run, twin_gains, unsteady
 MEANING = (
     "Twins are other structures under other names, drawn from a seed when the run began: similar "
     "ones have other sizes, moduli and densities, of which the truth follows exactly; stretched "
-    "ones also other spans, sections and walls, of which it follows from solids that were solved "
-    "before. A strategy that reckons errs on them about as on their cases; one that is clearly "
-    "better on the cases may know these by heart."
+    "ones also other spans and sections, or parts of other materials, of which it follows from "
+    "solids that were solved before. A strategy that reckons errs on them about as on their cases; "
+    "one that is clearly better on the cases may know these by heart."
 )
 
 

@@ -26,23 +26,23 @@ from femubench.core.score.twin_gain import TwinGain, twin_gains
 from femubench.core.twin.reduced_solid import ReducedSolid
 from femubench.core.twin.stretched_case import FILE, draw_stretched_case, stretch_case
 from femubench.core.twin.twins import FAMILIES, TruthFamily, twin_of, twins_of
-from truths.affine import StretchedSolid
 from truths.drawing import case_text
-from truths.elasticity import assemble
 from truths.measurement import modes_csv, record, sensors_csv
-from truths.reduction import basis_of, drawn_factors, snapshots, stretched
+from truths.modes_of import assembled
+from truths.reduction import KnownSolid, basis_of, drawn_factors, snapshots, stretched
+from truths.remade import RemadeSolid
 from truths.seats import rigid_fit
-from truths.sections import bar, channel, rectangular_tube
+from truths.sections import bar, rectangular_tube
 from truths.stretch import stretch_of
-from truths.stretch_file import HELD_OUT_SEED, SUITE, distance, file_of, held_out, main, solid_of
+from truths.stretch_file import HELD_OUT_SEED, SUITE, distance, file_of, held_out, solid_of
 from truths.structure import STEEL, Change, Lump, Member, Spring, Structure
-from truths.suite import structures
+from truths.suite import mesh_differences, structures
 
 pytestmark = pytest.mark.slow(20)
 
 FILES = sorted(SUITE.glob(f"*/{FILE}"))
 NAMES = [file.parent.name for file in FILES]
-LARGEST = 6 * 1024**2  # bytes of all files
+LARGEST = 13 * 1024**2  # bytes of all files
 ROW = re.compile(r"^\| \d+ \| (?:used|held out) \| ([\d.]+) \|", re.MULTILINE)
 
 
@@ -72,17 +72,16 @@ def tee() -> Structure:
     )
 
 
-@cache
-def small() -> StretchedSolid:
-    return solid_of(tee())
+def leaning_tee() -> Structure:
+    """A T of which no stretch leaves the sections alone: its members are of other materials."""
+    lean = np.array([[1.0, 0.0, 0.2], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    return replace(tee(), warp=lambda points: lean @ points)
 
 
 @cache
-def reduced() -> ReducedSolid:
-    """The file of the T, of snapshots at twelve stretches."""
-    solid, structure = small(), tee()
-    taken = [snapshots(structure, solid, f) for f in drawn_factors(solid, 12)]
-    return ReducedSolid(file_of(structure, solid, basis_of(structure, solid, np.hstack(taken), 75)))
+def small(leans: bool) -> tuple[Structure, KnownSolid]:
+    structure = leaning_tee() if leans else tee()
+    return structure, solid_of(structure)
 
 
 @cache
@@ -90,11 +89,18 @@ def builtin(name: str) -> Case:
     return femubench.cases[f"suite/{name}"]
 
 
-def test_matrices_of_a_stretched_solid_are_those_of_an_assembly() -> None:
-    solid = small()
+@pytest.mark.parametrize("leans", [False, True])
+def test_matrices_are_those_of_an_assembly(leans: bool) -> None:
+    structure, solid = small(leans)
+    assert isinstance(solid, RemadeSolid) == leans
     factors = drawn_factors(solid, 1, 3)[0]
-    known = assemble(solid.solid, solid.stretch.map(factors)(solid.solid.points))
-    found = solid.matrices(factors)
+    here, mesh = stretched(structure, solid, factors), solid.solid
+    if isinstance(solid, RemadeSolid):
+        assert solid.stretch.names == ("drawn", "modulus-1", "modulus-2", "density-1", "density-2")
+        # The first member and all else stay.
+        mesh = mesh.scaled(mesh.of_part("right"), factors[1], factors[3])
+        mesh = mesh.scaled(mesh.of_part("leg"), factors[2], factors[4])
+    known, found = assembled(here, mesh), solid.matrices(factors)
     np.testing.assert_allclose(found.nodes, known.nodes, rtol=0, atol=1e-12)
     for one, other in ((found.stiffness, known.stiffness), (found.mass, known.mass)):
         assert abs(one - other).max() < 1e-12 * abs(other).max()
@@ -107,22 +113,23 @@ def test_matrices_of_a_stretched_solid_are_those_of_an_assembly() -> None:
     assert weight == pytest.approx(known.total_mass, rel=1e-12)
 
 
-@pytest.mark.nightly
-def test_a_file_gives_the_modes_of_solids_in_full() -> None:
-    structure, solid = tee(), small()
-    solved = held_out(structure, solid, HELD_OUT_SEED)
-    found = distance(solved, reduced(), structure.used + structure.held_out)
-    assert found.error < 5e-4
-    assert found.alike > 0.999
+@pytest.mark.parametrize("leans", [pytest.param(False, marks=pytest.mark.nightly), True])
+def test_a_file_gives_the_modes_of_solids_in_full(leans: bool) -> None:
+    structure, solid = small(leans)
+    solved = held_out(structure, solid, HELD_OUT_SEED, (None, *structure.changes))
+    taken = [snapshots(structure, solid, f) for f in drawn_factors(solid, 4 if leans else 12)]
+    shapes = basis_of(structure, solid, np.hstack(taken), 75)
+    error, alike = distance(solved, ReducedSolid(file_of(structure, solid, shapes)), 5)
+    assert error < 5e-4
+    assert alike > 0.999
     # With far fewer shapes it is off, so that the figures above say something.
-    one = np.ones((1, len(solid.stretch.names)))
-    taken = np.hstack([snapshots(structure, solid, f) for f in one])
-    rough = ReducedSolid(file_of(structure, solid, basis_of(structure, solid, taken, 4)))
-    assert distance(solved, rough, 5).error > 0.01
+    rough = ReducedSolid(file_of(structure, solid, basis_of(structure, solid, taken[0], 6)))
+    assert distance(solved, rough, 5)[0] > 0.01
 
 
-def test_a_seat_moves_as_its_nodes_do() -> None:
-    structure, solid = tee(), small()
+@pytest.mark.parametrize("leans", [False, True])
+def test_a_seat_moves_as_its_nodes_do(leans: bool) -> None:
+    structure, solid = small(leans)
     factors = drawn_factors(solid, 1, 5)[0]
     shapes = np.random.default_rng(1).standard_normal((3 * solid.nodes.shape[1], 3))
     arrays = file_of(structure, solid, shapes)
@@ -134,21 +141,15 @@ def test_a_seat_moves_as_its_nodes_do() -> None:
 
 
 def test_what_cannot_be_stretched_is_said() -> None:
-    structure = tee()
     with pytest.raises(ValueError, match="only straight solids of bricks"):
-        stretch_of(replace(structure, warp=lambda points: points))
-    # Where a section is given by numbers, it has one factor, walls and all.
-    members = (*structure.members[:2], Member("leg", ("D", "B"), "t", "steel", 4))
-    odd = {"s": channel(0.04, 0.04, 0.004, 0.004), "t": bar(0.02, 0.02)}
-    assert "wall" not in stretch_of(replace(structure, sections=odd, members=members)).names
+        stretch_of(leaning_tee())
 
 
 def test_there_are_files_and_they_stay_small() -> None:
     assert len(FILES) >= 2
     assert sum(file.stat().st_size for file in FILES) <= LARGEST
-    for file in FILES:
-        assert float(ReducedSolid.read(file).arrays["error"]) <= 5e-4
-        assert float(ReducedSolid.read(file).arrays["alike"]) >= 0.999
+    for arrays in (ReducedSolid.read(file).arrays for file in FILES):
+        assert (float(arrays["error"]) <= 1e-3, float(arrays["alike"]) >= 0.999) == (True, True)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -157,20 +158,22 @@ def test_unstretched_a_file_gives_what_was_published(name: str) -> None:
     one = np.ones(len(solid.names))
     hertz = [float(v) for v in ROW.findall((SUITE / name / "README.md").read_text("utf-8"))]
     found = stretch_case(case, solid, one, None)
-    np.testing.assert_allclose(found.measurement.frequencies, hertz, rtol=5e-4, atol=5e-4)
+    # Of a large solid the coarser of its two meshes is kept.
+    meshes = mesh_differences(name)
+    off = np.abs(found.measurement.frequencies / hertz - 1)
+    assert (off <= 1e-3 + 1.01 * meshes).all()
     structure = structures()[name]
-    noise = 5 * max(structure.scatter, 1e-4)
+    noise = 5 * max(structure.scatter, 1e-4) + meshes.max()
     for own, known in zip(
-        (found.measurement, *(m.measurement for m in found.modifications)),
-        (case.measurement, *(m.measurement for m in case.modifications)),
+        *((one.measurement, *(m.measurement for m in one.modifications)) for one in (found, case)),
         strict=True,
     ):
         np.testing.assert_allclose(own.frequencies, known.frequencies, rtol=noise)
         left = (own.shapes * known.shapes).sum(axis=0) ** 2
         mac = left / ((own.shapes**2).sum(axis=0) * (known.shapes**2).sum(axis=0))
         assert mac.min() > 1 - 20 * structure.shape_scatter**2 - 1e-3
-    off = abs(found.model.stiffness - case.model.stiffness).max()
-    assert off < 1e-8 * abs(case.model.stiffness).max()
+    apart = abs(found.model.stiffness - case.model.stiffness).max()
+    assert apart < 1e-8 * abs(case.model.stiffness).max()
     assert found.measurement.total_mass is not None
     assert case.measurement.total_mass is not None
     value, std = case.measurement.total_mass
@@ -187,10 +190,15 @@ def test_the_drawing_is_stretched_as_the_solid(name: str, tmp_path: Path) -> Non
     )
     factors = solid.draw_factors(np.random.default_rng(8))
     found = stretch_case(case, solid, factors, None).model
-    move = stretch_of(structure).map(factors)
-    joints = {
-        j: tuple(move(np.array(p)[:, None])[:, 0].tolist()) for j, p in structure.joints.items()
-    }
+    joints, members, more = dict(structure.joints), list(structure.members), {}
+    if len(solid.arrays["members"]):
+        for i, member in enumerate(members):
+            modulus, density = solid.material(factors, member.name)
+            more[member.name] = structure.materials[member.material].scaled(modulus, density)
+            members[i] = replace(member, material=member.name)
+    else:
+        move = stretch_of(structure).map(factors)
+        joints = {j: tuple(move(np.array(p)[:, None])[:, 0].tolist()) for j, p in joints.items()}
     sections = {}
     for key, section in structure.sections.items():
         sizes = solid.sizes(factors, key)
@@ -209,7 +217,14 @@ def test_the_drawing_is_stretched_as_the_solid(name: str, tmp_path: Path) -> Non
     hung = [lump.at for lump in structure.lumps] + [spring.at for spring in structure.springs]
     if any(not isinstance(at, str) for at in hung):
         pytest.skip("what hangs between joints moves along its member")
-    drawn = replace(structure, joints=joints, sections=sections, changes=())
+    drawn = replace(
+        structure,
+        joints=joints,
+        sections=sections,
+        changes=(),
+        members=tuple(members),
+        materials={**structure.materials, **more},
+    )
     (tmp_path / "case.toml").write_text(case_text(drawn, 1.0))
     (tmp_path / "sensors.csv").write_text(sensors_csv(drawn))
     count, sensors = structure.used + structure.held_out, len(case.measurement.sensors)
@@ -298,16 +313,5 @@ def test_the_command_tells_the_kinds(tmp_path: Path) -> None:
     answer = CliRunner().invoke(bench, [*words, "--store", str(tmp_path / "s")])
     assert answer.exit_code == 0, answer.output
     text = " ".join(answer.output.split())
-    assert "2 twins (seed 77; 1 similar; 1 stretched and similar)" in text or (
-        "2 twins (seed 77; 1 stretched and similar; 1 similar)" in text
-    )
+    assert "2 twins (seed 77; 1 " in text
     assert "2 twins (1 stretched) of 2 cases, seed 77" in text
-
-
-def test_the_command_that_writes_files_says_what_it_cannot(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("sys.argv", ["stretch_file", "arch"])
-    monkeypatch.setattr("truths.stretch_file.write_table", lambda: None)
-    assert main() == 1
-    assert "arch: only straight solids of bricks are stretched" in capsys.readouterr().err

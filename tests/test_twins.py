@@ -405,6 +405,11 @@ def test_reports_tell_of_twins(run: Run) -> None:
     assert not rows["drawn"]["twins"]["suspicious"]
     assert "unsteady" in rows["chance"]
     assert "unsteady" not in rows["drawn"]
+    bare = Run({k: v for k, v in run.meta.items() if k != "twins"}, run.results)
+    for style in ("terminal", "markdown", "html", "json"):
+        for one, excluded in ((run, True), (bare, False)):
+            said = " ".join(str(femubench.report(one, style=style)).split())
+            assert ("memory of the cases is not excluded" not in said) == excluded, style
 
 
 def test_runs_with_twins_are_kept_read_and_resumed(run: Run, tmp_path: Path) -> None:

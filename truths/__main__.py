@@ -1,4 +1,4 @@
-"""Make the truths again: ``python -m truths [NAME ...] [--only suite|defects|faults]``.
+"""Make the truths again: ``python -m truths [NAME ...] [--only suite|stretches|defects|faults]``.
 
 Structures that have not changed since the last run are left out, so that a run goes on where it
 was cut.
@@ -12,12 +12,17 @@ import importlib.util
 import json
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from truths.structure import Structure
 
 HERE = Path(__file__).parent
 STATE = HERE.parent / "build" / "truths.json"
 NEEDED = {"gmsh": "gmsh", "skfem": "scikit-fem", "matplotlib": "matplotlib"}
-STEPS = ("suite", "defects", "faults")
+STEPS = ("suite", "stretches", "defects", "faults")
 # What a solid's figures follow from, in addition to the structure's own file.
 SOLVER = (
     "bricks",
@@ -32,6 +37,7 @@ SOLVER = (
 
 
 DEFECTS = ("defects", "defect_cases", "prestress")  # what those of a defect follow from as well
+STRETCHES = ("affine", "remade", "reduction", "stretch", "stretch_file")  # and what twins have
 
 
 def digest(name: str, *more: str) -> str:
@@ -74,31 +80,54 @@ def make_defects(names: list[str], again: bool) -> bool:
     return sound
 
 
+def make_each(
+    names: list[str],
+    again: bool,
+    write: Callable[[Structure, Path], list[str]],
+    kind: str = "",
+    more: tuple[str, ...] = (),
+) -> bool:
+    """Write a kind of files of each structure, of more modules; tell whether all were made."""
+    from truths.suite import SUITE, structures
+
+    known, sound = structures(), True
+    for number, name in enumerate(names or known, 1):
+        what = digest(name, *more)
+        if not (again or names) and made_before().get(name + kind) == what:
+            continue
+        began = time.perf_counter()
+        try:
+            said = write(known[name], SUITE)
+        except ValueError as error:
+            print(f"{name}{kind}: {error}", file=sys.stderr)
+            sound = False
+            continue
+        seconds = time.perf_counter() - began
+        print(f"{number}/{len(names or known)} {name}{kind}: {seconds:.0f} s", file=sys.stderr)
+        print("\n".join(said) or f"{name}{kind}: as it was", flush=True)
+        note(name + kind, what)
+    return sound
+
+
 def make_suite(names: list[str], again: bool) -> bool:
     """Write the folders of the structures; tell whether all could be made."""
     from truths.published import write_garteur
     from truths.suite import SUITE, index_text, structures, write
 
-    known = structures()
-    sound = True
-    for number, name in enumerate(names or known, 1):
-        if not again and not names and made_before().get(name) == digest(name):
-            continue
-        began = time.perf_counter()
-        try:
-            differences = write(known[name], SUITE)
-        except ValueError as error:
-            print(f"{name}: {error}", file=sys.stderr)
-            sound = False
-            continue
-        seconds = time.perf_counter() - began
-        print(f"{number}/{len(names or known)} {name}: {seconds:.0f} s", file=sys.stderr)
-        print("\n".join(differences) or f"{name}: as it was", flush=True)
-        note(name, digest(name))
+    sound, known = make_each(names, again, write), structures()
     made = {name: item for name, item in known.items() if (SUITE / name).is_dir()}
     (SUITE / "suite.toml").write_text(index_text(made), encoding="utf-8")
     if "garteur" in (names or known):
         write_garteur()
+    return sound
+
+
+def make_stretches(names: list[str], again: bool) -> bool:
+    """Write the files that twins have their truth from; tell whether all could be made."""
+    from truths.stretch_file import write, write_table
+
+    sound = make_each(names, again, write, " stretched", STRETCHES)
+    write_table()
     return sound
 
 
@@ -123,6 +152,8 @@ def main() -> int:
     sound = True
     if options.only in (None, "suite"):
         sound = make_suite(options.names, options.again)
+    if options.only in (None, "stretches"):
+        sound = make_stretches(options.names, options.again) and sound
     if options.only in (None, "defects"):
         sound = make_defects(options.names, options.again) and sound
     if options.only in (None, "faults") and not options.names:

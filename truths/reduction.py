@@ -18,10 +18,12 @@ from truths.affine import StretchedSolid
 from truths.eigenmodes import attach, factorised, lowest, shift_at, translation
 from truths.elasticity import Matrices
 from truths.modes_of import stations
+from truths.remade import RemadeSolid
 from truths.seats import DIRECTIONS, observed, rigid_fit, seat_nodes
 from truths.structure import Place, Structure
 
 Array = npt.NDArray[np.float64]
+KnownSolid = StretchedSolid | RemadeSolid
 
 SPARE = 3  # modes beyond those listed: they mix into those of a changed structure
 PURE = 1e-3  # of a mode's motion, across the plane of a planar structure
@@ -30,12 +32,13 @@ _TURNS = {"3d": (0, 1, 2), "in-plane": (1,), "out-of-plane": (0, 1)}
 _PLANES = {"3d": (0, 1, 2), "in-plane": (0, 2), "out-of-plane": (2,)}
 
 
-def stretched(structure: Structure, solid: StretchedSolid, factors: Array) -> Structure:
+def stretched(structure: Structure, solid: KnownSolid, factors: Array) -> Structure:
     """Return a structure of which all places lie where a stretch moves them."""
-    return replace(structure, warp=solid.stretch.map(factors))
+    move = solid.stretch.map(factors)
+    return replace(structure, warp=lambda points: structure.warped(move(points)))
 
 
-def drawn_factors(solid: StretchedSolid, count: int, seed: int = _SEED) -> Array:
+def drawn_factors(solid: KnownSolid, count: int, seed: int = _SEED) -> Array:
     """Return stretches that fill the ranges of the factors evenly, (count, factors)."""
     low, high = np.log(solid.stretch.ranges).T
     cube: Any = qmc.LatinHypercube  # whose argument is called rng by newer versions
@@ -43,7 +46,7 @@ def drawn_factors(solid: StretchedSolid, count: int, seed: int = _SEED) -> Array
     return np.asarray(np.exp(low + shares * (high - low)))
 
 
-def snapshots(structure: Structure, solid: StretchedSolid, factors: Array) -> Array:
+def snapshots(structure: Structure, solid: KnownSolid, factors: Array) -> Array:
     """Return modes of a stretched structure, and what forces at seats of changes do, (dofs, n).
 
     Raises:
@@ -86,7 +89,7 @@ def _loads(structure: Structure, matrices: Matrices) -> sparse.csr_array:
     return sparse.csr_array(sparse.vstack(rows, format="csr"))
 
 
-def rigid_fields(structure: Structure, solid: StretchedSolid) -> Array:
+def rigid_fields(structure: Structure, solid: KnownSolid) -> Array:
     """Return fields of which the rigid motions of every stretched shape are sums, (dofs, n)."""
     parts = [solid.stretch.parts(axis, solid.nodes[axis]) for axis in range(3)]
     along = _PLANES[structure.plane]
@@ -104,7 +107,7 @@ def rigid_fields(structure: Structure, solid: StretchedSolid) -> Array:
     return np.array(kept).T
 
 
-def basis_of(structure: Structure, solid: StretchedSolid, taken: Array, size: int) -> Array:
+def basis_of(structure: Structure, solid: KnownSolid, taken: Array, size: int) -> Array:
     """Return shapes, (dofs, size at most), of which those of all stretches are sums.
 
     They have unit energy, as stiffness and mass of the drawing at the guessed frequency have it.
@@ -155,11 +158,11 @@ class Seat:
 
 
 def seat_of(
-    structure: Structure, solid: StretchedSolid, matrices: Matrices, place: Place, shapes: Array
+    structure: Structure, solid: KnownSolid, matrices: Matrices, place: Place, shapes: Array
 ) -> Seat:
     """Return the moments of a seat of the drawing, of which these are the matrices."""
     nodes = seat_nodes(structure, matrices, place)
-    centre = structure.point(place)
+    centre = structure.warped(structure.point(place)[:, None])[:, 0]
     pieces = []
     for axis in range(3):
         there = solid.stretch.parts(axis, np.append(solid.nodes[axis, nodes], centre[axis]))

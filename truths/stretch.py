@@ -18,11 +18,16 @@ from truths.structure import Member, Structure
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
-SECTION, WALL, LENGTH = "section", "wall", "length"
+SECTION, LENGTH = "section", "length"
 LENGTHS = 3  # factors of spans, which take them in turns
-RANGES = {SECTION: (0.85, 1.2), WALL: (0.8, 1.25), LENGTH: (0.8, 1.25)}  # of the factors
-# Which rectangle is the outer one, and which the void, of a hollow section.
-_HOLLOW = (True, False)
+SAME, MODULUS, DENSITY = "drawn", "modulus", "density"
+RANGES = {  # of the factors
+    SECTION: (0.85, 1.2),
+    LENGTH: (0.8, 1.25),
+    SAME: (1.0, 1.0),
+    MODULUS: (0.5, 2.0),
+    DENSITY: (0.6, 1.6),
+}
 
 
 @dataclass(frozen=True)
@@ -74,34 +79,25 @@ class Stretch:
 def stretch_of(structure: Structure) -> Stretch:
     """Return the stretch of a structure under which its sections stay what they are.
 
-    Tubes and bars have factors of their own for walls and for what lies between them; where that
-    would tear a section, walls and sections have one.
-
     Raises:
-        ValueError: where neither can be.
+        ValueError: where there is none.
     """
     if structure.mesher != "bricks" or structure.warp is not None:
         raise ValueError(f"{structure.name}: only straight solids of bricks are stretched")
-    for walls in (True, False):
-        found = _stretch(structure, walls)
-        if all(_kept(structure, found, walls)):
-            return found
-    raise ValueError(f"{structure.name}: a section would not stay what it is")
-
-
-def _stretch(structure: Structure, walls: bool) -> Stretch:
     axes, spans = [], 0
     for axis in range(3):
-        axes.append(_axis(structure, axis, walls, spans))
+        axes.append(_axis(structure, axis, spans))
         spans += len({kind for kind in axes[-1][1] if kind.startswith(LENGTH)})
     names = {kind for _, kinds in axes for kind in kinds}
     ordered = sorted(names, key=lambda name: (name != SECTION, name))
     x, y, z = (np.array([ordered.index(kind) for kind in kinds]) for _, kinds in axes)
-    knots = axes[0][0], axes[1][0], axes[2][0]
-    return Stretch(knots, (x, y, z), tuple(ordered))
+    found = Stretch((axes[0][0], axes[1][0], axes[2][0]), (x, y, z), tuple(ordered))
+    if not all(_kept(structure, found)):
+        raise ValueError(f"{structure.name}: a section would not stay what it is")
+    return found
 
 
-def _axis(structure: Structure, axis: int, walls: bool, spans: int) -> tuple[Array, list[str]]:
+def _axis(structure: Structure, axis: int, spans: int) -> tuple[Array, list[str]]:
     """Return the knots of an axis, and the name of the factor of each interval between them.
 
     Arguments:
@@ -110,35 +106,24 @@ def _axis(structure: Structure, axis: int, walls: bool, spans: int) -> tuple[Arr
     across = [m for m in structure.solid_members if abs(structure.axes(m)[0][0, axis]) < 0.5]
     extents = [list(member_boxes(structure, member)) for member in across]
     zones = [(min(b[1][axis] for b in e), max(b[2][axis] for b in e)) for e in extents]
-    thin = [pair for e in extents for pair in _walls(e, axis)] if walls else []
     planes = [v for _, low, high, _ in boxes(structure) for v in (low[axis], high[axis])]
     low, high = min(planes), max(planes)
     joints = [p[axis] for p in structure.joints.values()]
     cuts = [v for v in joints if min(abs(v - p) for p in planes) < CLOSE]
     cuts = [v for v in cuts if not any(a < v < b for a, b in zones)]
-    marks = [low, high, *cuts, *(v for zone in (*zones, *thin) for v in zone)]
+    marks = [low, high, *cuts, *(v for zone in zones for v in zone)]
     knots = np.unique(np.clip(marks, low, high))
     knots = knots[np.append(True, np.diff(knots) > CLOSE)]
     # Across a plane in which all joints lie, both sides grow alike and stay mirror images.
     flat = float(np.ptp(joints)) < CLOSE
     kinds = []
     for middle in (knots[1:] + knots[:-1]) / 2:
-        if any(a < middle < b for a, b in thin):
-            kinds.append(WALL)
-        elif any(a < middle < b for a, b in zones):
+        if any(a < middle < b for a, b in zones):
             kinds.append(SECTION)
         else:
             kinds.append(f"{LENGTH}-{spans % LENGTHS + 1}")
             spans += not flat
     return knots, kinds
-
-
-def _walls(extent: list[tuple[str, Array, Array, str]], axis: int) -> Iterator[tuple[float, float]]:
-    """Yield from where to where the walls of a hollow section reach along an axis."""
-    if tuple(bool(kind) for *_, kind in extent) == _HOLLOW:
-        (_, low, high, _), (_, inner, outer, _) = extent
-        yield float(low[axis]), float(inner[axis])
-        yield float(outer[axis]), float(high[axis])
 
 
 def sizes(structure: Structure, stretch: Stretch, member: Member) -> Array:
@@ -162,17 +147,14 @@ def sizes(structure: Structure, stretch: Stretch, member: Member) -> Array:
     return np.array(found)
 
 
-def _kept(structure: Structure, stretch: Stretch, walls: bool) -> Iterator[bool]:
+def _kept(structure: Structure, stretch: Stretch) -> Iterator[bool]:
     """Yield whether each member's section stays symmetric, of one wall, and that of its name."""
     first: dict[str, Array] = {}
     for member in structure.solid_members:
         own = sizes(structure, stretch, member)
         other = first.setdefault(member.section, own)
         yield bool(np.abs(own - other).max() < CLOSE)
-        shape = "shape" in structure.sections[member.section].drawn
-        if walls and not shape:
-            yield False
-        if shape:
+        if "shape" in structure.sections[member.section].drawn:
             yield bool(np.abs(own[:, 0::2] + own[:, 1::2]).max() < CLOSE)
             if len(own) > 1:
                 gaps = own[1] - own[0]

@@ -1,7 +1,8 @@
-"""A solid of which every span, section and wall may be longer: its modes from a few dozen shapes.
+"""A solid of other spans and sections, or other materials: its modes from a few dozen shapes.
 
-Mass and stiffness of a solid that is stretched piecewise along its axes are sums of fixed matrices
-times products of powers of the factors; they are kept as shapes found beforehand see them.
+Mass and stiffness of a solid that is stretched piecewise along its axes, or of which members have
+other moduli and densities, are sums of fixed matrices times products of powers of the factors; they
+are kept as shapes found beforehand see them.
 
 Source: affine decomposition and Rayleigh-Ritz (Quarteroni, Manzoni & Negri 2016, chapter 3).
 """
@@ -28,6 +29,7 @@ _RIGID = 6  # modes of a free structure
 _SHIFT = 50.0  # times the frequency below which modes are rigid
 _NAMES = (
     *("names", "ranges", "sections", "sizes", "sensors", "lumps", "springs", "masses"),
+    *("members", "materials"),
     *("knots_x", "knots_y", "knots_z", "kinds_x", "kinds_y", "kinds_z", "rigid_below"),
     *("stiffness", "stiffness_powers", "mass", "mass_powers"),
     *("seat_axes", "seat_factors", "seat_counts", "seat_first", "seat_second"),
@@ -55,12 +57,12 @@ class ReducedSolid:
         """Return the solid of a file.
 
         Arguments:
-            file: ``.npz`` as `python -m truths.stretch_file` writes it.
+            file: ``.npz`` as `python -m truths --only stretches` writes it.
 
         Raises:
             InputError: where it is no such file.
         """
-        expected = "a stretched solid, as python -m truths.stretch_file writes it"
+        expected = "a stretched solid, as python -m truths writes it"
         try:
             with np.load(BytesIO(read_bytes(file, LARGEST)), allow_pickle=False) as kept:
                 arrays = dict(kept)
@@ -106,6 +108,18 @@ class ReducedSolid:
         if section not in names:
             return None
         return np.asarray(self.arrays["sizes"][names.index(section)] @ factors)
+
+    @cached_property
+    def _materials(self) -> dict[str, tuple[int, int]]:
+        rows = zip(self.arrays["members"], self.arrays["materials"].tolist(), strict=True)
+        return {str(name): (modulus, density) for name, (modulus, density) in rows}
+
+    def material(self, factors: FloatArray, member: str) -> tuple[float, float]:
+        """Return the factors of modulus and density of a member, 1 of one that stays."""
+        if member not in self._materials:
+            return 1.0, 1.0
+        modulus, density = self._materials[member]
+        return float(factors[modulus]), float(factors[density])
 
     def mass(self, factors: FloatArray) -> float:
         """Return the mass with all that is attached to it, without design changes, in kg."""

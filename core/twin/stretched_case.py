@@ -1,4 +1,4 @@
-"""Twins with spans, sections and walls of their own, of which solids give what is measured."""
+"""Twins with spans and sections, or materials, of their own: solids give what is measured."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.errors import NotApplicable
-from femubench.core.fem.frame import Frame, GroundSpring, Joint, Place, PointMass
+from femubench.core.fem.frame import Frame, GroundSpring, Joint, Material, Member, Place, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.fem.sections import Section, rectangular_tube, solid_rectangle
 from femubench.core.fem.sensors import Sensors
@@ -119,7 +119,12 @@ def stretch_case(
             replace(
                 frame,
                 joints=tuple(joints),
-                members=tuple(replace(m, section=sections[id(m.section)]) for m in frame.members),
+                members=tuple(
+                    replace(
+                        m, section=sections[id(m.section)], material=_material(m, solid, factors)
+                    )
+                    for m in frame.members
+                ),
                 masses=_at_places(frame, solid, factors, frame.masses),
                 springs=_at_places(frame, solid, factors, frame.springs),
             )
@@ -131,6 +136,12 @@ def stretch_case(
         matches=(),
         lines=None,
     )
+
+
+def _material(member: Member, solid: ReducedSolid, factors: FloatArray) -> Material:
+    modulus, density = solid.material(factors, member.name)
+    known = member.material
+    return replace(known, E=modulus * known.E, rho=density * known.rho)
 
 
 def _section(section: Section, solid: ReducedSolid, factors: FloatArray) -> Section:
