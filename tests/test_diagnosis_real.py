@@ -81,13 +81,13 @@ def test_a_look_at_the_ladder_names_the_torsion_constant_before_any_fit() -> Non
 
 
 @pytest.mark.parametrize("name", SOLID)
-def test_solid_twins_are_predicted_four_times_better(name: str) -> None:
+def test_solid_twins_are_predicted_three_times_better(name: str) -> None:
     found = diagnosed(name)
     assert found.verdict in ("named", "ambiguous")
     assert found.gain.held_out_percent is not None
     assert found.gain.modified_percent is not None
     for before, after in (found.gain.held_out_percent, found.gain.modified_percent):
-        assert after < 0.25 * before
+        assert after < before / 3.0
 
 
 @pytest.mark.parametrize("name", SOLID)

@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import structs, to_builtins
 
 from femubench.core.schema.paired_modes import ModeBefore, PartnerCandidate
-from femubench.results import Block, JobResult, PairedMode, Rule, Run, rank_results
+from femubench.results import Block, JobResult, PairedMode, Rule, Run, frequency_error, rank_results
 
 BLOCKS = ("used", "higher", "modified")
 MODES = {"used": (1, 2, 3), "higher": (4, 5), "modified": (1, 4)}
@@ -151,20 +151,21 @@ def _block(random: np.random.Generator, name: str, percent: float) -> Block:
     numbers = MODES[name]
     shares = random.standard_normal(len(numbers))
     errors = shares * percent / 100.0 / math.sqrt(float(np.mean(shares**2)))
-    change = CHANGE if name == "modified" else None
     modes = tuple(
         PairedMode(
             n,
             100.0 * n + FIRST[name],
             (100.0 * n + FIRST[name]) * (1.0 + float(e)),
             float(random.uniform(0.9, 1)),
-            change,
+            CHANGE if name == "modified" else None,
             candidates=_others(random, 100.0 * n),
         )
         for n, e in zip(numbers, errors, strict=True)
     )
-    macs = [mode.mac for mode in modes if mode.mac is not None]
-    return Block(percent, sum(macs) / len(macs), modes)
+    mac = float(np.mean([mode.mac for mode in modes if mode.mac is not None]))
+    # A frequency that was drawn below zero is an error of 100 %.
+    rms = 100.0 * math.sqrt(float(np.mean([frequency_error(mode) ** 2 for mode in modes])))
+    return Block(rms, mac, modes)
 
 
 def _others(random: np.random.Generator, hertz: float) -> tuple[PartnerCandidate, ...]:
