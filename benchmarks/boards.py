@@ -49,7 +49,8 @@ class Board:
 
 BOARDS = {
     "default": Board("README.md"),
-    "suite": Board("docs/scenarios.md", ("suite",), nominal="textbook"),
+    # What the rule was made with; those after it have the class "after the rule".
+    "suite": Board("docs/scenarios.md", ("suite:before the rule",), nominal="textbook"),
 }
 
 

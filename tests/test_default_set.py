@@ -83,6 +83,15 @@ class TestSuite:
             (f"suite/{name}", "ok") for name in STRUCTURES
         ]
 
+    def test_a_class_of_the_group_is_part_of_it(self) -> None:
+        assert names(["suite:wing-like"]) == ["suite/wing"]
+        assert names(["suite:planar frame", "suite/tower"]) == ["suite/portal", "suite/tower"]
+        with pytest.raises(InputError, match="did you mean 'suite:planar frame'"):
+            names(["suite:planer frame"])
+        with pytest.raises(InputError, match="no case 'nothing'") as fault:
+            names(["nothing"])
+        assert "planar" not in str(fault.value)
+
     def test_without_a_case_the_default_set_runs(self) -> None:
         plugins = load_plugins()
         default = [name for name, scenario in plugins.scenarios.items() if scenario.default]

@@ -17,7 +17,7 @@ from femubench import Case, InputError, read_case
 from femubench.core.challenge.posing import overlay
 from femubench.core.challenge.truth_file import TRUTH_FILE, KnownCase, read_truth
 from truths.faults import FAULT_KINDS, Draft, Structure, drafts, files_of, visibility
-from truths.posing import FAULTS, SUITE
+from truths.posing import FAULTS, SUITE, first_folders
 
 pytestmark = pytest.mark.slow(20)
 
@@ -25,7 +25,7 @@ Drawn = tuple[Structure, KnownCase, Draft]
 
 
 def structures_of(suite: Path) -> list[Structure]:
-    return [Structure(path.parent) for path in sorted(suite.glob("*/case.toml"))]
+    return [Structure(folder) for folder in first_folders(suite)]
 
 
 @pytest.fixture(scope="module")

@@ -36,7 +36,7 @@ from femubench.core.challenge.truth_file import (
 from femubench.core.errors import InputError
 from femubench.core.fit.residuals import Data
 from femubench.core.modal.eigen import enough_modes, solve_modes
-from truths.posing import FAULTS, SUITE
+from truths.posing import FAULTS, SUITE, first_folders
 from truths.truth_text import rounded, truth_text
 
 SEED = 12_000
@@ -488,7 +488,7 @@ def faults(suite: Path = SUITE) -> dict[str, Mapping[str, str]]:
     Arguments:
         suite: where the structures are.
     """
-    structures = [Structure(path.parent) for path in sorted(suite.glob(f"*/{CASE_FILE}"))]
+    structures = [Structure(folder) for folder in first_folders(suite)]
     found: dict[str, Mapping[str, str]] = {}
     for structure, truth, draft in drafts(structures) if structures else ():
         chi2, part = visibility(structure, truth, draft)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 from femubench.core.challenge import posing
@@ -17,6 +18,14 @@ STRUCTURES = OPENSEES / "structures"
 # Of a third, shear frames, by SciPy alone.
 SHEAR = ROOT / "truths" / "data" / "shear"
 SHEAR_STRUCTURES = SHEAR / "structures"
+
+
+def first_folders(suite: Path = SUITE) -> list[Path]:
+    """Return the structures that defects and faults are drawn on: none after the rule."""
+    index = suite / "suite.toml"
+    listed = tomllib.loads(index.read_text(encoding="utf-8")) if index.exists() else {}
+    later = {name for name, item in listed.items() if "after the rule" in item["classes"]}
+    return [p.parent for p in sorted(suite.glob("*/case.toml")) if p.parent.name not in later]
 
 
 def pose(

@@ -20,6 +20,8 @@ from truths.structure import Structure
 
 Array = npt.NDArray[np.float64]
 SUITE = Path(__file__).parents[1] / "scenarios" / "suite"
+# Classes: structures made after the rule of the boards was fixed, and those it was made with.
+AFTER, BEFORE = "after the rule", "before the rule"
 LARGEST_DIFFERENCE = 0.007  # of a listed mode's frequency, between the two meshes
 
 
@@ -164,7 +166,8 @@ def index_text(all_structures: dict[str, Structure]) -> str:
     """Return `suite.toml`: title and classes of each structure."""
     tables = []
     for name, item in all_structures.items():
-        values = {"title": item.title, "classes": list(item.classes), "default": item.default}
+        classes = [*item.classes, *(() if AFTER in item.classes else (BEFORE,))]
+        values = {"title": item.title, "classes": classes, "default": item.default}
         tables.append(f"[{name}]\n" + "".join(f"{k} = {text(v)}\n" for k, v in values.items()))
     return "# Written by `make truths`.\n\n" + "\n".join(tables)
 

@@ -136,12 +136,12 @@ def scenarios_of(scenarios: Mapping[str, Scenario]) -> dict[str, Scenario]:
 
 
 def _groups(scenarios: Mapping[str, Scenario]) -> dict[str, list[str]]:
-    """Return the scenarios called ``group/name`` by their group."""
+    """Return the scenarios called ``group/name`` by ``group`` and by ``group:class``."""
     found: dict[str, list[str]] = {}
-    for name in scenarios:
+    for name, scenario in scenarios.items():
         group, slash, _ = name.partition("/")
-        if slash:
-            found.setdefault(group, []).append(name)
+        for word in (group, *(f"{group}:{kind}" for kind in scenario.classes)) if slash else ():
+            found.setdefault(word, []).append(name)
     return found
 
 
@@ -173,8 +173,8 @@ def read_cases(given: CaseLike | Iterable[CaseLike], plugins: Plugins) -> list[C
     """Read and validate cases, each once.
 
     Arguments:
-        given: names of scenarios, of a group of them, of one case of a scenario, folders, or
-            cases; none for the scenarios of the default set.
+        given: names of scenarios, of a group of them (`group`, or `group:class` for those of a
+            class), of one case of a scenario, folders, or cases; none for the default set.
         plugins: where scenarios and readers come from.
 
     Raises:
@@ -282,4 +282,6 @@ def _folders(word: str, scenarios: Mapping[str, Scenario]) -> Iterable[tuple[str
         return [(None, path)]
     if "/" in word and word.partition("/")[0] not in {*scenarios, *groups}:
         raise InputError("folder does not exist", file=path, expected="a folder with a case.toml")
-    raise unknown("case", word, case_names(scenarios))
+    # All classes of all groups would drown the names.
+    known = [name for name in case_names(scenarios) if ":" in word or ":" not in name]
+    raise unknown("case", word, known)
