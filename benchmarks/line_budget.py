@@ -41,7 +41,7 @@ BUDGETS = {
     "core/publish": 1_390,
     "core/reproduction": 620,
     "core/run": 4_780,
-    "core/schema": 1_410,
+    "core/schema": 1_446,
     "core/score": 2_390,
     "core/study": 641,
     "core/twin": 1_065,

@@ -131,14 +131,11 @@ def case_files(folder: Path, share: float, files: list[Path], format: str, comma
     )
     fuzz(format, share, make, read)
     for file, content in broken if commands else ():
+        whole = file.read_bytes()
         file.write_bytes(content)
         refused_by_command(["run", str(file.parent), "-s", "unchanged", "--store", str(folder)])
-        file.write_bytes(texts_of(places, texts, file))
+        file.write_bytes(whole)
     assert not commands or len(broken) == _CLI_SAMPLE
-
-
-def texts_of(places: dict[Path, Path], texts: dict[Path, str], file: Path) -> bytes:
-    return next(texts[origin].encode() for origin, place in places.items() if place == file)
 
 
 def case_format(folder: Path, share: float, format: str) -> None:

@@ -429,14 +429,14 @@ def test_pages_need_nothing_from_elsewhere(full: Site) -> None:
 def test_one_yardstick_and_one_start_for_all(data: Data, site: Site) -> None:
     drawn = json.loads(json.dumps(data))
     drawn["meta"]["yardstick"] = "textbook"
+    drawn["meta"]["models"] = {
+        c: {"textbook": m["drawn"]} for c, m in data["meta"]["models"].items()
+    }
     drawn["meta"]["starts"] = {case: ["drawn"] for case in drawn["meta"]["cases"]}
     refused = site.add(drawn)
     assert refused.exit_code == 2
     assert "starts from the drawn model alone" in refused.stderr
     drawn["meta"]["starts"] = {case: ["textbook"] for case in drawn["meta"]["cases"]}
-    drawn["meta"]["models"] = {
-        c: {"textbook": m["drawn"]} for c, m in data["meta"]["models"].items()
-    }
     for result in drawn["results"]:
         result["nominal"] = "textbook"
     assert site.add(drawn).exit_code == 0

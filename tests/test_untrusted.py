@@ -24,7 +24,7 @@ from femubench.core.case.files import LARGEST_FILE, LARGEST_TEXT
 from femubench.core.case.reader import read_case as read_folder
 from femubench.core.cli.main import bench
 from femubench.core.schema import records as schema
-from femubench.core.schema.records import meta_from_json, read_run, run_from_json
+from femubench.core.schema.records import read_run, run_from_json
 from femubench.plugins.readers.universal import UniversalReader
 from femubench.reports.cells import plain
 from femubench.reports.markdown import escape
@@ -245,12 +245,14 @@ def test_no_name_moves_a_cursor(case: Path, name: str) -> None:
         ("seeds", [-1]), ("seed", 0.5), ("strategies", {"a": 1}), ("strategies", ["a"] * 1001),
         ("reference", {"frame": 1.0}), ("reference", {"frame": {"used": -1.0}}),
         ("reference", {"frame": {"used": None}}), ("run", "x" * 1001), ("citations", ["x"]),
+        ("rule", {"mac": 0}), ("rule", {"cpa": 1.0}), ("models", {}), ("models", {"frame": {}}),
     ],
 )  # fmt: skip
 def test_meta_data_are_checked(key: str, value: object) -> None:
-    meta = json.loads(run_text())["meta"] | {key: value}
-    with pytest.raises(InputError, match=f"meta.{key}"):
-        meta_from_json(meta, file="run.json")
+    run = json.loads(run_text())
+    run["meta"][key] = value
+    with pytest.raises(InputError, match=f"run.json: meta.{key}"):
+        run_from_json(run, file="run.json")
 
 
 @pytest.mark.parametrize(

@@ -245,9 +245,6 @@ def _check(result: JobResult, meta: Mapping[str, Any], file: Path, key: str) -> 
     reference = meta["reference"].get(result.case)
     if not reference:
         refuse("missing", f"meta.reference.{result.case}", "the errors of the nominal model")
-    nominal = meta.get("yardstick") or "drawn"
-    if nominal not in (meta["models"].get(result.case) or {}):
-        refuse("missing", f"meta.models.{result.case}.{nominal}", "what that model predicts")
     for name, block in result.blocks.items():
         if name not in reference or not block.modes:
             what = "no modes" if name in reference else "a block that the nominal model has not"

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from msgspec import Meta
+
+from femubench.core.errors import InputError
 
 LONGEST_TEXT = 100_000  # characters of a reason or a traceback
 Name = Annotated[str, Meta(max_length=1_000)]
@@ -31,3 +34,35 @@ else:
     Number = Real | None
     Figure = Text | Number  # of a parameter: its name, unit or value
     Note = Text | int | float | None  # on how a result came about
+
+LEAST_KEPT_MAC = 0.3  # of candidates in a run, so that rules with other limits can be tried on it
+# Of the rule of the boards: beyond these a run keeps no candidates, or a share is none.
+_RULE = {
+    **{"window": (0.0, 0.6932), "mac": (LEAST_KEPT_MAC, 1.0), "above": (0.0, 10.0)},
+    **{"cap": (1e-6, 10.0), "same_mac": (LEAST_KEPT_MAC, 1.0), "change_cap": (1e-6, 10.0)},
+    **{"floor": (1e-6, 1.0), "change_share": (0.0, 1.0), "visible": (0.0, 10.0)},
+}
+
+
+def read_rule_number(name: str, value: str | float, **where: Any) -> float:  # noqa: ANN401
+    """Return a number of the rule of the boards.
+
+    Arguments:
+        name, value: as they stand in the meta data of a run, or on a command line.
+        where: file, line and key, for the message.
+
+    Raises:
+        InputError: for another name, or a number that is out of its bounds.
+    """
+    if name not in _RULE:
+        expected = f"one of {', '.join(_RULE)}"
+        raise InputError(f"the rule has no {name!r}", **where, expected=expected)
+    least, most = _RULE[name]
+    try:
+        number = float(value)
+    except (ValueError, OverflowError):
+        number = math.nan
+    if not least <= number <= most:
+        what, expected = f"{name} of the rule is {value!r}", f"a number from {least:g} to {most:g}"
+        raise InputError(what, **where, expected=expected)
+    return number

@@ -13,7 +13,7 @@ from msgspec import Meta, Struct
 
 from femubench.core.errors import InputError
 from femubench.core.files import MIB, read_text
-from femubench.core.schema.bounds import Name, Percent, Text, Whole
+from femubench.core.schema.bounds import Name, Percent, Text, Whole, read_rule_number
 from femubench.core.schema.results import BLOCKS, NOMINALS, Blocks, JobResult, Nominal, Run
 from femubench.core.schema.validation import read_plain
 
@@ -114,7 +114,7 @@ def check_extent(
     """Check that the table of all strategies on all cases and seeds can be made.
 
     Raises:
-        InputError: when names and seeds are too many.
+        InputError: when names and seeds are too many, or what a nominal model predicts is missing.
     """
     strategies = {*meta.get("strategies", ()), *(result.strategy for result in results)}
     cases = {*(meta.get("cases") or ()), *(meta.get("reference") or ())}
@@ -125,6 +125,13 @@ def check_extent(
         what = f"{len(strategies)} strategies on {len(cases)} cases with {len(seeds)} seeds"
         expected = f"at most {_MOST_NAMES} strategies and {_MOST_JOBS} jobs"
         raise InputError(what, file=file, key="results", expected=expected)
+    models = {**(meta.get("models") or {}), **((meta.get("twins") or {}).get("models") or {})}
+    nominal = meta.get("yardstick") or "drawn"
+    ranked = {result.case for result in results} if models or meta.get("rule") else set()
+    for case in sorted(ranked | models.keys()):
+        if nominal not in models.get(case, ()):
+            where, expected = f"meta.models.{case}.{nominal}", "what that model predicts"
+            raise InputError("missing", file=file, key=where, expected=expected)
 
 
 def parse_json(
@@ -300,6 +307,9 @@ def meta_from_json(
         raise InputError("no meta data", file=file, line=line, key=key, expected="a table")
     check_depth(data, "meta data", file=file, line=line, key=key)
     read_plain(_MetaRecord, data, file=file, line=line, key=key)
+    for name, value in (data.get("rule") or {}).items():
+        if name != "version":
+            read_rule_number(name, value, file=file, line=line, key=f"{key}.rule.{name}")
     return data
 
 

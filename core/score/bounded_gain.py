@@ -13,16 +13,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from femubench.core.errors import InputError
 from femubench.core.modal.correlation import mac
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import LEAST_SENSORS, Pairing
+from femubench.core.schema.bounds import LEAST_KEPT_MAC, read_rule_number
 from femubench.core.schema.paired_modes import ModeBefore, PairedMode, PartnerCandidate
 from femubench.core.schema.results import Block
 from femubench.core.typing import FloatArray
 
-# What a run keeps of candidates, so that rules with other limits can be tried on it.
-LEAST_KEPT_MAC, WIDEST_KEPT = 0.3, math.log(2.0)
+WIDEST_KEPT = math.log(2.0)  # of candidates that a run keeps, as their least MAC
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,7 @@ class Rule:
             InputError: for a number that is out of its bounds.
         """
         stated = {k: v for k, v in (meta.get("rule") or {}).items() if k != "version"}
-        return cls().changed(f"{name}={value}" for name, value in stated.items())
+        return cls(**{name: read_rule_number(name, value) for name, value in stated.items()})
 
     def changed(self, words: Iterable[str]) -> Rule:
         """Return the rule with other numbers.
@@ -85,33 +84,8 @@ class Rule:
         Raises:
             InputError: for another key, or a number that is out of its bounds.
         """
-        found, names = self, [f.name for f in fields(self)]
-        for word in words:
-            name, _, value = word.partition("=")
-            if name not in names:
-                raise InputError(f"the rule has no {name!r}", expected=f"one of {', '.join(names)}")
-            least, most = _BOUNDS.get(name, (0.0, 10.0))
-            try:
-                number = float(value)
-            except ValueError:
-                number = math.nan
-            if not least <= number <= most:
-                what = f"{name} of the rule is {value!r}"
-                raise InputError(what, expected=f"a number from {least:g} to {most:g}")
-            found = replace(found, **{name: number})
-        return found
-
-
-# Beyond these a run keeps no candidates, or a share is none.
-_BOUNDS = {
-    "window": (0.0, 0.6932),
-    "mac": (LEAST_KEPT_MAC, 1.0),
-    "same_mac": (LEAST_KEPT_MAC, 1.0),
-    "floor": (1e-6, 1.0),
-    "cap": (1e-6, 10.0),
-    "change_cap": (1e-6, 10.0),
-    "change_share": (0.0, 1.0),
-}
+        stated = {key: value for key, _, value in (word.partition("=") for word in words)}
+        return replace(self, **{key: read_rule_number(key, value) for key, value in stated.items()})
 
 
 @dataclass(frozen=True)

@@ -11,20 +11,13 @@ import msgspec
 
 from femubench.core.errors import InputError
 from femubench.core.garbage import pause_collection
-from femubench.core.schema.records import to_plain
+from femubench.core.schema.records import Models, to_plain
 from femubench.core.schema.results import BLOCKS, UNSEEN, Block, JobResult, Nominal, rate
-from femubench.core.score.bounded_gain import (
-    CaseGain,
-    MeasuredModes,
-    ModelErrors,
-    Rule,
-    find_gain,
-)
+from femubench.core.score.bounded_gain import CaseGain, MeasuredModes, ModelErrors, Rule, find_gain
 
 TIE = 1e-6  # gains that differ by less share a rank: rounding differs by 1e-9 or so
 
 _Item = TypeVar("_Item")
-Models = Mapping[str, Mapping[Nominal, Mapping[str, Block]]]
 
 
 @dataclass(frozen=True)
