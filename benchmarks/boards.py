@@ -2,6 +2,7 @@
 
 python benchmarks/boards.py default      # README.md; minutes on two cores
 python benchmarks/boards.py suite        # docs/scenarios.md, the predictive board: docs/scoring.md
+python benchmarks/boards.py after        # docs/scenarios.md, what decides on the rule
 python benchmarks/boards.py default --from run.json    # of a run that is there
 """
 
@@ -40,17 +41,40 @@ class Board:
         page: where it stands, between marks of its name.
         cases: words of `bench run`; the default set where there are none.
         nominal: the models that strategies start from.
+        mark: where it stands in the page.
+        which: the structures, for what the README says of them.
     """
 
     page: str
     cases: tuple[str, ...] = ()
     nominal: StartModels = "both"
+    mark: str = "leaderboard"
+    which: str = ""
 
 
+FIRST_AFTER = (
+    *("bell-crank", "chair", "connecting-rod", "engine-mount", "lamp-post", "pi-portal"),
+    *("pipe-loop", "propeller", "rotor", "ski", "tee-bridge", "tuning-fork", "turbine-blade"),
+)
 BOARDS = {
     "default": Board("README.md"),
     # What the rule was made with; those after it have the class "after the rule".
-    "suite": Board("docs/scenarios.md", ("suite:before the rule",), nominal="textbook"),
+    "suite": Board(
+        "docs/scenarios.md",
+        ("suite:before the rule",),
+        nominal="textbook",
+        which="structures of the suite that were there before the rule ([the board](docs/"
+        'scenarios.md#all-strategies-on-all-structures), `bench run "suite:before the rule"`)',
+    ),
+    # The first that were ready; those made since join when the board is run again.
+    "after": Board(
+        "docs/scenarios.md",
+        tuple(f"suite/{name}" for name in FIRST_AFTER),
+        nominal="textbook",
+        mark="leaderboard-after",
+        which="structures of other families that were made after the rule ([the board](docs/"
+        "scenarios.md#structures-made-after-the-rule))",
+    ),
 }
 
 
@@ -93,12 +117,10 @@ def put(name: str, text: str, page: Path) -> None:
     page.write_text(f"{before}{mark}{text}\n{end}{after}", encoding="utf-8")
 
 
-def said_of_the_suite(run: Run) -> str:
-    """Return what the README says of the suite, wrapped."""
-    count = len(run.meta["cases"])
-    where = "[the board](docs/scenarios.md#all-strategies-on-all-structures)"
+def said_of(which: str, run: Run) -> str:
+    """Return what the README says of some structures, wrapped."""
     said = " ".join(finding(run, list_rows(run)))
-    text = f"On all {count} structures of the suite ({where}, `bench run suite`): {said}"
+    text = f"On the {len(run.meta['cases'])} {which}: {said}"
     return textwrap.fill(text, 118, break_long_words=False, break_on_hyphens=False)
 
 
@@ -117,11 +139,12 @@ def main() -> None:
     run = slim(run)
     text = json.dumps(brief(run_to_json(run)), separators=(",", ":"))
     file_of(words.board).write_text(text.replace('{"case"', '\n{"case"') + "\n", encoding="utf-8")
+    if board.which:
+        put(f"{words.board}-finding", said_of(board.which, run), ROOT / "README.md")
     if words.board == "suite":
-        put("suite-finding", said_of_the_suite(run), ROOT / "README.md")
         text = PredictiveReporter().render(run)
         put("predictive", f"```\n{text}\n```", ROOT / "docs" / "scoring.md")
-    put("leaderboard", f"```\n{board_text(run)}\n```", ROOT / board.page)
+    put(board.mark, f"```\n{board_text(run)}\n```", ROOT / board.page)
     print(f"{count_noun(len(run.results), 'job')} in {file_of(words.board)}")
 
 

@@ -354,7 +354,7 @@ def main() -> None:
         if not words.memory:
             table.to_csv(MEMORY, index=False, lineterminator="\n")
         return
-    sets = {"suite": problems_of(["suite"]), "default set": problems_of([])}
+    sets = {"suite": problems_of(["suite:before the rule"]), "default set": problems_of([])}
     if words.small:
         sets = {"suite": [p for p in sets["suite"] if p.case.model.size <= DENSE_LIMIT]}
     rows = []

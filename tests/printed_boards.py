@@ -39,11 +39,11 @@ def as_printed(text: str, spare: float = 0.1) -> Any:
     return pytest.approx(float(text), rel=0, abs=(0.5 + spare) * 10.0**-digits)
 
 
-def assert_board_is_that_of(run: Run, name: str) -> None:
-    """The table that a document prints, and what it says below, are those of a run."""
+def assert_board_is_that_of(run: Run, name: str, mark: str = "leaderboard") -> None:
+    """The table between marks of a document, and what it says below, are those of a run."""
     text = (ROOT / name).read_text(encoding="utf-8")
     board = list_rows(run)
-    rows = _ROW.findall(text)
+    rows = _ROW.findall(text.partition(f"<!-- {mark} -->")[2].partition(f"<!-- /{mark} -->")[0])
     assert [(rank, name) for _, rank, name, *_ in rows] == [
         ("" if row["rank"] is None else f"{row['rank']}", shorten_text(row["strategy"], 16))
         for row in board

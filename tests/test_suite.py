@@ -94,11 +94,22 @@ def test_the_predictive_board_and_what_the_documents_say_of_it() -> None:
 
 def test_what_the_documents_say_of_the_board() -> None:
     """The headline of README and docs is that of the run, sentence by sentence."""
-    run = stored("suite")
-    for page in ("README.md", "docs/scenarios.md"):
-        words = text_of(page).replace("\u2212", "-")
-        for sentence in finding(run, list_rows(run)):
-            assert sentence.replace("\u2212", "-") in words, (page, sentence)
+    for name in ("suite", "after"):
+        run = stored(name)
+        for page in ("README.md", "docs/scenarios.md"):
+            words = text_of(page).replace("\u2212", "-")
+            for sentence in finding(run, list_rows(run)):
+                assert sentence.replace("\u2212", "-") in words, (page, sentence)
+    rows = {row["strategy"]: row for row in list_rows(stored("after"))}
+    said = re.search(
+        r"`diagnosed` is second with a gain of (\S+) \((\S+) to (\S+)\), `shifted`.{0,60} has (\S+):",
+        text_of("README.md"),
+    )
+    own = rows["diagnosed"]
+    figures = [own["gain"], own["gain_low"], own["gain_high"], rows["shifted"]["gain"]]
+    assert said is not None
+    assert [as_printed(text) for text in said.groups()] == figures
+    assert own["rank"] == 2
 
 
 def test_a_board_says_what_its_strategies_could_read_and_that_yardsticks_lead_nothing() -> None:
