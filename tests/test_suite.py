@@ -102,7 +102,8 @@ def test_what_the_documents_say_of_the_board() -> None:
                 assert sentence.replace("\u2212", "-") in words, (page, sentence)
     rows = {row["strategy"]: row for row in list_rows(stored("after"))}
     said = re.search(
-        r"`diagnosed` is second with a gain of (\S+) \((\S+) to (\S+)\), `shifted`.{0,60} has (\S+):",
+        r"`diagnosed` is second with a gain of (\S+) \((\S+) to (\S+)\), "
+        r"`shifted`.{0,60} has (\S+):",
         text_of("README.md"),
     )
     own = rows["diagnosed"]
