@@ -19,10 +19,11 @@ from femubench.core.errors import InputError
 from femubench.core.run.executor import count_workers
 from femubench.core.run.handed_in import judge_answers, name_answers
 from femubench.core.run.provenance import plan_digest
+from femubench.core.schema.records import Models
 from femubench.core.schema.results import BLOCKS, JobResult, Run
 from femubench.core.score.bounded_gain import Rule
 from femubench.core.score.leaderboard import list_rows
-from femubench.core.score.ranking import Models, Scale
+from femubench.core.score.ranking import Scale
 from femubench.core.score.scoring import reference_of
 from femubench.core.twin.twins import Twin, again
 
