@@ -171,7 +171,9 @@ def test_unstretched_a_file_gives_what_was_published(name: str) -> None:
         np.testing.assert_allclose(own.frequencies, known.frequencies, rtol=noise)
         left = (own.shapes * known.shapes).sum(axis=0) ** 2
         mac = left / ((own.shapes**2).sum(axis=0) * (known.shapes**2).sum(axis=0))
-        assert mac.min() > 1 - 20 * structure.shape_scatter**2 - 1e-3
+        # The scatter is a share of the largest reading, the more of a shape the fewer move with it.
+        peak = np.square(known.shapes).max(axis=0) / np.square(known.shapes).mean(axis=0)
+        assert (mac > 1 - 2 * peak * structure.shape_scatter**2 - 1e-3).all()
     apart = abs(found.model.stiffness - case.model.stiffness).max()
     assert apart < 1e-8 * abs(case.model.stiffness).max()
     assert found.measurement.total_mass is not None

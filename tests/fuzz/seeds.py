@@ -17,6 +17,8 @@ CASES = sorted(
     path.parent
     for room in ("tests/cases", "tests/handwritten", "scenarios")
     for path in (ROOT / room).rglob("case.toml")
+    # The modes of these are in files that a user has.
+    if path.parent.name not in ("four-storey", "eighteen-storey")
 )
 _DOFS = "row,node,direction,x,y,z\n" + "".join(f"{i},n{i},x,{i}.0,0,0\n" for i in range(1, 5))
 _MASS = "4 4 4\n" + "".join(f"{i} {i} {1.0 + 0.5 * i}\n" for i in range(1, 5))
