@@ -203,6 +203,16 @@ def test_matrices_changed_as_a_whole_cannot_go_back(case: Case, tmp_path: Path) 
         write_case(tmp_path / "other", case, other)
 
 
-def test_too_many_sensors_leave_the_model_whole(case: Case) -> None:
+def test_a_basis_without_room_says_how_far_it_is_off() -> None:
+    assert reduce_groups(MODEL, KEPT, 12, most=90).moved > 0.01
+
+
+def test_what_leaves_no_small_model_leaves_the_whole_one(folder: Path) -> None:
     with pytest.raises(ModelError, match="coordinates of 60"):
         reduce_groups(MODEL, KEPT, 12, most=60)
+    groups = {**MODEL.groups, "odd": -2.0 * MODEL.stiffness}
+    read = read_case(folder)
+    odd = replace(read, model=replace(read.model, groups=groups))
+    kept = reduce_case(odd, above=500)
+    assert (kept.whole, kept.model) == (None, odd.model)
+    assert "times the stiffness of group 'odd' leaves no model" in kept.notes[-1]

@@ -75,8 +75,8 @@ def reduce_groups(
         most: coordinates.
 
     Raises:
-        ModelError: when kept rows and modes alone are more than the coordinates, or the model has
-            no modes.
+        ModelError: when kept rows and modes alone are more than the coordinates, the model has no
+            modes, or a factor on a group leaves no model.
     """
     rigid = rigid_body_vectors(model.dofs)
     kept = _hold_rigid(kept, rigid)
@@ -93,7 +93,11 @@ def reduce_groups(
     for name, part in basis.groups.items():
         known = part.is_mass or group_prior_std(model, name[1]) < _UNKNOWN
         for factor in PART_FACTORS if known else JOINT_FACTORS:
-            moved = max(moved, basis.settle(name, factor, count, tolerance))
+            try:
+                moved = max(moved, basis.settle(name, factor, count, tolerance))
+            except la.LinAlgError:
+                what = f"{factor:g} times the {name[0]} of group {name[1]!r} leaves no model"
+                raise ModelError(what) from None
     turn = _physical_coordinates(basis.vectors[kept], basis.coordinates(rigid))
     small = {name: turn.T @ part.small @ turn for name, part in basis.parts.items()}
     groups, mass_groups = (
@@ -198,8 +202,9 @@ class _Basis:
                 if moved < tolerance:
                     break
             before = frequencies
-            if not self._add_residuals(group, factor, values, x, tolerance, solver):
-                moved = 0.0 if self.size < self.most else moved
+            added, left = self._add_residuals(group, factor, values, x, tolerance, solver)
+            if not added:
+                moved = left
                 break
         return moved
 
@@ -228,8 +233,12 @@ class _Basis:
         x: FloatArray,
         tolerance: float,
         solver: ShiftedModel,
-    ) -> int:
-        """Add the response to the residuals of modes with a factor on a group; return how many."""
+    ) -> tuple[int, float]:
+        """Add the response to the residuals of modes with a factor on a group.
+
+        Returns:
+            How many vectors were added, and how far they would move a frequency, relative.
+        """
         model, shapes = self.solver.model, self.vectors @ x
         residual = model.stiffness_times(shapes) - values * model.mass_times(shapes)
         change = (factor - 1.0) * group.times(shapes)
@@ -238,6 +247,8 @@ class _Basis:
         # Few directions of force make up most residuals: those of what connects two parts.
         gram = residual.T @ residual
         strength, turn = la.eigh(gram)
+        if not (strength > 0.0).any():
+            return 0, 0.0
         residual = residual @ turn[:, strength > 1e-10 * strength[-1]]
         answer = solver.solve(residual)
         # With energy H of the answers at this factor, G H^-1 G lowers the eigenvalues, relatively.
@@ -246,13 +257,16 @@ class _Basis:
         if solver is self.solver and not group.is_mass:
             own = answer[group.rows]
             energy += (factor - 1.0) * (own.T @ (group.matrix @ own))
+        if not (energy.diagonal() > 0.0).all():
+            raise la.LinAlgError("a motion without energy")
         scale = 1.0 / np.sqrt(energy.diagonal())
         strength, turn = la.eigh(scale[:, None] * energy * scale)
         sound = strength > 1e-12 * strength[-1]
         ways = scale[:, None] * turn[:, sound] / np.sqrt(strength[sound])
         left, gain, _ = la.svd(ways.T @ pull)
         kept = np.flatnonzero(np.square(gain) > 2.0 * _SHARE * tolerance)[:_A_ROUND]
-        return self.add(answer @ (ways @ left[:, kept])) if len(kept) else 0
+        added = self.add(answer @ (ways @ left[:, kept])) if len(kept) else 0
+        return added, 0.5 * float(np.square(gain).max(initial=0.0))
 
 
 def _hold_rigid(kept: IntArray, rigid: FloatArray) -> IntArray:
