@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse as sp
+import seeds
 from hypothesis import example, given, settings, strategies as st
 from samples import one_of_each
 
@@ -47,14 +48,7 @@ from femubench.core.modal.measurement import Measurement
 
 HERE = Path(__file__).parent
 CASES = HERE / "cases"
-# Their modes are in files that a user has.
-READ_IN_PLACE = ("four-storey", "eighteen-storey")
-FOLDERS = sorted(
-    file.parent
-    for above in (HERE.parent / "scenarios", CASES)
-    for file in above.glob("**/case.toml")
-    if file.parent.name not in READ_IN_PLACE
-)
+FOLDERS = [folder for folder in seeds.CASES if "handwritten" not in folder.parts]
 
 
 def frame_of(case: Case) -> Frame:

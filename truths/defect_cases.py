@@ -22,8 +22,8 @@ from truths.posing import DEFECTS
 from truths.prestress import with_misfit
 from truths.seats import rigid_fit
 from truths.solid import Solid
-from truths.structure import Place, Structure
-from truths.suite import AFTER, mesh_differences, structures, write_files
+from truths.structure import AFTER, Place, Structure
+from truths.suite import mesh_differences, structures, write_files
 from truths.truth_text import rounded, truth_text
 
 Array = npt.NDArray[np.float64]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from femubench.core.challenge import posing
 from femubench.core.challenge.truth_file import KnownCase, read_truth
+from truths.structure import AFTER
 
 ROOT = Path(__file__).parents[1]
 SUITE = ROOT / "scenarios" / "suite"
@@ -24,7 +25,7 @@ def first_folders(suite: Path = SUITE) -> list[Path]:
     """Return the structures that defects and faults are drawn on: none after the rule."""
     index = suite / "suite.toml"
     listed = tomllib.loads(index.read_text(encoding="utf-8")) if index.exists() else {}
-    later = {name for name, item in listed.items() if "after the rule" in item["classes"]}
+    later = {name for name, item in listed.items() if AFTER in item["classes"]}
     return [p.parent for p in sorted(suite.glob("*/case.toml")) if p.parent.name not in later]
 
 

@@ -29,6 +29,8 @@ class Material:
         return Material(self.E * stiffness, self.nu, self.rho * mass)
 
 
+# Class of the structures that were made after the rule of the boards was fixed.
+AFTER = "after the rule"
 STEEL = Material(210e9, 0.3, 7850.0)
 ALUMINIUM = Material(70e9, 0.33, 2700.0)
 

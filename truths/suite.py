@@ -16,12 +16,11 @@ from truths.drawing import case_text, text
 from truths.measurement import modes_csv, record, sensors_csv
 from truths.modes_of import Observed, assembled, mesh_difference, mesh_of, modes_of
 from truths.picture import picture
-from truths.structure import Structure
+from truths.structure import AFTER, Structure
 
 Array = npt.NDArray[np.float64]
 SUITE = Path(__file__).parents[1] / "scenarios" / "suite"
-# Classes: structures made after the rule of the boards was fixed, and those it was made with.
-AFTER, BEFORE = "after the rule", "before the rule"
+BEFORE = "before the rule"  # class of the structures that the rule of the boards was made with
 LARGEST_DIFFERENCE = 0.007  # of a listed mode's frequency, between the two meshes
 
 

@@ -146,7 +146,7 @@ def frame_places(model: Model, places: Sequence[Place]) -> dict[Place, Place]:
 def dofs_csv(geometry: MatrixGeometry) -> bytes:
     """Return the table row,node,direction,x,y,z, nodes in the order of their names."""
     dofs, internal = geometry.dofs, geometry.dofs.internal
-    order = np.arange(len(dofs))
+    marked, order = bool(internal.any()), np.arange(len(dofs))
     if np.any(np.diff(np.unique(dofs.node, return_index=True)[1]) <= 0):
         order = np.argsort(dofs.node, kind="stable")  # nodes by their numbers
     rows = [
@@ -155,12 +155,11 @@ def dofs_csv(geometry: MatrixGeometry) -> bytes:
             geometry.names[dofs.node[i]],
             dofs.direction[i],
             *(number(v) for v in dofs.xyz[i]),
-            *([int(internal[i])] if internal.any() else []),
+            *([int(internal[i])] if marked else []),
         ]
         for i in order
     ]
-    columns = [*DOF_COLUMNS, *([INTERNAL] if internal.any() else [])]
-    return csv_bytes(columns, rows)
+    return csv_bytes([*DOF_COLUMNS, *([INTERNAL] if marked else [])], rows)
 
 
 def matrix_keys(

@@ -64,6 +64,11 @@ class MatrixGeometry:
         }
 
     @cached_property
+    def placed(self) -> tuple[str, ...]:
+        """Return the names of the nodes that move with the body, in the order of `points`."""
+        return tuple(self.places)
+
+    @cached_property
     def points(self) -> FloatArray:
         """Return where the nodes are in m, (k, 3)."""
         return np.array(list(self.places.values()))
@@ -74,8 +79,8 @@ class MatrixGeometry:
         Arguments:
             xyz: in m, (k, 3).
         """
-        found, names = cKDTree(self.points).query(xyz)[1], tuple(self.places)
-        return [(names[i], self.points[i]) for i in np.atleast_1d(found)]
+        found = cKDTree(self.points).query(xyz)[1]
+        return [(self.placed[i], self.points[i]) for i in np.atleast_1d(found)]
 
     def node(self, place: Place) -> str:
         """Return the node of a place; raises Misfit."""
@@ -106,8 +111,8 @@ class MatrixGeometry:
 
     def near(self, xyz: Vector | FloatArray) -> list[tuple[str, float]]:
         """Return the nodes within 1e-6 m of a point with their distances."""
-        gaps, names = np.linalg.norm(self.points - np.array(xyz), axis=1), tuple(self.places)
-        return [(names[i], float(gaps[i])) for i in np.flatnonzero(gaps <= ON_MEMBER)]
+        gaps = np.linalg.norm(self.points - np.array(xyz), axis=1)
+        return [(self.placed[i], float(gaps[i])) for i in np.flatnonzero(gaps <= ON_MEMBER)]
 
     def row_at(self, xyz: FloatArray, direction: str) -> int:
         """Return the row that a sensor reads; raises Misfit."""

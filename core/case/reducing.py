@@ -21,7 +21,7 @@ _MODES = 6  # that have to be right in addition to the measured ones
 _MOST_KEPT = DENSE_LIMIT // 2
 _LARGE = 2000  # degrees of freedom: up to here a basis takes as long as what it saves
 _SAME = 1e-9  # of the diagonal: what rounding makes of an unchanged entry
-TOLERANCE = 1e-3
+_TOLERANCE = 1e-3
 
 
 def reduce_case(case: Case, above: int = _LARGE) -> Case:
@@ -39,13 +39,13 @@ def reduce_case(case: Case, above: int = _LARGE) -> Case:
         return case
     counts = [len(case.measurement), *(len(m.measurement) for m in case.modifications)]
     try:
-        found = reduce_groups(model, _kept_rows(case), max(counts) + _MODES, tolerance=TOLERANCE)
+        found = reduce_groups(model, _kept_rows(case), max(counts) + _MODES, tolerance=_TOLERANCE)
     except ModelError as error:
         note = f"the model is not reduced to its groups: {error}"
         return replace(case, notes=(*case.notes, note))
     small = len(found.mass)
     note = f"the model is solved in {small} coordinates instead of {model.size} degrees of freedom"
-    if found.moved > TOLERANCE:
+    if found.moved > _TOLERANCE:
         note += f": with groups far from their values frequencies are {found.moved:.1%} off"
     return replace(case, model=_small_model(model, found), whole=model, notes=(*case.notes, note))
 

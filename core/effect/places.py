@@ -392,7 +392,7 @@ def point_places(model: Model) -> tuple[str, ...]:
         ('rung-middle@0.25', 'rung-middle@0.5', 'rung-middle@0.75')
     """
     if model.structure is None:
-        return tuple(model.geometry.places) if isinstance(model.geometry, MatrixGeometry) else ()
+        return model.geometry.placed if isinstance(model.geometry, MatrixGeometry) else ()
     frame = model.structure.frame
     points = [joint.name for joint in frame.joints]
     for member in frame.members:
