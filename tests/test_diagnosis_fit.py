@@ -14,6 +14,8 @@ from scipy import integrate, optimize
 
 from femubench import Model
 from femubench.core.challenge.structures import structure_named
+from femubench.core.diagnosis.tables import find_passengers
+from femubench.core.errors import ModelError
 from femubench.core.fit.modal_basis import solve_pencil
 from femubench.core.fit.modal_fit import Fit, Problem, State, bounds_of, fit, state_at
 from femubench.core.fit.projection import Projection
@@ -331,3 +333,14 @@ def test_evidence_is_the_integral_of_likelihood_times_prior(
     found = fit(small, parts, np.full(len(parts), 0.2), steps=40)
     assert found is not None
     assert found.log_evidence == pytest.approx(quadrature(small, parts, found), abs=0.15)
+
+
+def test_what_alone_keeps_the_mass_positive_is_no_passenger(problems: dict[str, Problem]) -> None:
+    """Without it the other cause takes away more mass than there is."""
+    problem = problems["hframe"]
+    part = part_at(problem, "density", "all")
+    away = np.array([-30.0])
+    with pytest.raises(ModelError, match="indefinite"):
+        state_at(problem, (part,), away)
+    both = state_at(problem, (part, part), np.concatenate([away, -away]))
+    assert find_passengers(both) == [False, False]

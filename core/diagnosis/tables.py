@@ -12,6 +12,7 @@ from femubench.core.diagnosis.region import Regions
 from femubench.core.diagnosis.symmetry import mirror_places
 from femubench.core.diagnosis.verdict import angle_between, credible, places_of
 from femubench.core.display import count_noun
+from femubench.core.errors import ModelError
 from femubench.core.fit.modal_fit import State, state_at
 from femubench.core.inference.examine import Examination
 from femubench.core.inference.posterior import Explanation, Posterior, fits_better
@@ -170,7 +171,7 @@ def list_causes(
     posterior = examination.posterior
     spread = find_spread(posterior, explanation)
     own = examination.own_error(explanation.fit.state)
-    passengers = _passengers(explanation)
+    passengers = find_passengers(explanation.fit.state)
     causes = causes_in(explanation, 1.0, posterior.earned, spread=spread, own=own)
     first = len(causes) - len(explanation.parts)
     tied = _tied(posterior, explanation)
@@ -200,9 +201,9 @@ def list_causes(
     return found
 
 
-def _passengers(explanation: Explanation) -> list[bool]:
+def find_passengers(state: State) -> list[bool]:
     """Return which causes may as well be left out, the rest as it is; never the only one."""
-    state, parts = explanation.fit.state, explanation.parts
+    parts = state.parts
     if len(parts) < 2:
         return [False] * len(parts)
     ends = np.cumsum([len(part.hypothesis.parameters) for part in parts])
@@ -210,8 +211,12 @@ def _passengers(explanation: Explanation) -> list[bool]:
     found = []
     for k in range(len(parts)):
         rest = np.concatenate([x for j, x in enumerate(pieces) if j != k])
-        without = state_at(state.problem, (*parts[:k], *parts[k + 1 :]), rest)
-        found.append(without.chi2 - state.chi2 < settings.notable_deviations**2)
+        try:
+            without = state_at(state.problem, (*parts[:k], *parts[k + 1 :]), rest)
+        except ModelError:  # the others take away more mass than there is without this one
+            found.append(False)
+        else:
+            found.append(without.chi2 - state.chi2 < settings.notable_deviations**2)
     return found if not all(found) else [False] * len(parts)
 
 
