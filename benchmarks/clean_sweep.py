@@ -1,4 +1,4 @@
-"""Diagnose clean data beside coarse models: what is blamed though nothing is wrong.
+"""Diagnose clean data next to coarse models: what is blamed though nothing is wrong.
 
     python benchmarks/clean_sweep.py 75             # seeds 0 to 74: 300 data sets; appends, goes on
     python benchmarks/clean_sweep.py 75 --first 1000 --seconds 480

@@ -89,7 +89,7 @@ class TestWinners:
 
 
 class TestGroups:
-    def test_of_three_says_which_are_told_apart(self, symmetric: Model) -> None:
+    def test_of_three_says_which_are_set_apart(self, symmetric: Model) -> None:
         effects = [YoungsModulus(), Density(), Temperature()]
         truth = YoungsModulus().extend(symmetric, "all", [-0.015])
         problem = posed(symmetric, truth, effects)

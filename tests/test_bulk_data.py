@@ -495,7 +495,7 @@ def test_the_updated_plane_goes_back_out_in_its_units(tmp_path: Path) -> None:
     assert near(in_si(READER.read_model(path), "mm"), wanted)
 
 
-def test_included_files_are_written_beside(tmp_path: Path) -> None:
+def test_included_files_are_written_next_to_the_model(tmp_path: Path) -> None:
     (tmp_path / "bar.inc").write_text(BAR)
     main = tmp_path / "main.bdf"
     main.write_text("INCLUDE 'bar.inc'\nSPC1,1,123456,1\n")
@@ -598,7 +598,7 @@ def test_a_truss_is_rods_between_hinges(model: Callable[..., Model]) -> None:
     assert found.total_mass == pytest.approx(total)
 
 
-def test_a_rod_beside_bars_pulls_and_twists_but_turns_with_no_joint(
+def test_a_rod_next_to_bars_pulls_and_twists_but_turns_with_no_joint(
     model: Callable[..., Model],
 ) -> None:
     portal = CLAMPED + f"GRID,3,,0.,.6,0.\nGRID,4,,{L},.6,0.\nCBAR,2,10,3,4,0.,1.,0.\n"

@@ -66,7 +66,7 @@ def test_tables_say_the_same_as_keys(tmp_path: Path) -> None:
         (JOINTS, MEMBERS.replace("up_x", "twist"), "members.csv:1: twist: unknown column"),
     ],
 )
-def test_a_fault_is_told_with_file_line_and_column(
+def test_a_fault_is_said_with_file_line_and_column(
     tmp_path: Path, joints: str, members: str, stated: str
 ) -> None:
     with pytest.raises(InputError) as error:

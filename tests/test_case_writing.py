@@ -254,7 +254,7 @@ def test_every_field_of_a_frame_reads_back(
     assert all(f.default is not MISSING for f in fields(Frame)[4:])
 
 
-def test_a_model_given_beside_the_case_is_the_one_written(tmp_path: Path, ladder: Case) -> None:
+def test_a_model_given_next_to_the_case_is_the_one_written(tmp_path: Path, ladder: Case) -> None:
     frame = replace(frame_of(ladder), factors=(Factor("GJ", ("all",), 0.6),))
     lines = [
         "cause: torsion constant",

@@ -309,7 +309,7 @@ def test_a_seal_that_unpacks_to_very_much_is_refused() -> None:
         (b'{"verdict": "none"}' + b" " * 2**22, "too large"),
     ],
 )
-def test_answers_of_strangers_are_checked(tmp_path: Path, content: bytes, match: str) -> None:
+def test_answers_of_others_are_checked(tmp_path: Path, content: bytes, match: str) -> None:
     path = tmp_path / "answer.json"
     path.write_bytes(content)
     with pytest.raises(InputError, match=match) as caught:

@@ -277,7 +277,7 @@ class TestGoingOn:
         assert result.exit_code == 2
         assert "seeds needs CASE or -s" in result.stderr
 
-    def test_a_request_that_is_none_is_told_in_one_line(
+    def test_a_request_that_is_none_is_said_in_one_line(
         self, invoke: Invoke, tmp_path: Path
     ) -> None:
         for field, value in (("seeds", "x"), ("timeouts", [1]), ("timeout", -1), ("cases", 5)):

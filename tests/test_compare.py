@@ -325,7 +325,7 @@ def test_hostile_names_are_text(data: Data) -> None:
     assert len({re.sub(r"\\\|", "", line).count("|") for line in tables}) <= 3
 
 
-def test_a_threshold_that_nothing_is_held_against_is_told(data: Data) -> None:
+def test_a_threshold_that_nothing_is_held_against_is_said(data: Data) -> None:
     bare = json.loads(json.dumps(data))
     for result in bare["results"]:
         result["higher"] = None

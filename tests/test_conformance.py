@@ -174,7 +174,7 @@ def test_slow_built_in_strategies_pass(name: str) -> None:
 
 @pytest.mark.slow(5)
 @pytest.mark.usefixtures("here")
-def test_time_and_memory_are_told_and_a_ratio_is_a_warning() -> None:
+def test_time_and_memory_are_said_and_a_ratio_is_a_warning() -> None:
     physical = BUILT_IN.strategies["physical"]
     found = verdicts("strategy", toys.Good(), reference=physical)
     assert re.fullmatch(

@@ -133,7 +133,7 @@ def test_without_a_list_there_is_no_suite(tmp_path: Path, monkeypatch: pytest.Mo
         case_folders(["suite"], plugins.scenarios)
 
 
-class TestStrangers:
+class TestOutsiders:
     def offering(self, *scenarios: Scenario) -> Plugins:
         class Plugin:
             @hookimpl

@@ -141,7 +141,7 @@ DATA: dict[str, tuple[Edit, str, float | None]] = {
         for name in ("modes-swapped", "sensor-gain", "sigma-misstated")
     ],
 )
-def test_a_fault_of_the_data_is_named_mended_and_nothing_else(name: str) -> None:
+def test_a_fault_of_the_data_is_named_corrected_and_nothing_else(name: str) -> None:
     edit, place, size = DATA[name]
     sound = clean("ladder", 1)
     found = with_a_wrong_sign() if name == "sensor-sign" else diagnosed(edit(sound))
@@ -159,7 +159,7 @@ def test_a_fault_of_the_data_is_named_mended_and_nothing_else(name: str) -> None
         np.testing.assert_array_equal(found.subject.measurement.shapes, sound.measurement.shapes)
 
 
-def test_deviations_stated_too_small_are_told_with_the_factor() -> None:
+def test_deviations_stated_too_small_are_said_with_the_factor() -> None:
     small = partial(edited, lambda m: replace(m, shape_std=m.shape_std / 3.0))
     found = diagnosed(small(clean("ladder", 1)))
     assert faults_of(found) == [("sigma-misstated", "data")]
@@ -214,7 +214,7 @@ def test_a_frequency_that_is_off_like_the_others_is_not_called_wrong() -> None:
     assert faults_of(diagnosed(off)) == []
 
 
-def test_deviations_stated_too_large_are_told_and_the_data_stay() -> None:
+def test_deviations_stated_too_large_are_said_and_the_data_stay() -> None:
     sound = clean("ladder", 1)
     found = diagnosed(edited(lambda m: replace(m, shape_std=3.0 * m.shape_std), sound))
     assert isinstance(found.subject, Case)
@@ -232,7 +232,7 @@ def test_faults_can_be_left_out() -> None:
     assert found.verdict == "unknown"
 
 
-def test_a_cause_beside_a_fault_is_still_named() -> None:
+def test_a_cause_next_to_a_fault_is_still_named() -> None:
     blind = draw_case(3, "A", effect="added-mass")
     found = diagnosed(SIGN(blind.case))
     assert faults_of(found) == [("sensor-sign", "sensor:P6z")]
@@ -310,7 +310,7 @@ class _Offers:
         return list(self.faults)
 
 
-def test_a_strangers_fault_is_found() -> None:
+def test_a_fault_of_others_is_found() -> None:
     (fault,) = load_plugins([], {"toy": _Offers(Octave)}).faults.values()
     sound = clean("ladder", 1)
     wrong = edited(partial(multiply, "frequencies", [1.0, 1.0, 2.0]), sound)

@@ -230,7 +230,7 @@ class TestNaming:
         assert departure(best.fit) < 1e-2
 
     @pytest.mark.slow(5)
-    def test_damage_over_many_elements_is_told_from_that_of_one(
+    def test_damage_over_many_elements_is_set_apart_from_that_of_one(
         self, model: Model, found: Callable[..., Examination]
     ) -> None:
         examination = found(MemberStiffness(), "AB", -0.3, LocalStiffnessLoss())

@@ -101,7 +101,7 @@ def at(probability: float, *causes: tuple[str, str]) -> Any:
     )
 
 
-def test_a_place_counts_whatever_is_beside_it() -> None:
+def test_a_place_counts_whatever_is_next_to_it() -> None:
     best = at(0.4, ("a", "x"), ("b", "u"))
     others = at(0.3, ("a", "x"), ("b", "v")), at(0.2, ("a", "y"), ("b", "u"))
     found = Posterior.of((best, *others, at(0.1, ("a", "z"))))

@@ -95,7 +95,7 @@ def test_fitted_values_count_as_spent(data: Data) -> None:
     assert many < few
 
 
-def test_both_tails_of_chi_square_are_told_with_their_numbers(data: Data) -> None:
+def test_both_tails_of_chi_square_are_said_with_their_numbers(data: Data) -> None:
     state = left(noise(data, np.random.default_rng(2)), data)
     state.x = np.zeros(0)
     whole, *parts = scatter_rows(state)
@@ -292,7 +292,7 @@ def test_textbook_physics_that_the_data_hardly_notice_is_no_part_of_a_name() -> 
         assert posterior(with_b, alone, plain).key(with_b) == (*("a",), *expected)
 
 
-def test_textbook_physics_in_all_that_is_left_is_named_whatever_is_beside_it() -> None:
+def test_textbook_physics_in_all_that_is_left_is_named_whatever_else_is_there() -> None:
     nothing = explained((), 1e-6, chi2=1000.0)
     core = explained(("a",), 0.6, chi2=80.0, book=("a",))
     with_b = explained(("a", "b"), 0.2, chi2=70.0, book=("a",))

@@ -233,7 +233,7 @@ def test_known_eccentricity_is_gone_on_from(models: dict[str, Model]) -> None:
         ("portal", "left-upper@0.5", 0.0, "added-mass"),
     ],
 )
-def test_a_mass_beside_the_axis_is_told_where_it_shows(
+def test_a_mass_next_to_the_axis_is_said_where_it_shows(
     name: str, place: str, widths: float, stated: str
 ) -> None:
     specimen, effect = structure_named(name), MassOffset()

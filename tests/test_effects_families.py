@@ -207,7 +207,7 @@ def test_a_wall_is_that_of_a_tube(ladder: FrameBuilder, hframe: FrameBuilder) ->
     assert parameter.upper == parameter.lower * -1.0 == pytest.approx(0.9)
 
 
-def test_a_thin_wall_is_told_from_another_modulus(ladder: FrameBuilder) -> None:
+def test_a_thin_wall_is_set_apart_from_another_modulus(ladder: FrameBuilder) -> None:
     """Bending, torsion and mass fall by different shares; the truth is a finer mesh."""
     nominal = ladder(polar=False)
     truth = WallThickness().frame(ladder(polar=False, elements=12), "BC", [-0.3])

@@ -179,7 +179,7 @@ def turning_cantilever(spring: float, count: int, rng: np.random.Generator) -> M
     )
 
 
-def test_a_foot_that_turns_is_no_damage_beside_it() -> None:
+def test_a_foot_that_turns_is_no_damage_next_to_it() -> None:
     """The equation is exact, the model has twelve elements and a rigid clamp."""
     seed = 0
     spring = 20.0 * EI / LENGTH

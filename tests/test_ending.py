@@ -238,7 +238,7 @@ def test_a_disk_that_is_full(kib: int, code: int, stated: str, tmp_path: Path) -
         assert "; to go on: bench run frame" in rest[-1]
 
 
-def test_links_that_lead_back_to_themselves_are_told(tmp_path: Path) -> None:
+def test_links_that_lead_back_to_themselves_are_said(tmp_path: Path) -> None:
     (tmp_path / "loop").symlink_to("loop")
     result = CliRunner().invoke(bench, ["publish", "loop", "x"])
     assert result.exit_code == 2

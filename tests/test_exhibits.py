@@ -196,7 +196,7 @@ class TestFiles:
         assert again.of("f" * 16) is None
 
     @pytest.mark.parametrize("text", ["", '{"modes": [], "mac": {"rows": ["x"]}}', "\0"])
-    def test_what_is_broken_is_left_out_and_told(self, text: str, tmp_path: Path) -> None:
+    def test_what_is_broken_is_left_out_and_said(self, text: str, tmp_path: Path) -> None:
         (tmp_path / FOLDER).mkdir()
         (tmp_path / FOLDER / f"{KEY}.json").write_text(text)
         exhibits = Exhibits(tmp_path)

@@ -220,14 +220,14 @@ def test_signs_of_grown_pivots_are_not_believed(
         assert ShiftedModel(model, shift).eigenvalues_below(expected) is None
 
 
-def test_rounding_that_hides_an_eigenvalue_is_told() -> None:
+def test_rounding_that_hides_an_eigenvalue_is_said() -> None:
     for smallest, expected in ((1e-11, 1), (-1e-11, 0), (1e-15, None), (-1e-15, None)):
         capacitance = np.diag([smallest, 1.0])
         assert negative_after(0, np.array([-1.0, 1.0]), capacitance) == expected
 
 
 @pytest.mark.usefixtures("back_end")
-def test_the_count_beside_an_eigenvalue_of_a_fine_mesh() -> None:
+def test_the_count_next_to_an_eigenvalue_of_a_fine_mesh() -> None:
     model = Model.of(lattice((4, 4, 1), 200))
     eigenvalues, _ = lowest_eigenpairs(model, 14)
     for near, counts in ((1e-3, {13}), (1e-7, {13, None})):

@@ -66,7 +66,7 @@ def test_nothing_to_ground_is_a_candidate_and_all_else_is(ladder: Any) -> None:
     assert free == plain
 
 
-def test_what_a_stranger_ties_to_ground_is_found_by_its_energy(ladder: Any) -> None:
+def test_what_an_outsider_ties_to_ground_is_found_by_its_energy(ladder: Any) -> None:
     model = Model.of(replace(ladder(elements=2), free=True))
     own = hypotheses_of(model, TETHER)
     assert [(h.place, h.places) for h in own] == [("A-F", 1)]

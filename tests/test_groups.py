@@ -276,7 +276,7 @@ def test_a_factor_never_reaches_zero() -> None:
     assert parameter.coordinate(parameter.value(-3.0)) == pytest.approx(-3.0)
 
 
-def test_rows_without_labels_are_told_by_motions_without_force() -> None:
+def test_rows_without_labels_are_known_by_motions_without_force() -> None:
     joints = [
         Joint(f"{side}{i}", (3.0 * i, y, z))
         for i in range(4)

@@ -127,7 +127,7 @@ def test_jobs_end_as_they_end_here(two: DaskWorkers) -> None:
     assert stable(there.results) == stable(here.results)
 
 
-def test_a_worker_that_is_not_like_this_machine_is_told_in_one_line(
+def test_a_worker_that_is_not_like_this_machine_is_said_in_one_line(
     two: DaskWorkers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     strategies = [toys.Unchanged()]

@@ -237,7 +237,7 @@ def test_workers_that_cannot_start_end_the_run(
     assert reasons == {"the worker process ended with exit code 3 before it was ready"}
 
 
-def test_wrong_input_is_told() -> None:
+def test_wrong_input_is_said() -> None:
     case = toys.tiny_case()
     with pytest.raises(InputError, match="case 'corner' occurs twice"):
         run_jobs([case, case], [toys.Unchanged()])

@@ -28,7 +28,7 @@ def answer(pool: workers.Workers[int], ask: Callable[[Any], bytes] = loaded) -> 
     return ended[0][1].answer.decode().split()
 
 
-def test_workers_start_with_what_comes_along_and_with_nothing_of_strangers() -> None:
+def test_workers_start_with_what_comes_along_and_with_nothing_of_others() -> None:
     assert toys.__name__ in sys.modules  # of the process that asks, and of no worker
     with workers.Workers[int](1).open() as pool:
         modules = set(answer(pool))

@@ -94,7 +94,9 @@ def found(run: Run, strategy: str) -> JobResult:
 
 
 @pytest.mark.parametrize("animal", zoo.ANIMALS, ids=lambda animal: animal.name)
-def test_every_animal_is_told_by_its_status(runs: dict[str, Run], animal: type[zoo.Animal]) -> None:
+def test_every_animal_is_known_by_its_status(
+    runs: dict[str, Run], animal: type[zoo.Animal]
+) -> None:
     expected = ends(animal, runs["wild"].meta["sandbox"])
     if expected is None:
         pytest.skip("it would do harm to this machine without a sandbox")

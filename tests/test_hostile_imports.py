@@ -238,7 +238,7 @@ class Scaled(Strategy):
         steps: how often.
     """
 
-    name = "scaled-by-stranger"
+    name = "scaled-by-outsider"
     citation = "A. Author 2001"
     factor: float = 1.0
     steps: int = 1
@@ -261,21 +261,21 @@ class Scaled(Strategy):
 class Text:
     """Write the names."""
 
-    name = "stranger-text"
+    name = "outsider-text"
     suffix = ".names"
 
     def render(self, run):
         return ", ".join(sorted({result.strategy for result in run.results}))
 
 class Bytes(Text):
-    name = "stranger-bytes"
+    name = "outsider-bytes"
     suffix = ".bin"
 
     def render_bytes(self, run):
         return b"\\0" + self.render(run).encode()
 
 class Effect:
-    name = "stranger-effect"
+    name = "outsider-effect"
     summary = "a bolt is loose"
     def places(self, model): return []
     def parameters(self, model, place): return []
@@ -315,39 +315,39 @@ def fine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 @pytest.mark.nightly
-def test_no_command_imports_a_stranger(fine: Path, tmp_path: Path) -> None:
+def test_no_command_imports_an_outsider(fine: Path, tmp_path: Path) -> None:
     store = ("--store", str(tmp_path / "store"))
     file = tmp_path / "run.json"
     for words in (
         ("plugins", "list"),
-        ("plugins", "show", "scaled-by-stranger"),
-        ("plugins", "show", "stranger-effect"),
+        ("plugins", "show", "scaled-by-outsider"),
+        ("plugins", "show", "outsider-effect"),
         ("scenarios", "list"),
         ("scenarios", "show", "strange"),
         ("run", "--help"),
         ("report", "--help"),
-        ("run", "strange", "-s", "unchanged", "-s", "scaled-by-stranger:factor=1.1",
+        ("run", "strange", "-s", "unchanged", "-s", "scaled-by-outsider:factor=1.1",
          "--json", str(file), *store),
         ("report", *store),
-        ("report", "-f", "stranger-text", *store),
-        ("report", "-f", "stranger-bytes", "--output", str(tmp_path / "out"), *store),
+        ("report", "-f", "outsider-text", *store),
+        ("report", "-f", "outsider-bytes", "--output", str(tmp_path / "out"), *store),
         ("publish", "--unverified", str(tmp_path / "pages"), str(file)),
     ):  # fmt: skip
         code, output, said, modules = bench(*words, site=fine, cwd=tmp_path)
         assert code == 0, (words, output, said)
         assert MODULE not in modules, words
-        if "stranger-text" in words:
-            assert output.strip() == "scaled-by-stranger:factor=1.1, unchanged"
+        if "outsider-text" in words:
+            assert output.strip() == "scaled-by-outsider:factor=1.1, unchanged"
     (written,) = (tmp_path / "out").glob("*.bin")
-    assert written.read_bytes() == b"\0scaled-by-stranger:factor=1.1, unchanged"
+    assert written.read_bytes() == b"\0scaled-by-outsider:factor=1.1, unchanged"
     results = json.loads(file.read_text())["results"]
     assert {result["status"] for result in results} == {"ok"}
     scores = {(r["strategy"], r["nominal"]): r["used"]["rms_percent"] for r in results}
-    assert scores["unchanged", "drawn"] != scores["scaled-by-stranger:factor=1.1", "drawn"]
+    assert scores["unchanged", "drawn"] != scores["scaled-by-outsider:factor=1.1", "drawn"]
 
 
 def found_here(plugins: Plugins) -> ForeignStrategy:
-    found = plugins.strategies["scaled-by-stranger"]
+    found = plugins.strategies["scaled-by-outsider"]
     assert isinstance(found, ForeignStrategy)
     return found
 
@@ -359,18 +359,18 @@ def test_a_strategy_is_known_by_its_description(fine: Path) -> None:
     assert (found.needs, found.promises, found.baseline) == (frozenset(), frozenset(), False)
     assert doc_of(found).startswith("Scale the stiffness.")
     changed = strategy_of(
-        "scaled-by-stranger:damping=1,steps=2,stiffness.ry=3", {found.name: found}
+        "scaled-by-outsider:damping=1,steps=2,stiffness.ry=3", {found.name: found}
     )
-    assert changed.name == "scaled-by-stranger:damping=1,steps=2,stiffness.ry=3"
+    assert changed.name == "scaled-by-outsider:damping=1,steps=2,stiffness.ry=3"
     inner: Any = changed
     assert inner.base.options == {
         "factor": 1.0, "steps": 2, "inner.damping": 1.0, "stiffness.ry": 3.0,
     }  # fmt: skip
     assert inner.needs == {"shapes"}
     assert (
-        label_variant(inner.base).name == "scaled-by-stranger:steps=2,damping=1.0,stiffness.ry=3.0"
+        label_variant(inner.base).name == "scaled-by-outsider:steps=2,damping=1.0,stiffness.ry=3.0"
     )
-    assert strategies["scaled-by-stranger"](factor=2.0).name == "scaled-by-stranger:factor=2.0"
+    assert strategies["scaled-by-outsider"](factor=2.0).name == "scaled-by-outsider:factor=2.0"
     assert MODULE not in sys.modules
 
 
@@ -413,7 +413,7 @@ def test_its_version_changes_with_its_source(fine: Path) -> None:
 
 def test_an_effect_and_a_reader_are_imported_by_who_uses_them(fine: Path) -> None:
     plugins = load_plugins()
-    assert "stranger-effect" in plugins.effects
+    assert "outsider-effect" in plugins.effects
     reader: Any = next(r for r in plugins.readers.values() if r.name == "third party reader")
     assert hasattr(reader, "read_nodes")
     assert not hasattr(reader, "read_model")
@@ -421,7 +421,7 @@ def test_an_effect_and_a_reader_are_imported_by_who_uses_them(fine: Path) -> Non
     assert reader.read_nodes(Path("x")) == {}
     assert MODULE in sys.modules
     sys.modules.pop(MODULE)
-    effect: Any = plugins.effects["stranger-effect"]
+    effect: Any = plugins.effects["outsider-effect"]
     assert effect.summary == "a bolt is loose"
     assert MODULE in sys.modules
 
@@ -474,8 +474,8 @@ def test_what_a_description_says_is_checked(
     loader._known.clear()
     (fault,) = [one for one in plugins.broken if one.plugin == "fine"]
     assert says in fault.message
-    assert "scaled-by-stranger" not in plugins.strategies
-    assert "stranger-text" in plugins.reporters
+    assert "scaled-by-outsider" not in plugins.strategies
+    assert "outsider-text" in plugins.reporters
 
 
 def test_a_terminal_does_not_obey_what_a_plugin_says(tmp_path: Path) -> None:

@@ -47,7 +47,7 @@ def test_stated_deviations_are_those_of_repeats(small: Any) -> None:
         assert covered(scores, name) > 0.7
 
 
-def test_close_modes_are_told_apart(small: Any, found: Identification) -> None:
+def test_close_modes_are_set_apart(small: Any, found: Identification) -> None:
     gaps = np.diff(small.frequencies) / small.frequencies[:-1]
     k = int(gaps.argmin())
     assert gaps[k] == pytest.approx(0.01)

@@ -272,7 +272,7 @@ class Scaled:
 
 class TestCatalogues:
     @pytest.mark.parametrize("kind", [KeyError, femubench.InputError])
-    def test_unknown_names_are_told_with_near_ones(self, kind: type[Exception]) -> None:
+    def test_unknown_names_are_said_with_near_ones(self, kind: type[Exception]) -> None:
         with pytest.raises(kind, match=r"^no case 'fram'; did you mean 'frame' or 'hframe'\?$"):
             femubench.cases["fram"]
         with pytest.raises(kind, match="no strategy 'loca'; did you mean 'local'"):
@@ -301,11 +301,11 @@ class TestRank:
         assert run.leaderboard["strategy"].tolist()[0] in names
         assert run.modes["strategy"].nunique() == 5
 
-    def test_what_cannot_be_told_apart_is_refused(self) -> None:
+    def test_what_cannot_be_set_apart_is_refused(self) -> None:
         with pytest.raises(femubench.InputError, match="strategy 'scaled' occurs twice"):
             femubench.rank("rod", [Scaled(held=[1]), Scaled(held=[2])])
 
-    def test_what_cannot_be_sent_to_a_worker_is_told(self) -> None:
+    def test_what_cannot_be_sent_to_a_worker_is_said(self) -> None:
         run = femubench.rank("rod", [Scaled(held=threading.Lock())], jobs=1, nominal="drawn")
         (reason,) = run.table["reason"]
         assert reason.startswith("Scaled cannot be sent to a worker process: TypeError")

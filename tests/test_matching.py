@@ -47,7 +47,7 @@ def read(tmp_path: Path, reader: Reader, keys: str = "") -> Case:
     return read_case(folder, readers=(reader,))
 
 
-def test_sensors_beside_the_structure_are_moved_and_said(tmp_path: Path) -> None:
+def test_sensors_next_to_the_structure_are_moved_and_said(tmp_path: Path) -> None:
     companions = PLACES + np.array([0.0, 0.004, 0.0])
     case = read(tmp_path, Reader(companions))
     np.testing.assert_allclose(case.measurement.sensors.xyz, PLACES, atol=1e-12)
@@ -131,13 +131,13 @@ def test_two_sensors_at_one_place_and_direction(tmp_path: Path) -> None:
         (np.full((4, 3), np.nan), "", "expected sensors: a table label,x,y,z,direction"),
     ],
 )
-def test_what_would_fit_is_told(tmp_path: Path, xyz: np.ndarray, keys: str, advice: str) -> None:
+def test_what_would_fit_is_said(tmp_path: Path, xyz: np.ndarray, keys: str, advice: str) -> None:
     with pytest.raises(InputError) as fault:
         read(tmp_path, Reader(xyz), keys)
     assert advice in str(fault.value)
 
 
-def test_a_test_of_a_small_part_is_told(tmp_path: Path) -> None:
+def test_a_test_of_a_small_part_is_said(tmp_path: Path) -> None:
     case = read(tmp_path, Reader(PLACES[0] + 0.02 * (PLACES - PLACES[0])))
     assert any("the structure 1.92 m: is one of the units wrong?" in note for note in case.notes)
 

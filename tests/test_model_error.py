@@ -269,7 +269,7 @@ def test_unseen_data_lie_within_what_is_foreseen(
     assert np.sqrt(np.mean(np.square(np.concatenate(blind)))) > 1.5
 
 
-def test_a_cause_beside_a_model_error_keeps_its_size(
+def test_a_cause_next_to_a_model_error_keeps_its_size(
     problem: Problem, slopes: dict[str, FloatArray]
 ) -> None:
     """The same error stands in a reference: what is left of it hides nothing."""

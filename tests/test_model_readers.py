@@ -464,7 +464,7 @@ def test_a_missing_library_is_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path
             femubench.read_model(tmp_path / name)
 
 
-def test_rows_without_labels_or_places_are_told(tmp_path: Path) -> None:
+def test_rows_without_labels_or_places_are_said(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", K=np.eye(2), M=np.eye(2))
     with pytest.raises(InputError, match=r"no labels.*row,node,direction"):
         femubench.read_model(tmp_path / "a.npz")

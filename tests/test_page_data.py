@@ -141,7 +141,7 @@ class TestPapers:
             "offset": rows["e_offset"]["updated"],
         }
 
-    def test_stand_beside_the_case_of_the_paper_alone(self) -> None:
+    def test_stand_next_to_the_case_of_the_paper_alone(self) -> None:
         run = frame_run(1.0)
         assert papers_of(run)["frame"]["baruch"][4] == 911.3
         assert papers_of(frame_run(1.01)) == {}

@@ -83,7 +83,7 @@ def test_a_rigid_mode_turned_elastic_takes_nobody() -> None:
     assert pairing.index.tolist() == [1, 2, 3, 4, 5, 6]
 
 
-def test_shapes_alike_at_the_sensors_are_told_apart_by_frequency() -> None:
+def test_shapes_alike_at_the_sensors_are_set_apart_by_frequency() -> None:
     shapes = np.column_stack([SHAPES[:, 0], SHAPES[:, 0]])
     pairing = pair_modes(np.array([300.0, 210.0]), shapes, np.array([200.0, 310.0]), shapes)
     assert pairing.index.tolist() == [1, 0]

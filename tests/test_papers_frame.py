@@ -236,7 +236,7 @@ def test_cutoff_decides_on_the_non_zeros(rerun: Study, bench: Workbench) -> None
     assert abs(firm - 1.0) > 0.02
 
 
-def test_misprints_are_told_by_their_figures(bench: Workbench) -> None:
+def test_misprints_are_known_by_their_figures(bench: Workbench) -> None:
     right, transposed = misprints.rotations(bench)
     assert right < 0.1 * transposed
     structure = bench.cases[CASE].model.frame_structure

@@ -78,7 +78,7 @@ def from_site(site: Path) -> Plugins:
     return load_plugins([point for dist in found for point in dist.entry_points])
 
 
-def test_third_party_loads_beside_broken_ones(site: Path) -> None:
+def test_third_party_loads_next_to_broken_ones(site: Path) -> None:
     distribution(site, "fine-one", GOOD.format(name="nothing-at-all"))
     distribution(site, "no-import", "import a_module_that_nobody_has\n")
     distribution(site, "exits", "import sys\nsys.exit(3)\n")
@@ -187,7 +187,7 @@ def test_an_offer_by_reference_is_loaded_when_it_is_used(site: Path) -> None:
         ((":Nothing'", ":Nobody'"), "has no attribute 'Nobody'"),
     ],
 )
-def test_a_wrong_reference_is_told_when_it_is_used_and_of_a_stranger_at_once(
+def test_a_wrong_reference_is_said_when_it_is_used_and_of_an_outsider_at_once(
     site: Path, change: tuple[str, str], says: str
 ) -> None:
     source = REFERENCES.format(name="nothing").replace(*change)
@@ -210,7 +210,7 @@ def test_what_is_no_reference_is_refused_at_once(site: Path, value: str) -> None
     assert "'nothing' is offered as" in fault.message
 
 
-def test_function_without_decorator_is_told() -> None:
+def test_function_without_decorator_is_said() -> None:
     module = ModuleType("forgetful")
     exec("def femubench_readers(): return []", module.__dict__)
     (fault,) = load_plugins([], {"forgetful": module}).broken

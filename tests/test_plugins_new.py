@@ -119,7 +119,7 @@ def test_its_tests_fail_when_the_plugin_is_wrong(copy: Path, old: str, new: str)
 
 
 @pytest.mark.nightly
-def test_strategy_is_timed_beside_others(packages: Path) -> None:
+def test_strategy_is_timed_next_to_others(packages: Path) -> None:
     brief = ("--benchmark-max-time=0.05", "--benchmark-min-rounds=2", "--benchmark-only")
     result = pytest_of(packages / "my-strategy", *brief)
     assert result.returncode == 0, result.stdout + result.stderr
@@ -265,7 +265,7 @@ class TestShow:
                 if "(none)" not in pair:
                     strategy_of(f"{name}:{pair.replace(' ', '')}", known)
 
-    def test_unknown_name_is_told_with_near_ones(self) -> None:
+    def test_unknown_name_is_said_with_near_ones(self) -> None:
         result = invoke("plugins", "show", "barch")
         assert (result.exit_code, result.stdout) == (2, "")
         assert "did you mean 'baruch'?" in result.stderr

@@ -106,7 +106,7 @@ class TestEffort:
         with effort.piece(kind):
             clock.now += seconds
 
-    def test_no_time_is_told_before_it_is_known(self, clock: Clock) -> None:
+    def test_no_time_is_said_before_it_is_known(self, clock: Clock) -> None:
         effort, said = self.said(clock)
         with effort.scope({"single": (1, 3)}):
             self.work(effort, clock, "single", 4.0)

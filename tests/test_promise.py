@@ -86,7 +86,7 @@ def test_entries_off_by_rounding_move_the_eigenvalues_within_the_bound(stiffer: 
 
 
 @pytest.mark.parametrize("name", ["berman", "secant", "baruch"])
-def test_matrix_methods_work_beside_stiff_parts(name: str) -> None:
+def test_matrix_methods_work_next_to_stiff_parts(name: str) -> None:
     model = aeroplane(1e3)
     measurement = data(model)
     result = strategies[name]().update(model, measurement, np.random.default_rng(0))
@@ -97,7 +97,7 @@ def test_matrix_methods_work_beside_stiff_parts(name: str) -> None:
 
 
 @pytest.mark.parametrize("stiffer", [1.0, 1e3])
-def test_a_broken_promise_is_told_all_the_same(stiffer: float) -> None:
+def test_a_broken_promise_is_said_all_the_same(stiffer: float) -> None:
     model = aeroplane(stiffer)
     modes = elastic(model)
     known = eigenvalue_rounding(model, modes.shapes, modes.eigenvalues)

@@ -153,7 +153,7 @@ def test_cylindrical_axes(tmp_path: Path) -> None:
     assert sensors.directions == ("x", "y", "-x")  # outwards
 
 
-def test_system_told_in_another(tmp_path: Path) -> None:
+def test_system_said_in_another(tmp_path: Path) -> None:
     """Dataset 18 chains: a quarter turn about z, twice, is a half turn."""
     file = write(tmp_path / "a.uff", nodes_15(def_cs=[8] * 3, disp_cs=[8] * 3), *modes(*SHAPES))
     text = "".join(

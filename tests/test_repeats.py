@@ -72,7 +72,7 @@ def test_noise_draws_have_the_covariance() -> None:
     np.testing.assert_allclose(draws.std(axis=0), STD, rtol=0.02)
 
 
-def test_selection_and_errors_besides_keep_it_whole() -> None:
+def test_selection_and_errors_of_others_keep_it_whole() -> None:
     some = measured().select((3, 1)).frequency_covariance
     assert some is not None
     np.testing.assert_allclose(some, COVARIANCE[np.ix_([2, 0], [2, 0])])

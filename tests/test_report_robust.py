@@ -130,7 +130,7 @@ class TestDamage:
         (drawn / f"case-{digest[:32]}.json").write_text("{", encoding="utf-8")
         assert report("-f", "html").exit_code == 0
 
-    def test_notes_of_a_stranger_are_shown_or_left(self) -> None:
+    def test_notes_of_an_outsider_are_shown_or_left(self) -> None:
         for notes in (5, {"a": 1}, [EVIL, None]):
             run = Run({**RUN.meta, "notes": notes}, RUN.results)
             assert EVIL not in HtmlReporter().render(run)

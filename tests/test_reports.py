@@ -159,7 +159,7 @@ class TestTerminal:
         assert [row[6:9] for row in rows[1:4]] == [["0", "of", "1"]] * 3
         assert "some models lost rigid-body modes or have negative eigenvalues" in text
 
-    def test_failures_are_told_and_counted(self) -> None:
+    def test_failures_are_said_and_counted(self) -> None:
         text = TerminalReporter().render(RUN)
         assert re.search(r"beam +broken +0 +failed +stiffness: measured 3e-2,", text)
         counted = "counted as the model that was given: picky: the model has no joints."

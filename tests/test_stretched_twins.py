@@ -19,7 +19,7 @@ from femubench import read_case
 from femubench.core.case.case import Case
 from femubench.core.cli.main import bench
 from femubench.core.errors import InputError, NotApplicable
-from femubench.core.run.companions import choose_beside
+from femubench.core.run.companions import choose_companions
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.starts import Starts
 from femubench.core.score.twin_gain import TwinGain, twin_gains
@@ -285,7 +285,7 @@ def gain(families: Mapping[str, TruthFamily]) -> dict[str, TwinGain]:
     twins = list(twins_of([case], 2, 13, families))
     truth = stretch_case(case, ReducedSolid.read(case.folder / FILE), np.ones(4), None)
     able = [toys.Unchanged(), Ratios(tuple(truth.measurement.frequencies))]
-    starts = Starts(companions=choose_beside([case], twins, 2, 13))
+    starts = Starts(companions=choose_companions([case], twins, 2, 13))
     return twin_gains(run_jobs([case], able, jobs=1, starts=starts))
 
 

@@ -296,7 +296,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("change", WRONG)
-def test_what_is_wrong_is_told_in_one_line_with_its_place(change: str) -> None:
+def test_what_is_wrong_is_said_in_one_line_with_its_place(change: str) -> None:
     old, new = change.split("|")
     assert old in STUDY
     with pytest.raises(InputError) as caught:

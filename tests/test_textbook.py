@@ -84,7 +84,7 @@ def test_a_run_starts_from_both_models_and_ranks_from_the_textbook_one(tmp_path:
     assert again.results == both.results
 
 
-STRANGER = """
+OUTSIDER = """
 import femubench
 
 class Lead:
@@ -111,7 +111,7 @@ def test_no_plugin_moves_what_all_are_measured_against(
 ) -> None:
     plain = femubench.rank("frame", "unchanged", jobs=1).meta["reference"]
     monkeypatch.syspath_prepend(tmp_path)
-    put_distribution(tmp_path, "lead", STRANGER)
+    put_distribution(tmp_path, "lead", OUTSIDER)
     assert "lead-filling" in load_plugins().effects
     assert femubench.rank("frame", "unchanged", jobs=1).meta["reference"] == plain
 

@@ -106,7 +106,7 @@ def test_what_cannot_be_posed_is_one_line(tmp_path: Path, suite: Path) -> None:
         pose(room, room, suite=suite)
 
 
-def test_a_defect_is_a_case_with_the_healthy_structure_beside_it(tmp_path: Path) -> None:
+def test_a_defect_is_a_case_with_the_healthy_structure_next_to_it(tmp_path: Path) -> None:
     case_folder = tmp_path / "case"
     pose(DEFECTS / "portal-loose-joint-1", case_folder, reference=True)
     case, healthy = read_case(case_folder), read_case(SUITE / "portal")

@@ -45,7 +45,7 @@ from femubench.core.fem.sections import rectangular_tube, round_tube
 from femubench.core.library.rank import plan_again, plan_run, rank, request_of, textbook_of
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.run.companions import choose_beside
+from femubench.core.run.companions import choose_companions
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
@@ -283,7 +283,7 @@ def test_the_same_seed_gives_the_same_twins_and_another_one_others() -> None:
 def run() -> Run:
     case = builtin("frame-solid")
     twins = list(twins_of([case], 2, 11))
-    others = choose_beside([case], twins, 2, 11)
+    others = choose_companions([case], twins, 2, 11)
     truth = tuple(case.measurement.frequencies[case.measurement.frequencies > 0.0])
     able = [toys.Unchanged(), Memory(truth[:8]), Chance(), Drawn()]
     return run_jobs([case], able, seeds=(0, 1), jobs=2, starts=Starts(companions=others))

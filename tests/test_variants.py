@@ -17,7 +17,7 @@ from femubench.plugins.strategies.unchanged import Unchanged
 KNOWN: dict[str, Strategy] = {s.name: s for s in (GenericLS(), Spring(), Unchanged())}
 
 
-def test_options_are_set_and_told_by_the_name() -> None:
+def test_options_are_set_and_known_by_the_name() -> None:
     words = "generic-ls:orthogonality=false, plain=full"
     found = strategy_of(words, KNOWN)
     assert isinstance(found, Variant)

@@ -22,7 +22,7 @@ from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import check_strategy, choose_names
 from femubench.core.plugin.variants import Variant, label_variant, strategy_of
 from femubench.core.roles import Strategy
-from femubench.core.run.companions import Companions, choose_beside
+from femubench.core.run.companions import Companions, choose_companions
 from femubench.core.run.executor import open_executor
 from femubench.core.run.frames import modes_frame, results_frame
 from femubench.core.run.recording import Progress
@@ -272,7 +272,7 @@ def _plan(
     others = Companions()
     if request.twins:
         drawn = draw_twins_of(cases, classes, request.twins, request.twin_seed or 0)
-        others = choose_beside(cases, drawn, request.twins, request.twin_seed or 0)
+        others = choose_companions(cases, drawn, request.twins, request.twin_seed or 0)
     starts = Starts(textbook_of([*cases, *drawn]), request.nominal, classes, others)
     kept = request.to_json() if repeatable else {"nominal": request.nominal}
     return Plan(cases, strategies, request, starts, kept)

@@ -65,7 +65,7 @@ class Companions:
 NOTHING = Companions()
 
 
-def choose_beside(
+def choose_companions(
     cases: Sequence[Case], twins: Sequence[Twin], number: int, seed: int
 ) -> Companions:
     """Return twins, and the case with the smallest model to run again.

@@ -145,7 +145,7 @@ def test_what_is_downloaded_is_what_the_commands_write(
     assert opened.messages == []
 
 
-def test_case_by_case_has_every_figure_beside_the_baseline(page: Page, real: Any) -> None:
+def test_case_by_case_has_every_figure_next_to_the_baseline(page: Page, real: Any) -> None:
     read = """() => {
       const [head, ...rows] = document.querySelector("table.matrix").rows;
       const names = [...head.cells].map((th) => th.textContent);

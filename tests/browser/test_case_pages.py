@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-VIEW, TOLD = ".case-structure svg.case-view", ".case-structure .case-stated"
+VIEW, SAID = ".case-structure svg.case-view", ".case-structure .case-stated"
 PIXELS = f"document.querySelector('{VIEW}').innerHTML"
 
 
@@ -39,7 +39,7 @@ def drawn(page: Page) -> str:
 
 
 def stated(page: Page) -> str:
-    return page.locator(TOLD).inner_text()
+    return page.locator(SAID).inner_text()
 
 
 @pytest.mark.parametrize("case", ["hframe", "frame-solid"])

@@ -101,7 +101,7 @@ def test_a_small_screen_scrolls_no_chart(
 
 
 @pytest.mark.parametrize("kind", ["index", "strategy"])
-def test_what_strangers_write_is_text(view: Callable[..., Any], hostile: Path, kind: str) -> None:
+def test_what_others_write_is_text(view: Callable[..., Any], hostile: Path, kind: str) -> None:
     found = view(page_of(hostile, kind))
     page = found.page
     page.wait_for_selector("thead button")

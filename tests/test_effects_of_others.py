@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from blind_sweep import SweepCase, run_task
 from distributions import install_metadata
-from stranger_effects import CAUTION, SUMMARY, Bare, Plain, Skin
+from outside_effects import CAUTION, SUMMARY, Bare, Plain, Skin
 
 import femubench
 from femubench import Diagnosis, InputError, Model, diagnose
@@ -33,7 +33,7 @@ OURS = ("youngs-modulus", "density", "torsion-constant")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Install the package of the third party, as pip would."""
     folder = tmp_path_factory.mktemp("site")
-    install_metadata(folder, "newcomers", {"newcomers": "stranger_effects"})
+    install_metadata(folder, "newcomers", {"newcomers": "outside_effects"})
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
         draw.registered_effects.cache_clear()
