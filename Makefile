@@ -32,9 +32,9 @@ ON_ALL_CORES := -n 2 --dist loadfile --no-loadscope-reorder -p no:benchmark
 LONG := browser $(addprefix test_,conformance.py diagnosed_strategy.py diagnosis_blind.py diagnosis_faults.py \
 	harness_sandbox.py hostile_imports.py identify.py library.py publish.py resume.py standing_judge.py)
 QUICK := -m "not slow and not nightly" $(addprefix --ignore=tests/,$(LONG))
-LINT := ruff layout budgets mypy pyright
+LINT := ruff layout budgets mypy
 
-.PHONY: run check test lint nightly pytest $(LINT) docs kernels bench bench-report truths format clean
+.PHONY: run check test lint nightly pytest pyright $(LINT) docs kernels bench bench-report truths format clean
 .DELETE_ON_ERROR:
 
 run: $(VENV)/.installed
@@ -76,7 +76,7 @@ pytest: $(VENV)/.installed-test
 nightly: $(VENV)/.installed-test
 	@status=0; \
 	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest $(ON_ALL_CORES) -m nightly $(ARGS) || status=1; \
-	$(MAKE) --no-print-directory -k docs kernels truths ARGS= || status=1; \
+	$(MAKE) --no-print-directory -k pyright docs kernels truths ARGS= || status=1; \
 	exit $$status
 
 docs: $(VENV)/.installed-test

@@ -94,6 +94,17 @@ class Forecasts:
         reached = 2.0 * ndtr(np.abs(self.error[first]) / std[first]) - 1.0
         return np.asarray(np.nan_to_num(reached, nan=2.0))
 
+    def mean_crps(self, std: FloatArray) -> FloatArray:
+        """Return by band the mean CRPS with each of s common deviations, nan where unknown, (s, 2).
+
+        Arguments:
+            std: of ln f, for all forecasts alike, (s,).
+        """
+        each = np.fmin(crps_normal(self.error, std[:, None]), self.cap)
+        count = np.bincount(self.band, minlength=2)
+        shares = self.weight[:, None] * (self.band[self.mode][:, None] == np.arange(2))
+        return np.where(count > 0, each @ shares / np.maximum(count, 1), math.nan)
+
     def figures(self, common: FloatArray) -> FloatArray:
         """Return by band mean CRPS and share in the 90 % intervals, nan where unknown, (2, 2).
 
@@ -191,7 +202,7 @@ def learn_deviations(table: GainTable, textbook: Mapping[str, Forecasts]) -> Flo
         table: of the run.
         textbook: forecasts of the textbook model by case.
     """
-    scores = [[textbook[c].figures(np.full(2, s))[:, 0] for s in _DEVIATIONS] for c in table.cases]
+    scores = [textbook[case].mean_crps(_DEVIATIONS) for case in table.cases]
     units, best = table.by_structure(np.array(scores)), {}
     for k, name in enumerate(table.units):
         others = np.delete(units, k, axis=0)
