@@ -42,7 +42,7 @@ def write_example(folder: Path) -> tuple[Path, ...]:
         assert isinstance(spec.model, FrameSpec)
         better = _better(frame_of(spec.model))
         site = FrameSite(better)
-        sensors = read_sensors(files[1], site, Alignment.of(None, None, None)).sensors
+        sensors = read_sensors(files[1], site, Alignment.of(spec.measurement)).sensors
         change = spec.modification[0]
         heavier = better.with_attachments(
             attachments("masses", change.masses, site), attachments("springs", change.springs, site)

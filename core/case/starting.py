@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from femubench.core.case.case import Case
+from femubench.core.case.case import SCATTER, Case
+from femubench.core.case.faults import Remedy
 from femubench.core.case.files import CASE_FILE, LARGEST_FILE
 from femubench.core.case.matrices import reader_of, reading_with
 from femubench.core.case.model_files import further_files
+from femubench.core.case.modes import FIT_STD
 from femubench.core.case.reader import read_case
+from femubench.core.case.records import COVARIANCE, MODES, REFERENCES, SENSORS
+from femubench.core.case.response_files import read_responses
 from femubench.core.case.schema import LengthUnit
 from femubench.core.case.table_text import csv_bytes
 from femubench.core.case.tables import SUFFIXES, read_table
@@ -34,15 +39,19 @@ class Beginning:
 
     Arguments:
         model: a file with the model, or with its stiffness alone.
-        modes: a file with the measured modes.
+        modes: the file with the measured modes, the folder of an identification or a file of
+            responses; several such records are repeats.
         mass, dofs: files with the mass, and with labels or places of the rows of matrices.
         sensors: a file with the places of sensors, where `modes` has none.
         model_unit: of the lengths of the model; None where it was not stated.
-        unit, frame, tolerance: of the test, as the keys of ``[measurement]``.
+        unit, frame, tolerance, offset, without: of the test, as the keys of ``[measurement]``.
+        tables: what was identified, by name: the file that it comes from, and the table.
+        stated: what to say of it.
+        places: the file of sensors that went into it.
     """
 
     model: Path
-    modes: Path
+    modes: tuple[Path, ...]
     mass: Path | None = None
     dofs: Path | None = None
     sensors: Path | None = None
@@ -50,11 +59,30 @@ class Beginning:
     unit: LengthUnit | None = None
     frame: str | None = None
     tolerance: float | None = None
+    offset: str | None = None
+    without: str | None = None
+    tables: Mapping[str, tuple[Path, bytes]] = field(default_factory=dict)
+    stated: tuple[str, ...] = ()
+    places: Path | None = None
 
-    def files(self) -> dict[str, Path]:
-        """Return the files that are at hand, by what they are."""
-        named = {key: getattr(self, key) for key in ("model", "mass", "dofs", "modes", "sensors")}
-        return {key: path for key, path in named.items() if path is not None}
+    def files(self) -> tuple[Path, ...]:
+        """Return the files that are at hand."""
+        modes = () if self.tables else self.modes
+        every = (self.model, self.mass, self.dofs, *modes, self.sensors)
+        return tuple(path for path in every if path is not None)
+
+    def command(self, folder: Path, remedy: Remedy) -> str:
+        """Return the command that begins the case with other keys."""
+        words = ["bench", "init", str(folder)]
+        for key in ("model", "mass", "dofs"):
+            words += [] if (path := getattr(self, key)) is None else [f"--{key}", str(path)]
+        words += [word for path in self.modes for word in ("--modes", str(path))]
+        sensors = self.sensors or self.places
+        words += [] if sensors is None else ["--sensors", str(sensors)]
+        for key in ("model-unit", "unit", "frame", "offset", "tolerance", "without"):
+            value = remedy.keys.get(key, getattr(self, key.replace("-", "_")))
+            words += [] if value is None else [f"--{key}", str(value)]
+        return shlex.join(words)
 
 
 def start_case(
@@ -79,7 +107,10 @@ def start_case(
     """
     with new_folder(folder) as fresh:
         copies = _copied(given, fresh, readers)
-        used, held_out = _shared_out(given.modes, readers)
+        for name, (_, content) in given.tables.items():
+            (fresh / name).write_bytes(content)
+        modes = fresh / MODES if given.tables else given.modes[0]
+        used, held_out = _shared_out(modes, readers)
         keys = _Keys(folder.resolve().name, given, copies, used, held_out)
         (fresh / CASE_FILE).write_text(keys.text(readers), encoding="utf-8")
         try:
@@ -87,10 +118,15 @@ def start_case(
         except InputError as error:
             # The file that the user has, and not its copy.
             origins = {fresh / name: path for path, name in copies.items()}
+            origins |= {fresh / name: path for name, (path, _) in given.tables.items()}
             file = None if error.file is None else origins.get(Path(error.file))
-            line = error.line if file is not None else None
+            line = error.line if file is not None and file.suffix in SUFFIXES else None
+            expected = error.expected
+            if isinstance(error.remedy, Remedy) and expected is not None:
+                command = given.command(folder, error.remedy)
+                expected = expected.replace(f"with {error.remedy}", f"with `{command}`")
             raise InputError(
-                error.what, file=file, line=line, key=error.key, expected=error.expected
+                error.what, file=file, line=line, key=error.key, expected=expected
             ) from None
         (fresh / CASE_FILE).write_text(keys.text(readers, case), encoding="utf-8")
         if case.matches:
@@ -103,11 +139,11 @@ def start_case(
 
 def _copied(given: Beginning, fresh: Path, readers: Sequence[Reader]) -> dict[Path, str]:
     """Copy the files into a folder; return from every file to its name there."""
-    names = {path: path.name for path in given.files().values()}
+    names = {path: path.name for path in given.files()}
     check_regular(given.model, LARGEST_FILE)
     for further in further_files(given.model, readers):
         names.setdefault(further, os.path.relpath(further, given.model.parent))
-    taken: dict[str, Path] = dict.fromkeys((CASE_FILE, MATCHES, PICTURE), fresh)
+    taken: dict[str, Path] = dict.fromkeys((CASE_FILE, MATCHES, PICTURE, *given.tables), fresh)
     for source, name in names.items():
         if name.startswith(".."):
             what = f"{given.model.name} includes it, which lies outside of its folder"
@@ -120,6 +156,28 @@ def _copied(given: Beginning, fresh: Path, readers: Sequence[Reader]) -> dict[Pa
     return names
 
 
+def has_modes(file: Path, readers: Sequence[Reader]) -> bool:
+    """Tell whether a file holds modes, and not responses of which they are to be found.
+
+    Raises:
+        InputError: for a kind of file that nobody reads, or one that is broken.
+    """
+    if file.suffix.lower() in SUFFIXES:
+        return read_table(file).columns[0] not in ("frequency", "time")
+    reader = reader_of(file, readers)
+    if reader is None:
+        return False
+    try:
+        with reading_with(reader, file):
+            return bool(len(reader.read_modes(file)))
+    except InputError as fault:
+        try:
+            read_responses(file, readers)
+        except InputError:
+            raise fault from None
+        return False
+
+
 def _shared_out(modes: Path, readers: Sequence[Reader]) -> tuple[list[int], list[int]]:
     """Return the labels of the modes to use, and of the upper third, which is held out."""
     if modes.suffix.lower() in SUFFIXES:
@@ -130,6 +188,7 @@ def _shared_out(modes: Path, readers: Sequence[Reader]) -> tuple[list[int], list
         reader = reader_of(modes, readers)
         if reader is None:
             known = ", ".join([*SUFFIXES, *(s for r in readers for s in r.suffixes)])
+            known += ", or a folder that `bench identify` writes"
             raise InputError("unknown kind of file", file=modes, expected=known)
         with reading_with(reader, modes):
             read = reader.read_modes(modes)
@@ -154,7 +213,9 @@ class _Keys:
 
     def text(self, readers: Sequence[Reader], case: Case | None = None) -> str:
         """Return it; with a case that was read from a first one, also what that found."""
-        source = " and ".join(path.name for path in self.given.files().values())
+        given = self.given
+        every = (*given.files(), *(given.modes if given.tables else ()))
+        source = " and ".join(path.name for path in every)
         lines = [
             f"# Written by `bench init` from {source}.",
             "# Every key is explained in docs/case-format.md; an unknown key is an error.",
@@ -178,11 +239,12 @@ class _Keys:
 
     def _title(self, readers: Sequence[Reader]) -> str:
         """Return the title that a test has in its file."""
-        reader: Any = reader_of(self.given.modes, readers)
+        file = self.given.modes[0]
+        reader: Any = None if file.is_dir() else reader_of(file, readers)
         if not hasattr(reader, "read_outline"):
             return ""
-        with reading_with(reader, self.given.modes):
-            return str(reader.read_outline(self.given.modes).title)[:200]
+        with reading_with(reader, file):
+            return str(reader.read_outline(file).title)[:200]
 
     def _model(self, case: Case | None) -> Iterator[str]:
         given = self.given
@@ -206,20 +268,35 @@ class _Keys:
     def _measurement(self, case: Case | None) -> Iterator[str]:
         given = self.given
         yield "[measurement]"
-        if given.sensors is not None:
-            yield f"sensors = {_quoted(self.copies[given.sensors])}"
-        yield f"modes = {_quoted(self.copies[given.modes])}"
+        for said in given.stated:
+            yield f"# {_clean(said)}"
+        if given.sensors is not None or SENSORS in given.tables:
+            name = SENSORS if given.sensors is None else self.copies[given.sensors]
+            yield f"sensors = {_quoted(name)}"
+        yield f"modes = {_quoted(MODES if given.tables else self.copies[given.modes[0]])}"
+        if COVARIANCE in given.tables:
+            yield f'covariance = "{COVARIANCE}"'
+        if REFERENCES in given.tables:
+            yield f"# {REFERENCES}: what every response was measured to."
+        if FIT_STD.encode() in given.tables.get(MODES, (None, b""))[1][:80]:
+            shares = "frequencies = {:g}, shapes = {:g}".format(*SCATTER)
+            yield f"scatter = {{{shares}}}   # from test to test, added to what the fit says"
         if given.unit is not None:
             yield f'unit = "{given.unit}"   # of the coordinates of the sensors'
         if given.frame is not None:
             yield f"frame = {_quoted(given.frame)}   # the model's axes in those of the test"
         if given.tolerance is not None:
             yield f"tolerance = {given.tolerance!r}   # of the size of the structure"
+        if given.offset is not None:
+            yield f"offset = [{given.offset}]   # of the test's origin, in m"
+        if given.without is not None:
+            listed = ", ".join(_quoted(label) for label in given.without.split(","))
+            yield f"without = [{listed}]   # sensors that are left out"
         for note in () if case is None else case.notes:
             yield f"# {_clean(note)}"
         if case is not None and case.matches:
             yield f"# {MATCHES} lists where every sensor was taken to sit."
-        yield "shape_std = 0.015   # of the largest component, where the test states no scatter"
+        yield "shape_std = 0.015   # of the largest reading, where the test states no scatter"
         yield f"used = {list(self.used)}   # what an updating strategy is given"
         share = "the upper third: only the score sees them" if self.held_out else "too few modes"
         yield f"held_out = {list(self.held_out)}   # {share}"
