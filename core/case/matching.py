@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import permutations, product
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -21,8 +21,9 @@ from femubench.core.case.schema import LengthUnit, MeasurementSpec
 from femubench.core.case.tables import PLACES
 from femubench.core.case.units import METRES
 from femubench.core.errors import InputError
+from femubench.core.fem.frame import ACTIVE
 from femubench.core.fem.mesh import ON_MEMBER
-from femubench.core.fem.sensors import Sensors, axis_of, direction_of
+from femubench.core.fem.sensors import Sensors, axis_of, direction_of, moved_names
 from femubench.core.typing import FloatArray
 
 TOLERANCE = 0.01  # of the size of the structure
@@ -32,6 +33,7 @@ _NEAR = 0.05  # of the size of the structure: so far from it most sensors of a f
 _MOST = 0.8  # of the sensors must fit: the others may have a wrong place
 _AS_WELL = 1.25  # times the distance of the best fit, within which another one fits as well
 _FAR = 4.0  # times the distance that most sensors keep: one beyond has a wrong place
+_STEPS = 10  # of moving a test to the places nearest to it
 _STATIONS = 41  # points of a member, from which axes and units are sought
 _NAMED = re.compile(r"([+-]?)([xyz])", re.ASCII)
 
@@ -130,13 +132,14 @@ class Placement:
         site: the structure.
         alignment: how the test lies to it.
         every: all coordinates of the test as they were given, finite, (k, 3).
-        labels: of the sensors that are there.
+        labels, directions: of the sensors that are there.
     """
 
     site: Site
     alignment: Alignment
     every: FloatArray
     labels: Sequence[str] = ()
+    directions: Sequence[str] = ()
 
     @cached_property
     def size(self) -> float:
@@ -228,8 +231,8 @@ class Placement:
                     f"{match.place}, direction {way} ({other.distance:.3g} and "
                     f"{match.distance:.3g} m away)"
                 )
-                expected = f'a finer model, or one of the two left out: without = "{match.sensor}"'
-                raise self._misfit(what, expected)
+                left_out = f'without = ["{match.sensor}"], `bench init --without {match.sensor}`'
+                raise self._misfit(what, f"a finer model, or one of the two left out: {left_out}")
 
     def _misfit(self, what: str, expected: str) -> Misfit:
         """Return the fault, with the keys under which the test would fit where these are clear."""
@@ -239,111 +242,111 @@ class Placement:
             question = "is it the right model, or is one of the units wrong?"
             found = f"no unit, axes or offset fit: the sensors span {sizes}: {question}"
             return Misfit(what, f"{expected}; {found}")
-        fits = [fit for fit in fits if fit.units == fits[0].units]
-        best = min(fit.gap for fit in fits)
-        fits = [fit for fit in fits if fit.gap <= _AS_WELL * best + ON_MEMBER]
-        proper = [fit for fit in fits if np.linalg.det(fit.alignment.turn) > 0.0]
+        best = fits[0]
+        alike = [fit for fit in fits if fit.kind == best.kind]
+        near = _AS_WELL * min(fit.gap for fit in alike) + ON_MEMBER
+        alike = [fit for fit in alike if fit.gap <= near]
+        proper = [fit for fit in alike if np.linalg.det(fit.way.turn) > 0.0]
         if not proper:
-            mirrored = f"only mirrored axes {frame_text(fits[0].alignment.turn)!r} fit"
+            mirrored = f"only mirrored axes {frame_text(best.way.turn)!r} fit"
             advice = "turn one axis of the test, its coordinates and its directions"
             return Misfit(what, f"{expected}; {mirrored}: {advice}")
-        remedy = proper[0].remedy(self)
+        remedy = self._remedy(proper[0])
         if not remedy.keys:
             return Misfit(what, expected)
         text = f"{expected}; with {remedy} all fit"
         if "without" in remedy.keys:
             text = f"{expected}; put those places right, or with {remedy} the others fit"
-        others = dict.fromkeys(frame_text(fit.alignment.turn) for fit in proper[1:])
-        others.pop(frame_text(proper[0].alignment.turn), None)
-        if others:
-            text += f"; by symmetry so they do with {' or '.join(list(others)[:3])}: compare MACs"
+        frames = list(dict.fromkeys(frame_text(fit.way.turn) for fit in proper))
+        if len(frames) > 1:
+            text += f"; by symmetry so they do with {' or '.join(frames[1:4])}: compare MACs"
         return Misfit(what, text, remedy)
 
     def _fits(self) -> Iterator[Fit]:
-        """Yield the units, axes and offsets with which most of the sensors lie on the structure."""
-        cloud = cloud_of(self.site)
-        tree, own = cKDTree(cloud), self.alignment
-        middle = 0.5 * (cloud.min(axis=0) + cloud.max(axis=0))
+        """Yield units, axes and offsets with which most of the sensors lie on the structure."""
+        tree, own = cKDTree(cloud_of(self.site)), self.alignment
+        middle = 0.5 * (tree.mins + tree.maxes)
         count = max(2, int(np.ceil(_MOST * len(self.every))))
-        for offset in (False, True):
-            found = 0
-            for unit, model_unit, factor in self._unit_pairs():
-                for turn in signed_axes():
-                    points = factor * self.every @ turn.T
-                    shift = np.zeros(3) if not offset else middle - np.median(points, axis=0)
-                    for _ in range(20 if offset else 1):
-                        gaps, at = tree.query(points + shift)
-                        near = np.argsort(gaps)[:count]
-                        step = (cloud[at[near]] - points[near] - shift).mean(axis=0)
-                        shift = shift + step if offset else shift
-                    gap = float(np.sort(gaps)[count - 1])
-                    spread = size_of(points[near]) / (self.size or 1.0)
-                    if gap > _NEAR * self.size or not _EXTENT[0] <= spread <= _EXTENT[1]:
-                        continue
-                    changed = (unit != (own.unit or 1.0)) + (model_unit != own.model_unit)
-                    same = np.array_equal(turn, own.turn)
-                    rank = (changed, -round(spread, 1), not same, gap)
-                    scale = METRES[model_unit or "m"] / METRES[own.model_unit or "m"]
-                    way = replace(
-                        own, unit=unit, turn=turn, offset=scale * shift, model_unit=model_unit
-                    )
-                    found += 1
-                    yield Fit(way, gap, rank, factor, shift)
-            if found:
+        there = directions_of(self.site)
+        own_scale = METRES[own.model_unit or "m"]
+        units = [(u, v) for u in METRES.values() for v in (METRES if own.model_unit else (None,))]
+        found = False
+        for offset, (unit, model_unit) in product((False, True), units):
+            factor = unit * own_scale / METRES[model_unit or "m"]
+            size = factor * size_of(self.every) / (self.size or 1.0)
+            if found and offset:
                 return
+            if offset and not _EXTENT[0] <= size <= _EXTENT[1]:
+                continue
+            for turn in signed_axes():
+                points = factor * self.every @ turn.T
+                points += middle - np.median(points, axis=0) if offset else own.offset
+                for _ in range(_STEPS if offset else 1):
+                    gaps, at = tree.query(points)
+                    near = np.argsort(gaps)[:count]
+                    step = (tree.data[at[near]] - points[near]).mean(axis=0)
+                    points = points + step if offset else points
+                gap, spread = float(gaps[near[-1]]), size_of(points[near]) / (self.size or 1.0)
+                if gap > _NEAR * self.size or not _EXTENT[0] <= spread <= _EXTENT[1]:
+                    continue
+                shift = (points - factor * self.every @ turn.T)[0] * unit / factor
+                way = replace(own, unit=unit, turn=turn, offset=shift, model_unit=model_unit)
+                lost = sum(not set(moved_names(way.direction(d))) <= there for d in self.directions)
+                changed = (unit != (own.unit or 1.0)) + (model_unit != own.model_unit)
+                kind = (changed, -round(spread, 1), lost, unit, model_unit or "")
+                found = True
+                yield Fit((*kind, not np.array_equal(turn, own.turn), gap), way, points)
 
-    def _unit_pairs(self) -> Iterator[tuple[float, LengthUnit | None, float]]:
-        """Yield units of test and model, and the factor from the one to the structure as it is."""
-        own = self.alignment
-        for unit in METRES.values():
-            for model_unit in METRES if own.model_unit else [None]:
-                scale = METRES[model_unit or "m"] / METRES[own.model_unit or "m"]
-                yield unit, model_unit, unit / scale
+    def _remedy(self, fit: Fit) -> Remedy:
+        """Return the keys of a fit that differ from those as they are."""
+        own, way = self.alignment, fit.way
+        gaps = self._gaps(fit.points) / (self.size or 1.0)
+        far = gaps > max(_FAR * fit.gap / (self.size or 1.0), _NEAR)
+        keys = {
+            "model-unit": way.model_unit if way.model_unit != own.model_unit else None,
+            "unit": next(u for u, metres in METRES.items() if metres == way.unit),
+            "frame": None if np.array_equal(way.turn, own.turn) else frame_text(way.turn),
+            "offset": ",".join(f"{value:.4g}" for value in way.offset),
+            "tolerance": f"{float(f'{1.05 * gaps[~far].max():.2g}'):g}",
+            "without": ",".join(self.labels[i] for i in np.flatnonzero(far)),
+        }
+        same = {
+            "unit": way.unit == (own.unit or 1.0),
+            "offset": np.abs(way.offset - own.offset).max() <= ON_MEMBER,
+            "tolerance": gaps[~far].max() <= own.tolerance,
+        }
+        return Remedy({k: v for k, v in keys.items() if v and not same.get(k, False)})
 
 
-@dataclass(frozen=True)
-class Fit:
+class Fit(NamedTuple):
     """A way in which most sensors of a test lie on a structure.
 
     Arguments:
-        alignment: it.
-        gap: that most sensors keep to the structure, in m of the structure as it was read.
-        rank: less is better: units changed, what the test spans, axes changed, the gap.
-        factor, shift: from coordinates of the test to the structure as it was read.
+        rank: less is better: units changed, minus what the test spans, directions that the model
+            lacks, the units, axes changed, the distance that most sensors keep in m.
+        way: it.
+        points: the sensors by it, in m of the structure as it was read, (k, 3).
     """
 
-    alignment: Alignment
-    gap: float
-    rank: tuple[float, ...]
-    factor: float
-    shift: FloatArray
+    rank: tuple[Any, ...]
+    way: Alignment
+    points: FloatArray
 
     @property
-    def units(self) -> tuple[object, object]:
-        """Return the units of test and model."""
-        return self.alignment.unit, self.alignment.model_unit
+    def kind(self) -> tuple[Any, ...]:
+        """Return all of the rank but axes and distance."""
+        return self.rank[:-2]
 
-    def remedy(self, test: Placement) -> Remedy:
-        """Return the keys that differ from those of a placement."""
-        own, way = test.alignment, self.alignment
-        gaps = test._gaps(self.factor * test.every @ way.turn.T + self.shift)
-        names = {metres: unit for unit, metres in METRES.items()}
-        keys: dict[str, str] = {}
-        if way.model_unit != own.model_unit:
-            keys["model-unit"] = str(way.model_unit)
-        if way.unit is not None and way.unit != (own.unit or 1.0):
-            keys["unit"] = names[way.unit]
-        if not np.array_equal(way.turn, own.turn):
-            keys["frame"] = frame_text(way.turn)
-        if np.abs(way.offset - own.offset).max() > ON_MEMBER:
-            keys["offset"] = ",".join(f"{value:.4g}" for value in way.offset)
-        far = gaps > max(_FAR * self.gap, _NEAR * test.size)
-        needed = float(gaps[~far].max()) / (test.size or 1.0)
-        if needed > own.tolerance:
-            keys["tolerance"] = f"{float(f'{1.05 * needed:.2g}'):g}"
-        if far.any():
-            keys["without"] = ",".join(test.labels[i] for i in np.flatnonzero(far))
-        return Remedy(keys)
+    @property
+    def gap(self) -> float:
+        """Return the distance that most sensors keep to the structure in m."""
+        return float(self.rank[-1])
+
+
+def directions_of(site: Site) -> set[str]:
+    """Return the directions that a structure has."""
+    is_frame = isinstance(site, FrameSite)
+    return set(ACTIVE[site.frame.plane] if is_frame else site.dofs.direction)
 
 
 def signed_axes() -> Iterator[FloatArray]:
@@ -404,7 +407,8 @@ def match_sensors(
     stated: tuple[str, ...] = ()
     if rows:
         labels = tuple(read.labels[i] for i in rows)
-        test = Placement(site, alignment, read.xyz[rows], labels)
+        ways = tuple(read.directions[i] for i in rows)
+        test = Placement(site, alignment, read.xyz[rows], labels, ways)
         stated_unit, unit = alignment.unit, test.detect_unit()
         alignment = replace(alignment, unit=stated_unit or METRES[unit])
         test = replace(test, alignment=alignment)

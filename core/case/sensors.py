@@ -61,7 +61,7 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
             alignment,
         )
     every = np.array([row.vector() for row in rows], dtype=float)
-    test = Placement(site, alignment, every, tuple(labels))
+    test = Placement(site, alignment, every, tuple(labels), tuple(directions))
     matches = tuple(test.match_labels(test.labels))
     for row, match in zip(rows, matches, strict=True):
         try:

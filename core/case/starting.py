@@ -134,7 +134,7 @@ def start_case(
         case = read_case(fresh, readers=readers)
         if draw is not None and case.matches:
             draw(case, fresh / PICTURE)
-    return replace(case, folder=folder)
+    return replace(case, folder=folder, notes=(*given.stated, *case.notes))
 
 
 def _copied(given: Beginning, fresh: Path, readers: Sequence[Reader]) -> dict[Path, str]:

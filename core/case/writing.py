@@ -51,6 +51,7 @@ from femubench.core.case.table_text import (
 )
 from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import Frame
+from femubench.core.fem.mesh import locate
 from femubench.core.fem.model import Model
 from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.modal.measurement import Measurement
@@ -318,6 +319,8 @@ def _model_part(case: Case, known: Known) -> tuple[Keys, Files, tuple[Modificati
     if has_skew_dofs(model):
         what = "the model has changed matrices and flexible connections of skew members"
         raise BadKey(("model",), what, "degrees of freedom along x, y or z")
+    frame = model.frame_structure.frame
+    frame_places(model, [locate(frame, xyz) for xyz in case.measurement.sensors.xyz])
     moved = tuple(_at_nodes(item, model) for item in case.modifications)
     return *matrix_keys(*matrices, frame_geometry(model), model), moved
 
