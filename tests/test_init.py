@@ -68,9 +68,7 @@ def universal(folder: Path, length: float = 1e3, count: int = 6, **nodes: np.nda
 
 def init(folder: Path, *more: str) -> Result:
     files = {"--model": "K.mtx", "--mass": "M.mtx", "--dofs": "dofs.csv", "--modes": "test.uff"}
-    files = {key: name for key, name in files.items() if key not in more or key == "--modes"}
-    if "--modes" in more and "found" not in more[-1]:
-        files.pop("--modes")
+    files = {key: name for key, name in files.items() if key not in more}
     words = [word for key, name in files.items() for word in (key, str(folder / name))]
     return CliRunner().invoke(bench, ["init", str(folder / "case"), *words, *more])
 
@@ -173,7 +171,7 @@ def test_a_mistake_names_its_remedy_and_leaves_nothing(tmp_path: Path, mistake: 
         ("diagnose .", "which `bench init` writes"),
         ("update portal -s baruch -o new", "`elements` with a node at every sensor"),
         ("identify one.csv", "two or more in one file"),
-        ("identify twice.uff", "the sensor 3:z is there twice"),
+        ("identify twice.uff", "the sensor 1:z is there twice"),
     ],
 )
 def test_other_mistakes_name_their_remedy(
@@ -185,11 +183,8 @@ def test_other_mistakes_name_their_remedy(
     signal = np.random.default_rng(0).standard_normal(2100)
     rows = "".join(f"{0.01 * i:.2f};{v}\n".replace(".", ",") for i, v in enumerate(signal))
     Path("one.csv").write_text(f"time;1:z\n{rows}")
-    record = {
-        "type": 58, "func_type": 1, "rsp_node": 3, "rsp_dir": 3, "data": signal, "ref_node": 0, "ref_dir": 0,
-        "x": 0.01 * np.arange(2100.0), "abscissa_spacing": 1, "binary": 0, "id1": "a",
-    }  # fmt: skip
-    pyuff.UFF("twice.uff").write_sets([record, record], mode="overwrite")
+    if "twice" in words:  # two forces, as if they were time
+        write_universal(Path("twice.uff"), responses(tmp_path), func_type=1)
     done = CliRunner().invoke(bench, words.split())
     assert done.exit_code == 2, done.output
     assert advice in done.output
@@ -199,7 +194,7 @@ def test_other_mistakes_name_their_remedy(
 def responses(folder: Path, noise: float = 1e-3) -> FrequencyResponses:
     """Return receptances of the chain to a force at its second mass."""
     hertz, shapes = chain(folder)
-    lines = np.arange(0.2 * hertz[0], 1.1 * hertz[-1], 0.2)
+    lines = np.arange(0.2 * hertz[0], 1.1 * hertz[-1], 0.5)
     modal = 1.0 / (hertz**2 - lines[:, None] ** 2 + 0.02j * hertz * lines[:, None])
     values = np.einsum("om,fm,im->foi", shapes, modal, shapes[[1, 2]]) / (4.0 * np.pi**2 * MASS)
     rng = np.random.default_rng(1)
@@ -222,13 +217,15 @@ def test_responses_and_the_folder_of_an_identification(tmp_path: Path) -> None:
     assert direct.measurement.frequencies == pytest.approx(hertz, rel=1e-3)
     assert direct.measurement.frequency_std / hertz == pytest.approx(0.002, rel=0.01)
     assert direct.measurement.shape_std == pytest.approx(0.02, rel=0.05)
-    (tmp_path / "case").rename(tmp_path / "direct")
-    femubench.identify(tmp_path / "test.uff", output=tmp_path / "found")
-    done = init(tmp_path, "--modes", str(tmp_path / "found"))  # a second record of the same
+    found = tmp_path / "found"  # has what `bench identify` writes
+    (tmp_path / "case").rename(found)
+    done = init(tmp_path, "--modes", str(found))
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "case" / "modes.csv").read_bytes() == (found / "modes.csv").read_bytes()
+    (tmp_path / "case").rename(tmp_path / "other")
+    done = init(tmp_path, "--modes", str(tmp_path / "other"), "--modes", str(found))
     assert done.exit_code == 0, done.output
     assert "means of 2 records of one state, 8 modes" in " ".join(done.output.split())
-    table = (tmp_path / "found" / "modes.csv").read_bytes()
-    assert table == (tmp_path / "direct" / "modes.csv").read_bytes()
     assert b"frequency_std" in (tmp_path / "case" / "modes.csv").read_bytes()
 
 
