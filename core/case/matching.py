@@ -262,7 +262,7 @@ class Placement:
             text += f"; by symmetry so they do with {' or '.join(frames[1:4])}: compare MACs"
         return Misfit(what, text, remedy)
 
-    def _fits(self) -> Iterator[Fit]:
+    def _fits(self) -> Iterator[Laying]:
         """Yield units, axes and offsets with which most of the sensors lie on the structure."""
         tree, own = cKDTree(cloud_of(self.site)), self.alignment
         middle = 0.5 * (tree.mins + tree.maxes)
@@ -295,9 +295,9 @@ class Placement:
                 changed = (unit != (own.unit or 1.0)) + (model_unit != own.model_unit)
                 kind = (changed, -round(spread, 1), lost, unit, model_unit or "")
                 found = True
-                yield Fit((*kind, not np.array_equal(turn, own.turn), gap), way, points)
+                yield Laying((*kind, not np.array_equal(turn, own.turn), gap), way, points)
 
-    def _remedy(self, fit: Fit) -> Remedy:
+    def _remedy(self, fit: Laying) -> Remedy:
         """Return the keys of a fit that differ from those as they are."""
         own, way = self.alignment, fit.way
         gaps = self._gaps(fit.points) / (self.size or 1.0)
@@ -318,7 +318,7 @@ class Placement:
         return Remedy({k: v for k, v in keys.items() if v and not same.get(k, False)})
 
 
-class Fit(NamedTuple):
+class Laying(NamedTuple):
     """A way in which most sensors of a test lie on a structure.
 
     Arguments:
