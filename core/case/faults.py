@@ -41,14 +41,12 @@ class Remedy:
     keys: Mapping[str, str]
 
     def __str__(self) -> str:
-        listed = {"offset": "[{}]", "tolerance": "{}"}
         parts = []
         for key, value in self.keys.items():
-            text = listed.get(key, '"{}"').format(value)
-            if key == "without":
-                text = "[" + ", ".join(f'"{label}"' for label in value.split(",")) + "]"
-            of = " of [model]" if key == "model-unit" else ""
-            parts.append(f"{key.removeprefix('model-')} = {text}{of}")
+            text = {"tolerance": value, "offset": f"[{value}]"}.get(key, f'"{value}"')
+            text = str(value.split(",")) if key == "without" else text
+            parts.append(f"{key.removeprefix('model-')} = {text}")
+            parts[-1] += " of [model]" if key == "model-unit" else ""
         return " and ".join(parts)
 
 

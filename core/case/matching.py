@@ -236,21 +236,20 @@ class Placement:
 
     def _misfit(self, what: str, expected: str) -> Misfit:
         """Return the fault, with the keys under which the test would fit where these are clear."""
-        fits = sorted(self._fits() if len(self.every) > 1 else (), key=lambda fit: fit.rank)
+        fits = sorted(self._fits() if len(self.every) > 1 else (), key=lambda fit: fit[:3])
         if not fits:
             sizes = f"{size_of(self.every):.3g} as they stand, the structure {self.size:.3g} m"
             question = "is it the right model, or is one of the units wrong?"
             found = f"no unit, axes or offset fit: the sensors span {sizes}: {question}"
             return Misfit(what, f"{expected}; {found}")
-        best = fits[0]
-        alike = [fit for fit in fits if fit.kind == best.kind]
+        alike = [fit for fit in fits if fit.kind == fits[0].kind]
         near = _AS_WELL * min(fit.gap for fit in alike) + ON_MEMBER
         alike = [fit for fit in alike if fit.gap <= near]
         proper = [fit for fit in alike if np.linalg.det(fit.way.turn) > 0.0]
         if not proper:
-            mirrored = f"only mirrored axes {frame_text(best.way.turn)!r} fit"
             advice = "turn one axis of the test, its coordinates and its directions"
-            return Misfit(what, f"{expected}; {mirrored}: {advice}")
+            mirrored = f"only mirrored axes {frame_text(alike[0].way.turn)!r} fit: {advice}"
+            return Misfit(what, f"{expected}; {mirrored}")
         remedy = self._remedy(proper[0])
         if not remedy.keys:
             return Misfit(what, expected)
@@ -267,7 +266,8 @@ class Placement:
         tree, own = cKDTree(cloud_of(self.site)), self.alignment
         middle = 0.5 * (tree.mins + tree.maxes)
         count = max(2, int(np.ceil(_MOST * len(self.every))))
-        there = directions_of(self.site)
+        framed = isinstance(self.site, FrameSite)
+        there = set(ACTIVE[self.site.frame.plane] if framed else self.site.dofs.direction)
         own_scale = METRES[own.model_unit or "m"]
         units = [(u, v) for u in METRES.values() for v in (METRES if own.model_unit else (None,))]
         found = False
@@ -295,58 +295,45 @@ class Placement:
                 changed = (unit != (own.unit or 1.0)) + (model_unit != own.model_unit)
                 kind = (changed, -round(spread, 1), lost, unit, model_unit or "")
                 found = True
-                yield Laying((*kind, not np.array_equal(turn, own.turn), gap), way, points)
+                yield Laying(kind, not np.array_equal(turn, own.turn), gap, way, points)
 
     def _remedy(self, fit: Laying) -> Remedy:
         """Return the keys of a fit that differ from those as they are."""
-        own, way = self.alignment, fit.way
-        gaps = self._gaps(fit.points) / (self.size or 1.0)
-        far = gaps > max(_FAR * fit.gap / (self.size or 1.0), _NEAR)
-        keys = {
-            "model-unit": way.model_unit if way.model_unit != own.model_unit else None,
-            "unit": next(u for u, metres in METRES.items() if metres == way.unit),
-            "frame": None if np.array_equal(way.turn, own.turn) else frame_text(way.turn),
-            "offset": ",".join(f"{value:.4g}" for value in way.offset),
-            "tolerance": f"{float(f'{1.05 * gaps[~far].max():.2g}'):g}",
-            "without": ",".join(self.labels[i] for i in np.flatnonzero(far)),
-        }
-        same = {
-            "unit": way.unit == (own.unit or 1.0),
-            "offset": np.abs(way.offset - own.offset).max() <= ON_MEMBER,
-            "tolerance": gaps[~far].max() <= own.tolerance,
-        }
-        return Remedy({k: v for k, v in keys.items() if v and not same.get(k, False)})
+        own, way, size = self.alignment, fit.way, self.size or 1.0
+        gaps = self._gaps(fit.points) / size
+        far = gaps > max(_FAR * fit.gap / size, _NEAR)
+        needed, keys = float(gaps[~far].max()), {}
+        if way.model_unit not in (None, own.model_unit):
+            keys["model-unit"] = str(way.model_unit)
+        if way.unit != (own.unit or 1.0):
+            keys["unit"] = next(str(u) for u, metres in METRES.items() if metres == way.unit)
+        if fit.turned:
+            keys["frame"] = frame_text(way.turn)
+        if np.abs(way.offset - own.offset).max() > ON_MEMBER:
+            keys["offset"] = ",".join(f"{value:.4g}" for value in way.offset)
+        if needed > own.tolerance:
+            keys["tolerance"] = f"{float(f'{1.05 * needed:.2g}'):g}"
+        if far.any():
+            keys["without"] = ",".join(self.labels[i] for i in np.flatnonzero(far))
+        return Remedy(keys)
 
 
 class Laying(NamedTuple):
-    """A way in which most sensors of a test lie on a structure.
+    """A way in which most sensors of a test lie on a structure; the best one sorts first.
 
     Arguments:
-        rank: less is better: units changed, minus what the test spans, directions that the model
-            lacks, the units, axes changed, the distance that most sensors keep in m.
+        kind: units changed, minus what the test spans, directions that are lost, the units.
+        turned: whether axes are changed.
+        gap: that most sensors keep to the structure in m.
         way: it.
         points: the sensors by it, in m of the structure as it was read, (k, 3).
     """
 
-    rank: tuple[Any, ...]
+    kind: tuple[Any, ...]
+    turned: bool
+    gap: float
     way: Alignment
     points: FloatArray
-
-    @property
-    def kind(self) -> tuple[Any, ...]:
-        """Return all of the rank but axes and distance."""
-        return self.rank[:-2]
-
-    @property
-    def gap(self) -> float:
-        """Return the distance that most sensors keep to the structure in m."""
-        return float(self.rank[-1])
-
-
-def directions_of(site: Site) -> set[str]:
-    """Return the directions that a structure has."""
-    is_frame = isinstance(site, FrameSite)
-    return set(ACTIVE[site.frame.plane] if is_frame else site.dofs.direction)
 
 
 def signed_axes() -> Iterator[FloatArray]:

@@ -9,13 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from femubench.core.case.modes import FIT_STD, read_modes
-from femubench.core.case.table_text import (
-    SHAPE_STD,
-    common_share,
-    covariance_csv,
-    modes_csv,
-    sensors_csv,
-)
+from femubench.core.case.table_text import SHAPE_STD, covariance_csv, modes_csv, sensors_csv
 from femubench.core.case.tables import RESERVED, read_table
 from femubench.core.errors import InputError
 from femubench.core.fem.sensors import Sensors
@@ -24,10 +18,8 @@ from femubench.core.modal.correlation import modal_scale_factor
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import pair_modes
 
-MODES, SENSORS, COVARIANCE, REFERENCES = (
-    f"{name}.csv" for name in ("modes", "sensors", "covariance", "references")
-)
-TABLES = (MODES, SENSORS, COVARIANCE, REFERENCES)
+TABLES = ("modes.csv", "sensors.csv", "covariance.csv", "references.csv")
+MODES, SENSORS, COVARIANCE, REFERENCES = TABLES
 _LEAST_MAC, _WINDOW = 0.8, 1.1  # of one mode in two records of one state
 _FEWEST = 3  # records that say something of correlations
 
@@ -43,11 +35,8 @@ def record_tables(
             accelerometers; None where there is none.
         fitted: whether the deviations are those of a fit alone.
     """
-    stated = FIT_STD if fitted else RESERVED[2]
-    tables = {
-        MODES: modes_csv(measurement, common_share([measurement], None), stated),
-        SENSORS: sensors_csv(measurement.sensors),
-    }
+    table = modes_csv(measurement, np.nan, FIT_STD if fitted else RESERVED[2])
+    tables = {MODES: table, SENSORS: sensors_csv(measurement.sensors)}
     if measurement.frequency_correlation is not None:
         tables[COVARIANCE] = covariance_csv(measurement)
     if references is not None:
@@ -99,11 +88,9 @@ def mean_record(records: Sequence[Measurement], files: Sequence[Path]) -> tuple[
     kept = np.ones(len(first), dtype=bool)
     for record, file in zip(records[1:], files[1:], strict=True):
         rows = {label: i for i, label in enumerate(record.sensors.labels)}
-        if set(rows) != set(first.sensors.labels):
-            listed = ", ".join(sorted(set(rows) ^ set(first.sensors.labels))[:6])
-            what = f"not the sensors of {files[0]}: {listed} in one of them only"
-            expected = "records of one state at the same sensors; give others as cases of their own"
-            raise InputError(what, file=file, expected=expected)
+        if apart := sorted(set(rows) ^ set(first.sensors.labels)):
+            what = f"not the sensors of {files[0]}: {', '.join(apart[:6])} in one of them only"
+            raise InputError(what, file=file, expected="the same sensors, or a case of its own")
         own = record.shapes[[rows[label] for label in first.sensors.labels]]
         ways = (first.frequencies, first.shapes, record.frequencies, own)
         index = pair_modes(*ways, least_mac=_LEAST_MAC, window=_WINDOW).index
@@ -116,24 +103,19 @@ def mean_record(records: Sequence[Measurement], files: Sequence[Path]) -> tuple[
     f, s = np.array(hertz)[:, kept], np.array(shapes)[:, :, kept]
     mean, shape = f.mean(axis=0), s.mean(axis=0)
     largest = np.nanmax(np.abs(shape), axis=0)
-    freedom = count - 1.0
-    shares = (
-        float(np.sqrt(np.square(f / mean - 1.0).sum(axis=0).mean() / freedom)),
-        float(np.sqrt(np.nanmean(np.square((s - shape) / largest).sum(axis=0)) / freedom)),
-    )
-    picked = first.select(np.array(first.numbers)[kept].tolist())
-    share = 1.0 / np.sqrt(count)
+    apart = (f / mean - 1.0, (s - shape) / largest)
+    scatter = [float(np.sqrt(np.nanmean(np.square(e)) * count / (count - 1.0))) for e in apart]
+    picked, root = first.select(np.array(first.numbers)[kept].tolist()), np.sqrt(count)
     found = replace(
         picked,
         frequencies=mean,
-        frequency_std=np.maximum(shares[0] * mean, picked.frequency_std) * share,
+        frequency_std=np.maximum(scatter[0] * mean, picked.frequency_std) / root,
         shapes=shape,
-        shape_std=np.maximum(shares[1] * largest, picked.shape_std) * share,
+        shape_std=np.maximum(scatter[1] * largest, picked.shape_std) / root,
         frequency_correlation=shrunk_correlation(f)[0] if count >= _FEWEST else None,
     )
-    said = (
-        f"means of {count} records of one state, {len(found)} modes in all of them; from record "
-        f"to record frequencies scatter by {100.0 * shares[0]:.2g} % and shapes by "
-        f"{100.0 * shares[1]:.2g} % of their largest reading"
+    shares = "frequencies scatter by {:.2g} % and shapes by {:.2g} %".format(
+        *(100.0 * share for share in scatter)
     )
-    return found, said
+    said = f"means of {count} records of one state, {len(found)} modes in all of them"
+    return found, f"{said}; from record to record {shares}"

@@ -16,7 +16,7 @@ from femubench.core.case.case import SCATTER, Case
 from femubench.core.case.faults import Remedy
 from femubench.core.case.files import CASE_FILE, LARGEST_FILE
 from femubench.core.case.matrices import reader_of, reading_with
-from femubench.core.case.model_files import further_files
+from femubench.core.case.model_files import ModelFiles, further_files, read_model
 from femubench.core.case.modes import FIT_STD
 from femubench.core.case.reader import read_case
 from femubench.core.case.records import COVARIANCE, MODES, REFERENCES, SENSORS
@@ -24,12 +24,15 @@ from femubench.core.case.response_files import read_responses
 from femubench.core.case.schema import LengthUnit
 from femubench.core.case.table_text import csv_bytes
 from femubench.core.case.tables import SUFFIXES, read_table
+from femubench.core.case.units import METRES, NEWTONS
 from femubench.core.case.writing import new_folder
 from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
 from femubench.core.files import check_regular
 from femubench.core.roles import Reader
 
+# Mass over the cube of the diagonal, kg/m3: a mast of 1 km to a block of steel.
+_DENSITIES = (1e-4, 2e4)
 MATCHES, PICTURE = "matches.csv", "matches.png"
 
 
@@ -105,13 +108,16 @@ def start_case(
     Raises:
         InputError: when the folder holds anything, or for what is wrong in the files.
     """
+    guessed = given.model_unit is None
+    if guessed:
+        given = replace(given, model_unit=_likely_unit(given, readers))
     with new_folder(folder) as fresh:
         copies = _copied(given, fresh, readers)
         for name, (_, content) in given.tables.items():
             (fresh / name).write_bytes(content)
         modes = fresh / MODES if given.tables else given.modes[0]
         used, held_out = _shared_out(modes, readers)
-        keys = _Keys(folder.resolve().name, given, copies, used, held_out)
+        keys = _Keys(folder.resolve().name, given, copies, used, held_out, guessed)
         (fresh / CASE_FILE).write_text(keys.text(readers), encoding="utf-8")
         try:
             case = read_case(fresh, readers=readers)
@@ -135,6 +141,18 @@ def start_case(
         if draw is not None and case.matches:
             draw(case, fresh / PICTURE)
     return replace(case, folder=folder, notes=(*given.stated, *case.notes))
+
+
+def _likely_unit(given: Beginning, readers: Sequence[Reader]) -> LengthUnit:
+    """Return the unit in which a model is as heavy for its size as a structure can be."""
+    files = ModelFiles(given.model, given.mass, given.dofs)
+    model = read_model(files, readers)
+    size = float(np.linalg.norm(np.ptp(model.dofs.xyz, axis=0))) if len(model.dofs) else 0.0
+    density = model.total_mass / size**3 if size > 0.0 else 0.0
+    units: tuple[LengthUnit, ...] = ("m", "mm", "in")
+    low, high = _DENSITIES
+    likely = [u for u in units if low <= density * NEWTONS[u] / METRES[u] ** 4 <= high]
+    return next(iter(likely), "m")
 
 
 def _copied(given: Beginning, fresh: Path, readers: Sequence[Reader]) -> dict[Path, str]:
@@ -210,6 +228,7 @@ class _Keys:
     copies: Mapping[Path, str]
     used: Sequence[int]
     held_out: Sequence[int]
+    guessed: bool
 
     def text(self, readers: Sequence[Reader], case: Case | None = None) -> str:
         """Return it; with a case that was read from a first one, also what that found."""
@@ -253,8 +272,8 @@ class _Keys:
         for key, path in (("file", given.model), ("mass", given.mass), ("dofs", given.dofs)):
             if path is not None:
                 yield f"{key} = {_quoted(self.copies[path])}"
-        stated = "" if given.model_unit else "   # not stated: m, N and kg were taken"
-        yield f'unit = "{given.model_unit or "m"}"{stated}'
+        stated = "   # not stated: taken from its size and mass" if self.guessed else ""
+        yield f'unit = "{given.model_unit}"{stated}'
         if case is not None:
             yield f"# It {sizes_of(case.model)}."
         yield "# free = true   # if it hung free: nothing that holds it to ground is then suspected"
