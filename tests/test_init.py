@@ -132,7 +132,7 @@ MISTAKES: dict[str, tuple[str, dict[str, np.ndarray], str]] = {
     "left-handed": ("--frame x,y,-z", {}, "each once and right-handed"),
     "no offset": ("--offset 1,2", {}, "is no X,Y,Z in m"),
     "no modes": ("--modes @K.mtx", {}, "K.mtx: no modes are read"),
-    "no kind": ("--modes @notes.docx", {}, "expected .uff"),
+    "no kind": ("--modes @notes.docx", {}, "a folder that `bench identify` writes"),
     "no folder of it": ("--modes @empty", {}, "`bench identify FILE --output"),
     "no places": ("--modes @modes.csv", {}, "bench init --sensors FILE"),
     "no model": ("--modes @test.uff --model @nodes.docx", {}, "nodes.docx"),

@@ -6,6 +6,7 @@ import os
 import shlex
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -68,6 +69,15 @@ class Beginning:
     stated: tuple[str, ...] = ()
     places: Path | None = None
 
+    @classmethod
+    def of(cls, model: Any, modes: Sequence[Any], *more: Any, **stated: Any) -> Beginning:  # noqa: ANN401
+        """Return it with paths; raises InputError where model or modes are missing."""
+        if model is None or not modes:
+            missing = "--model" if model is None else "--modes"
+            expected = "a file with the model and one with the modes"
+            raise InputError("is missing", key=missing, expected=expected)
+        return cls(Path(model), tuple(Path(path) for path in modes), *more, **stated)
+
     def files(self) -> tuple[Path, ...]:
         """Return the files that are at hand."""
         modes = () if self.tables else self.modes
@@ -116,7 +126,7 @@ def start_case(
         for name, (_, content) in given.tables.items():
             (fresh / name).write_bytes(content)
         modes = fresh / MODES if given.tables else given.modes[0]
-        used, held_out = _shared_out(modes, readers)
+        used, held_out = _shared_out(mode_numbers(modes, readers), given.modes[0])
         keys = _Keys(folder.resolve().name, given, copies, used, held_out, guessed)
         (fresh / CASE_FILE).write_text(keys.text(readers), encoding="utf-8")
         try:
@@ -174,46 +184,39 @@ def _copied(given: Beginning, fresh: Path, readers: Sequence[Reader]) -> dict[Pa
     return names
 
 
-def has_modes(file: Path, readers: Sequence[Reader]) -> bool:
-    """Tell whether a file holds modes, and not responses of which they are to be found.
+def mode_numbers(file: Path, readers: Sequence[Reader]) -> list[int]:
+    """Return the labels of the modes of a file by frequency; none for a file of responses.
 
     Raises:
         InputError: for a kind of file that nobody reads, or one that is broken.
     """
     if file.suffix.lower() in SUFFIXES:
-        return read_table(file).columns[0] not in ("frequency", "time")
-    reader = reader_of(file, readers)
-    if reader is None:
-        return False
-    try:
-        with reading_with(reader, file):
-            return bool(len(reader.read_modes(file)))
-    except InputError as fault:
-        try:
-            read_responses(file, readers)
-        except InputError:
-            raise fault from None
-        return False
-
-
-def _shared_out(modes: Path, readers: Sequence[Reader]) -> tuple[list[int], list[int]]:
-    """Return the labels of the modes to use, and of the upper third, which is held out."""
-    if modes.suffix.lower() in SUFFIXES:
-        table = read_table(modes)
+        table = read_table(file)
+        if table.columns[0] in ("frequency", "time"):
+            return []
         table.check_columns(("mode", "frequency"), table.columns)
         found = [(row.number("frequency") or 0.0, row.whole("mode")) for row in table.rows]
-    else:
-        reader = reader_of(modes, readers)
-        if reader is None:
-            known = ", ".join([*SUFFIXES, *(s for r in readers for s in r.suffixes)])
-            known += ", or a folder that `bench identify` writes"
-            raise InputError("unknown kind of file", file=modes, expected=known)
-        with reading_with(reader, modes):
-            read = reader.read_modes(modes)
-        found = list(zip(read.frequencies.tolist(), read.numbers, strict=True))
-    if not found:
-        raise InputError("no modes", file=modes, expected="frequencies and mode shapes")
-    numbers = [number for _, number in sorted(found)]
+        return [number for _, number in sorted(found)]
+    reader = reader_of(file, readers)
+    if reader is None:
+        known = ", ".join([*SUFFIXES, *(s for r in readers for s in r.suffixes)])
+        expected = f"{known}, or a folder that `bench identify` writes"
+        raise InputError("unknown kind of file", file=file, expected=expected)
+    try:
+        with reading_with(reader, file):
+            read = reader.read_modes(file)
+    except InputError:
+        with suppress(InputError):
+            read_responses(file, readers)
+            return []
+        raise
+    return [read.numbers[k] for k in np.argsort(read.frequencies)]
+
+
+def _shared_out(numbers: Sequence[int], file: Path) -> tuple[list[int], list[int]]:
+    """Return the labels of the modes to use, and of the upper third, which is held out."""
+    if not numbers:
+        raise InputError("no modes", file=file, expected="frequencies and mode shapes")
     count = min(round(len(numbers) / 3) or 1, len(numbers) - 1)
     first = len(numbers) - count
     return sorted(numbers[:first]), sorted(numbers[first:])

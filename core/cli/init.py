@@ -9,7 +9,7 @@ import click
 
 from femubench.core.cli import options
 from femubench.core.cli.registry import plugins_for, wrap_text
-from femubench.core.errors import InputError, ModelError
+from femubench.core.errors import ModelError
 
 if TYPE_CHECKING:
     from femubench.core.case.case import Case
@@ -90,14 +90,10 @@ def init(
             click.echo(f"wrote {path}")
         click.echo(f"Now change it to your structure, and run: bench run {folder}")
         return
-    if model is None or not modes:
-        missing = "--model" if model is None else "--modes"
-        expected = "a file with the model and one with the modes"
-        raise InputError("is missing", key=missing, expected=expected)
     from femubench.core.case.starting import Beginning
     from femubench.core.library.new_case import begin_case
 
-    given = Beginning(model, modes, *others)
+    given = Beginning.of(model, modes, *others)
     case = begin_case(folder, given, plugins_for(ctx))
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         click.echo(f"wrote {path}")

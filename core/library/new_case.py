@@ -13,7 +13,7 @@ from femubench.core.case.records import (
     read_record,
     record_tables,
 )
-from femubench.core.case.starting import Beginning, has_modes, start_case
+from femubench.core.case.starting import Beginning, mode_numbers, start_case
 from femubench.core.display import count_noun
 from femubench.core.library.identify import identification_files, identification_of
 from femubench.core.modal.measurement import Measurement
@@ -44,7 +44,7 @@ def _identified(given: Beginning, plugins: Plugins) -> Beginning:
         if given.sensors is not None:
             tables.pop(SENSORS, None)
         return replace(given, tables={n: (first / n, held) for n, held in tables.items()})
-    if len(given.modes) == 1 and has_modes(first, readers):
+    if len(given.modes) == 1 and mode_numbers(first, readers):
         return given
     records: list[Measurement] = []
     tables, stated = {}, []

@@ -13,7 +13,6 @@ from femubench.core.case.starting import Beginning
 from femubench.core.conformance import SECONDS
 from femubench.core.conformance.checking import CheckResult, findings, subjects
 from femubench.core.conformance.problems import of_case
-from femubench.core.errors import InputError
 from femubench.core.library.cases import CaseLike, as_list, read_cases, usable_plugins
 from femubench.core.library.new_case import begin_case
 from femubench.core.library.new_package import write_package
@@ -45,13 +44,9 @@ def init_case(
     """
     if model is None and modes is None and not stated:
         return write_example(Path(folder))
-    if model is None or modes is None:
-        missing = "model" if model is None else "modes"
-        expected = "a file with the model and one with the modes"
-        raise InputError("is missing", key=missing, expected=expected)
     paths = {key: Path(stated[key]) for key in ("mass", "dofs", "sensors") if stated.get(key)}
-    every = [modes] if isinstance(modes, str | PathLike) else modes
-    given = Beginning(Path(model), tuple(Path(path) for path in every), **{**stated, **paths})
+    every = [modes] if isinstance(modes, str | PathLike) else modes or ()
+    given = Beginning.of(model, every, **{**stated, **paths})
     begin_case(Path(folder), given, usable_plugins())
     return tuple(sorted(path for path in Path(folder).rglob("*") if path.is_file()))
 

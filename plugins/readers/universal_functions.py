@@ -50,7 +50,7 @@ def read_functions(path: Path, positions: Sensors | None) -> FrequencyResponses 
     """
     length = force = 1.0
     datasets: list[Dataset] = []
-    for dataset in read_datasets(path, (58, 164))[0]:
+    for dataset in read_datasets(path, (58, 164)):
         if dataset["type"] == 164:
             length, force = float(dataset["length"]), float(dataset["force"])
         else:
