@@ -331,6 +331,7 @@ class _Building:
             fitted, spec = True, spec or ScatterSpec()
         if spec is not None:
             found = with_scatter(found, (spec.frequencies, spec.shapes))
+            found = replace(found, assumed=fitted)
             why = "deviations are those of one fit, no repeats" if fitted else "as stated"
             self.notes[
                 f"{name}: {why}: a scatter from test to test of {100.0 * spec.frequencies:g} % of "

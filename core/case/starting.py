@@ -51,7 +51,6 @@ class Beginning:
         unit, frame, tolerance, offset, without: of the test, as the keys of ``[measurement]``.
         tables: what was identified, by name: the file that it comes from, and the table.
         stated: what to say of it.
-        places: the file of sensors that went into it.
     """
 
     model: Path
@@ -67,7 +66,6 @@ class Beginning:
     without: str | None = None
     tables: Mapping[str, tuple[Path, bytes]] = field(default_factory=dict)
     stated: tuple[str, ...] = ()
-    places: Path | None = None
 
     @classmethod
     def of(cls, model: Any, modes: Sequence[Any], *more: Any, **stated: Any) -> Beginning:  # noqa: ANN401
@@ -81,20 +79,18 @@ class Beginning:
     def files(self) -> tuple[Path, ...]:
         """Return the files that are at hand."""
         modes = () if self.tables else self.modes
-        every = (self.model, self.mass, self.dofs, *modes, self.sensors)
+        sensors = None if SENSORS in self.tables else self.sensors
+        every = (self.model, self.mass, self.dofs, *modes, sensors)
         return tuple(path for path in every if path is not None)
 
     def command(self, folder: Path, remedy: Remedy) -> str:
         """Return the command that begins the case with other keys."""
         words = ["bench", "init", str(folder)]
-        for key in ("model", "mass", "dofs"):
-            words += [] if (path := getattr(self, key)) is None else [f"--{key}", str(path)]
-        words += [word for path in self.modes for word in ("--modes", str(path))]
-        sensors = self.sensors or self.places
-        words += [] if sensors is None else ["--sensors", str(sensors)]
-        for key in ("model-unit", "unit", "frame", "offset", "tolerance", "without"):
+        files = ("model", "mass", "dofs", "modes", "sensors")
+        for key in (*files, "model-unit", "unit", "frame", "offset", "tolerance", "without"):
             value = remedy.keys.get(key, getattr(self, key.replace("-", "_")))
-            words += [] if value is None else [f"--{key}", str(value)]
+            for one in value if isinstance(value, tuple) else (value,):
+                words += [] if one is None else [f"--{key}", str(one)]
         return shlex.join(words)
 
 
@@ -292,8 +288,8 @@ class _Keys:
         yield "[measurement]"
         for said in given.stated:
             yield f"# {_clean(said)}"
-        if given.sensors is not None or SENSORS in given.tables:
-            name = SENSORS if given.sensors is None else self.copies[given.sensors]
+        if SENSORS in given.tables or given.sensors is not None:
+            name = SENSORS if SENSORS in given.tables else self.copies[given.sensors]
             yield f"sensors = {_quoted(name)}"
         yield f"modes = {_quoted(MODES if given.tables else self.copies[given.modes[0]])}"
         if COVARIANCE in given.tables:

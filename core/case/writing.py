@@ -151,6 +151,8 @@ def _differing(one: Measurement, other: Measurement) -> str | None:
     """Return a field in which two measurements differ."""
     for f in fields(Measurement):
         first, second = getattr(one, f.name), getattr(other, f.name)
+        if f.name == "assumed":  # what is written is stated
+            continue
         if f.name == "shape_std":  # of what was not measured it means nothing
             first = np.where(np.isnan(first) & np.isnan(one.shapes), second, first)
         if f.name == "sensors":

@@ -62,7 +62,7 @@ def _identified(given: Beginning, plugins: Plugins) -> Beginning:
         mean, said = mean_record(records, given.modes)
         tables, stated = record_tables(mean, fitted=False), [*stated, said]
     named = {name: (first, content) for name, content in tables.items()}
-    return replace(given, tables=named, stated=tuple(stated), places=given.sensors, sensors=None)
+    return replace(given, tables=named, stated=tuple(stated))
 
 
 def _draw(case: Case, file: Path) -> None:
