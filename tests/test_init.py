@@ -229,6 +229,18 @@ def test_responses_and_the_folder_of_an_identification(tmp_path: Path) -> None:
     assert b"frequency_std" in (tmp_path / "case" / "modes.csv").read_bytes()
 
 
+def test_unit_of_a_model_follows_from_its_size_and_mass(tmp_path: Path) -> None:
+    universal(tmp_path)
+    for name in ("K.mtx", "M.mtx"):  # N/mm and tonnes
+        scipy.io.mmwrite(tmp_path / name, 1e-3 * scipy.io.mmread(tmp_path / name))
+    rows = "".join(f"{i + 1},n{i + 1},z,{x:g},0,0\n" for i, x in enumerate(X))
+    (tmp_path / "dofs.csv").write_text(f"row,node,direction,x,y,z\n{rows}")
+    done = init(tmp_path, "--frame", "y,-x,z")
+    assert done.exit_code == 0, done.output
+    assert "has a mass of 16 kg" in " ".join(done.output.split())
+    assert 'unit = "mm"   # not stated' in (tmp_path / "case" / "case.toml").read_text()
+
+
 def test_scatter_of_records_is_that_of_their_means() -> None:
     rng, count = np.random.default_rng(3), 40
     shapes, hertz = rng.standard_normal((12, 6)), 10.0 * np.arange(1.0, 7.0)
