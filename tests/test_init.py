@@ -119,7 +119,7 @@ MISTAKES: dict[str, tuple[str, dict[str, np.ndarray], str]] = {
         "--unit mm --frame y,x,-z` all fit; by symmetry so they do with y,-x,z: compare",
     ),
     "tolerance": ("--frame y,-x,z --tolerance 0.0001", {}, "--tolerance 0.0022` all fit"),
-    "origin": ("--frame y,-x,z", {"y": X + 5e3}, "--frame y,-x,z --offset -5,"),
+    "origin": ("--frame y,-x,z", {"y": X + 5e3}, "--frame y,-x,z --origin -5,"),
     "all at once": (
         "--tolerance 1e-6 --unit ft",
         {"y": X / 25.4, "x": X / X},
@@ -130,7 +130,7 @@ MISTAKES: dict[str, tuple[str, dict[str, np.ndarray], str]] = {
     "no model of it": ("--frame y,-x,z", {"y": X**2, "x": X**3}, "is it the right model"),
     "no frame": ("--frame x,x,z", {}, "each once and right-handed"),
     "left-handed": ("--frame x,y,-z", {}, "each once and right-handed"),
-    "no offset": ("--offset 1,2", {}, "is no X,Y,Z in m"),
+    "no origin": ("--origin 1,2", {}, "is no X,Y,Z in m"),
     "no modes": ("--modes @K.mtx", {}, "K.mtx: no modes are read"),
     "no kind": ("--modes @notes.docx", {}, "a folder that `bench identify` writes"),
     "no folder of it": ("--modes @empty", {}, "`bench identify FILE --output"),

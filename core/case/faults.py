@@ -43,7 +43,7 @@ class Remedy:
     def __str__(self) -> str:
         parts = []
         for key, value in self.keys.items():
-            text = {"tolerance": value, "offset": f"[{value}]"}.get(key, f'"{value}"')
+            text = {"tolerance": value, "origin": f"[{value}]"}.get(key, f'"{value}"')
             text = str(value.split(",")) if key == "without" else text
             parts.append(f"{key.removeprefix('model-')} = {text}")
             parts[-1] += " of [model]" if key == "model-unit" else ""

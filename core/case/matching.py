@@ -46,7 +46,7 @@ class Alignment:
         unit: of its coordinates in m; None where the size of the structure tells it.
         turn: the axes of the model in those of the test, (3, 3).
         tolerance: how far a sensor may be from the structure, of the size of the structure.
-        offset: of the test's origin in m along the axes of the model, (3,).
+        origin: of the test's origin in m along the axes of the model, (3,).
         without: labels of sensors that are left out.
         model_unit: of a model that comes in files; None of one that is in m by definition.
     """
@@ -54,7 +54,7 @@ class Alignment:
     unit: float | None
     turn: FloatArray
     tolerance: float
-    offset: FloatArray = field(default_factory=lambda: np.zeros(3))
+    origin: FloatArray = field(default_factory=lambda: np.zeros(3))
     without: Collection[str] = ()
     model_unit: LengthUnit | None = None
 
@@ -65,14 +65,14 @@ class Alignment:
             None if spec.unit is None else METRES[spec.unit],
             np.eye(3) if spec.frame is None else parse_frame(spec.frame),
             TOLERANCE if spec.tolerance is None else spec.tolerance,
-            np.array(spec.offset, dtype=float),
+            np.array(spec.origin, dtype=float),
             spec.without,
             model_unit,
         )
 
     def moved(self, xyz: FloatArray) -> FloatArray:
         """Return coordinates of the test as those of the model in m, (..., 3)."""
-        return np.asarray((self.unit or 1.0) * xyz @ self.turn.T + self.offset)
+        return np.asarray((self.unit or 1.0) * xyz @ self.turn.T + self.origin)
 
     def direction(self, name: str) -> str:
         """Return a direction of the test as one of the model."""
@@ -240,7 +240,7 @@ class Placement:
         if not fits:
             sizes = f"{size_of(self.every):.3g} as they stand, the structure {self.size:.3g} m"
             question = "is it the right model, or is one of the units wrong?"
-            found = f"no unit, axes or offset fit: the sensors span {sizes}: {question}"
+            found = f"no unit, axes or origin fit: the sensors span {sizes}: {question}"
             return Misfit(what, f"{expected}; {found}")
         alike = [fit for fit in fits if fit.kind == fits[0].kind]
         near = _AS_WELL * min(fit.gap for fit in alike) + ON_MEMBER
@@ -266,31 +266,33 @@ class Placement:
         tree, own = cKDTree(cloud_of(self.site)), self.alignment
         middle = 0.5 * (tree.mins + tree.maxes)
         count = max(2, int(np.ceil(_MOST * len(self.every))))
-        framed = isinstance(self.site, FrameSite)
-        there = set(ACTIVE[self.site.frame.plane] if framed else self.site.dofs.direction)
+        site = self.site
+        there = set(
+            ACTIVE[site.frame.plane] if isinstance(site, FrameSite) else site.dofs.direction
+        )
         own_scale = METRES[own.model_unit or "m"]
         units = [(u, v) for u in METRES.values() for v in (METRES if own.model_unit else (None,))]
         found = False
-        for offset, (unit, model_unit) in product((False, True), units):
+        for origin, (unit, model_unit) in product((False, True), units):
             factor = unit * own_scale / METRES[model_unit or "m"]
             size = factor * size_of(self.every) / (self.size or 1.0)
-            if found and offset:
+            if found and origin:
                 return
-            if offset and not _EXTENT[0] <= size <= _EXTENT[1]:
+            if origin and not _EXTENT[0] <= size <= _EXTENT[1]:
                 continue
             for turn in signed_axes():
                 points = factor * self.every @ turn.T
-                points += middle - np.median(points, axis=0) if offset else own.offset
-                for _ in range(_STEPS if offset else 1):
+                points += middle - np.median(points, axis=0) if origin else own.origin
+                for _ in range(_STEPS if origin else 1):
                     gaps, at = tree.query(points)
                     near = np.argsort(gaps)[:count]
                     step = (tree.data[at[near]] - points[near]).mean(axis=0)
-                    points = points + step if offset else points
+                    points = points + step if origin else points
                 gap, spread = float(gaps[near[-1]]), size_of(points[near]) / (self.size or 1.0)
                 if gap > _NEAR * self.size or not _EXTENT[0] <= spread <= _EXTENT[1]:
                     continue
                 shift = (points - factor * self.every @ turn.T)[0] * unit / factor
-                way = replace(own, unit=unit, turn=turn, offset=shift, model_unit=model_unit)
+                way = replace(own, unit=unit, turn=turn, origin=shift, model_unit=model_unit)
                 lost = sum(not set(moved_names(way.direction(d))) <= there for d in self.directions)
                 changed = (unit != (own.unit or 1.0)) + (model_unit != own.model_unit)
                 kind = (changed, -round(spread, 1), lost, unit, model_unit or "")
@@ -309,12 +311,12 @@ class Placement:
             keys["unit"] = next(str(u) for u, metres in METRES.items() if metres == way.unit)
         if fit.turned:
             keys["frame"] = frame_text(way.turn)
-        if np.abs(way.offset - own.offset).max() > ON_MEMBER:
-            keys["offset"] = ",".join(f"{value:.4g}" for value in way.offset)
+        if np.abs(way.origin - own.origin).max() > ON_MEMBER:
+            keys["origin"] = ",".join(f"{value:.4g}" for value in way.origin)
         if needed > own.tolerance:
             keys["tolerance"] = f"{float(f'{1.05 * needed:.2g}'):g}"
         if far.any():
-            keys["without"] = ",".join(self.labels[i] for i in np.flatnonzero(far))
+            keys["without"] = ",".join(s for s, out in zip(self.labels, far, strict=True) if out)
         return Remedy(keys)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from femubench.core.case.case import Case, Match, Modification
+from femubench.core.case.case import SCATTER, Case, Match, Modification
 from femubench.core.case.checks import FREE_YET_HELD, NOT_HELD, check_unique
 from femubench.core.case.deviations import with_floor
 from femubench.core.case.faults import BadKey, KeyPath, at_key
@@ -328,7 +328,7 @@ class _Building:
             found = match_modes(read, path, sensors, share)
         spec, fitted = self.spec.measurement.scatter, False
         if read is None and FIT_STD in read_table(path).columns:
-            fitted, spec = True, spec or ScatterSpec()
+            fitted, spec = True, spec or ScatterSpec(frequencies=SCATTER[0], shapes=SCATTER[1])
         if spec is not None:
             found = with_scatter(found, (spec.frequencies, spec.shapes))
             found = replace(found, assumed=fitted)

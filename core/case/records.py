@@ -103,8 +103,8 @@ def mean_record(records: Sequence[Measurement], files: Sequence[Path]) -> tuple[
     f, s = np.array(hertz)[:, kept], np.array(shapes)[:, :, kept]
     mean, shape = f.mean(axis=0), s.mean(axis=0)
     largest = np.nanmax(np.abs(shape), axis=0)
-    apart = (f / mean - 1.0, (s - shape) / largest)
-    scatter = [float(np.sqrt(np.nanmean(np.square(e)) * count / (count - 1.0))) for e in apart]
+    errors, ratio = (f / mean - 1.0, (s - shape) / largest), count / (count - 1.0)
+    scatter = [float(np.sqrt(ratio * np.nanmean(np.square(error)))) for error in errors]
     picked, root = first.select(np.array(first.numbers)[kept].tolist()), np.sqrt(count)
     found = replace(
         picked,

@@ -393,7 +393,7 @@ class MeasurementSpec(TomlTable):
     tolerance: Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)] | None = Field(
         None, description="a number >= 0 and <= 1, of the size of the structure"
     )
-    offset: Vector = Field((0.0, 0.0, 0.0), description=XYZ)
+    origin: Vector = Field((0.0, 0.0, 0.0), description=XYZ)
     without: Many[Text] = Field((), max_length=1000, description="a list of labels of sensors")
     scatter: ScatterSpec | None = Field(None, description="{frequencies, shapes}")
     repeats: FileName | None = Field(None, description="a CSV file in the case folder")

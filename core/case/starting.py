@@ -48,7 +48,7 @@ class Beginning:
         mass, dofs: files with the mass, and with labels or places of the rows of matrices.
         sensors: a file with the places of sensors, where `modes` has none.
         model_unit: of the lengths of the model; None where it was not stated.
-        unit, frame, tolerance, offset, without: of the test, as the keys of ``[measurement]``.
+        unit, frame, tolerance, origin, without: of the test, as the keys of ``[measurement]``.
         tables: what was identified, by name: the file that it comes from, and the table.
         stated: what to say of it.
     """
@@ -62,7 +62,7 @@ class Beginning:
     unit: LengthUnit | None = None
     frame: str | None = None
     tolerance: float | None = None
-    offset: str | None = None
+    origin: str | None = None
     without: str | None = None
     tables: Mapping[str, tuple[Path, bytes]] = field(default_factory=dict)
     stated: tuple[str, ...] = ()
@@ -87,7 +87,7 @@ class Beginning:
         """Return the command that begins the case with other keys."""
         words = ["bench", "init", str(folder)]
         files = ("model", "mass", "dofs", "modes", "sensors")
-        for key in (*files, "model-unit", "unit", "frame", "offset", "tolerance", "without"):
+        for key in (*files, "model-unit", "unit", "frame", "origin", "tolerance", "without"):
             value = remedy.keys.get(key, getattr(self, key.replace("-", "_")))
             for one in value if isinstance(value, tuple) else (value,):
                 words += [] if one is None else [f"--{key}", str(one)]
@@ -288,9 +288,10 @@ class _Keys:
         yield "[measurement]"
         for said in given.stated:
             yield f"# {_clean(said)}"
-        if SENSORS in given.tables or given.sensors is not None:
-            name = SENSORS if SENSORS in given.tables else self.copies[given.sensors]
-            yield f"sensors = {_quoted(name)}"
+        if SENSORS in given.tables:
+            yield f'sensors = "{SENSORS}"'
+        elif given.sensors is not None:
+            yield f"sensors = {_quoted(self.copies[given.sensors])}"
         yield f"modes = {_quoted(MODES if given.tables else self.copies[given.modes[0]])}"
         if COVARIANCE in given.tables:
             yield f'covariance = "{COVARIANCE}"'
@@ -305,8 +306,8 @@ class _Keys:
             yield f"frame = {_quoted(given.frame)}   # the model's axes in those of the test"
         if given.tolerance is not None:
             yield f"tolerance = {given.tolerance!r}   # of the size of the structure"
-        if given.offset is not None:
-            yield f"offset = [{given.offset}]   # of the test's origin, in m"
+        if given.origin is not None:
+            yield f"origin = [{given.origin}]   # of the test's origin, in m"
         if given.without is not None:
             listed = ", ".join(_quoted(label) for label in given.without.split(","))
             yield f"without = [{listed}]   # sensors that are left out"

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _UNITS = click.Choice(("m", "cm", "mm", "in", "ft"))
 
 
-def _parse_offset(text: str) -> str:
+def _parse_origin(text: str) -> str:
     """Return three numbers as TOML has them."""
     try:
         x, y, z = map(float, text.split(","))
@@ -57,7 +57,7 @@ def _parse_offset(text: str) -> str:
     help="How far a sensor may be from the structure, of its size. Default: 0.01.",
 )  # fmt: skip
 @click.option(
-    "--offset", callback=options.read_with(_parse_offset), metavar="X,Y,Z",
+    "--origin", callback=options.read_with(_parse_origin), metavar="X,Y,Z",
     help="Where the origin of the test is on the model, in m.",
 )  # fmt: skip
 @click.option("--without", metavar="LABELS", help="Sensors that are left out, by comma.")
@@ -74,7 +74,7 @@ def init(
     model_unit: LengthUnit | None,
     frame: str | None,
     tolerance: float | None,
-    offset: str | None,
+    origin: str | None,
     without: str | None,
 ) -> None:
     """Write a case folder into FOLDER, which must be new or empty.
@@ -82,7 +82,7 @@ def init(
     With the files of a model and of a test, these are copied, the sensors matched with the model,
     and a case is written that runs; without any, a commented example.
     """
-    others = (mass, dofs, sensors, model_unit, unit, frame, tolerance, offset, without)
+    others = (mass, dofs, sensors, model_unit, unit, frame, tolerance, origin, without)
     if model is None and not modes and all(other is None for other in others):
         from femubench.core.library.plugins import init_case
 
