@@ -310,7 +310,7 @@ class Placement:
         if way.unit != (own.unit or 1.0):
             keys["unit"] = next(str(u) for u, metres in METRES.items() if metres == way.unit)
         if fit.turned:
-            keys["frame"] = frame_text(way.turn)
+            keys["frame"] = frame_text(way.turn)  # axes
         if np.abs(way.origin - own.origin).max() > ON_MEMBER:
             keys["origin"] = ",".join(f"{value:.4g}" for value in way.origin)
         if needed > own.tolerance:

@@ -87,7 +87,8 @@ class Beginning:
         """Return the command that begins the case with other keys."""
         words = ["bench", "init", str(folder)]
         files = ("model", "mass", "dofs", "modes", "sensors")
-        for key in (*files, "model-unit", "unit", "frame", "origin", "tolerance", "without"):
+        axes = ("model-unit", "unit", "frame", "origin", "tolerance", "without")
+        for key in (*files, *axes):
             value = remedy.keys.get(key, getattr(self, key.replace("-", "_")))
             for one in value if isinstance(value, tuple) else (value,):
                 words += [] if one is None else [f"--{key}", str(one)]
