@@ -36,6 +36,8 @@ class InputError(FemubenchError):
         expected: what would have been right, e.g. ``"a number > 0"``.
     """
 
+    remedy: object = None  # the keys that would make it right, where they are known
+
     def __init__(
         self,
         what: str,

@@ -68,8 +68,8 @@ def test_measurement_with_gaps_and_complex_shapes() -> None:
     np.testing.assert_array_equal(m.shapes[:, 1], [0.1, np.nan, -2.0, 0.5])
     assert np.isnan(m.shapes[:, 2]).all()
     np.testing.assert_allclose(m.shapes[:, 3], [5.0, -np.hypot(0.5, 0.1), 0.0, -0.2])
-    np.testing.assert_allclose(m.shape_std[:, 0], [0.02, 0.02, 0.001, 0.02])
-    np.testing.assert_allclose(m.shape_std[:, 1], 0.04)
+    np.testing.assert_allclose(m.shape_std[:, 0], [0.1, 0.1, 0.001, 0.1])
+    np.testing.assert_allclose(m.shape_std[:, 1], 0.1)
     assert np.isnan(m.shape_std[:, 2]).all()
     np.testing.assert_allclose(m.shape_std[:, 3], 0.1)
 

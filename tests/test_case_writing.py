@@ -656,7 +656,7 @@ def unwritable(ladder: Case, portal: Case, bracket: Case) -> Iterator[tuple[Case
     between = replace(portal.measurement.sensors, xyz=portal.measurement.sensors.xyz + 0.0)
     between.xyz[1] = [0.0, 0.0, 0.1]
     off = replace(portal.measurement, sensors=between)
-    yield replace(portal, measurement=off, modifications=(), model=model), "off the structure, near"
+    yield replace(portal, measurement=off, modifications=(), model=model), "no node at left@"
     m = ladder.measurement
     std, frequencies = m.shape_std.copy(), m.frequencies.copy()
     std[0, 0], frequencies[0] = np.nan, np.inf

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +17,10 @@ from click.testing import CliRunner, Result
 
 import femubench
 import femubench.plot
+from femubench.core.case.records import mean_record
 from femubench.core.cli.main import bench
+from femubench.modal import FrequencyResponses
+from tests.frf_problems import write_universal
 
 SPANS, MASS, STIFFNESS = 8, 2.0, 4.0e6
 
@@ -62,6 +68,7 @@ def universal(folder: Path, length: float = 1e3, count: int = 6, **nodes: np.nda
 
 def init(folder: Path, *more: str) -> Result:
     files = {"--model": "K.mtx", "--mass": "M.mtx", "--dofs": "dofs.csv", "--modes": "test.uff"}
+    files = {key: name for key, name in files.items() if key not in more}
     words = [word for key, name in files.items() for word in (key, str(folder / name))]
     return CliRunner().invoke(bench, ["init", str(folder / "case"), *words, *more])
 
@@ -95,38 +102,165 @@ def test_folder_runs_and_says_what_was_done(tmp_path: Path) -> None:
         assert "coordinates were taken in mm" in " ".join(found.output.split())
 
 
-@pytest.mark.parametrize(
-    ("more", "nodes", "what"),
-    [
-        (["--unit", "m"], {}, 'unit = "mm"'),
-        (["--tolerance", "0.0001"], {}, "off the structure, nearest n1"),
-        (["--frame", "x,x,z"], {}, "no frame of axes"),
-        (["--modes", "K.mtx"], {}, "K.mtx: no modes are read"),
-        ([], {"y": 1e3 * np.array([0.2, 0.2, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6]), "x": np.arange(8.0)},
-         "both lie nearest to n1, direction z"),
-    ],
-)  # fmt: skip
-def test_nothing_is_left_where_something_is_wrong(
-    tmp_path: Path, more: list[str], nodes: dict[str, np.ndarray], what: str
-) -> None:
-    universal(tmp_path, **nodes)
-    more = [str(tmp_path / word) if word.endswith(".mtx") else word for word in more]
-    done = init(tmp_path, *(more if "--frame" in more else ["--frame", "y,-x,z", *more]))
-    assert done.exit_code == 2
-    assert what in done.output
-    assert str(tmp_path / "case") not in done.output.replace(str(tmp_path / "case") + "/", "")
+X = 1e3 * 0.2 * np.arange(1.0, SPANS + 1.0)
+CLOSE, WRONG = X.copy(), X.copy()
+CLOSE[1], WRONG[5] = 210.0, 12000.0  # within the reach of the first node; typed for 1200
+# The mistake, more words of `bench init`, coordinates of the test, what the message advises.
+MISTAKES: dict[str, tuple[str, dict[str, np.ndarray], str]] = {
+    "unit": ("--frame y,-x,z --unit m", {}, "--unit mm --frame y,-x,z` all fit"),
+    "unit of the model": (
+        "--frame y,-x,z --model-unit mm",
+        {},
+        "--model-unit m --unit mm --frame y,-x,z` all",
+    ),
+    "axes": (
+        "",
+        {},
+        "--unit mm --frame y,x,-z` all fit; by symmetry so they do with y,-x,z: compare",
+    ),
+    "tolerance": ("--frame y,-x,z --tolerance 0.0001", {}, "--tolerance 0.0022` all fit"),
+    "origin": ("--frame y,-x,z", {"y": X + 5e3}, "--frame y,-x,z --origin -5,"),
+    "all at once": (
+        "--tolerance 1e-6 --unit ft",
+        {"y": X / 25.4, "x": X / X},
+        "--unit in --frame y",
+    ),
+    "one wrong place": ("--frame y,-x,z", {"y": WRONG}, "--frame y,-x,z --without 6:z` the"),
+    "two at one place": ("--frame y,-x,z", {"y": CLOSE}, "bench init --without 2:z"),
+    "no model of it": ("--frame y,-x,z", {"y": X**2, "x": X**3}, "is it the right model"),
+    "no frame": ("--frame x,x,z", {}, "each once and right-handed"),
+    "no origin": ("--origin 1,2", {}, "is no X,Y,Z in m"),
+    "no modes": ("--modes @K.mtx", {}, "K.mtx: no modes are read"),
+    "no kind": ("--modes @notes.docx", {}, "a folder that `bench identify` writes"),
+    "no folder of it": ("--modes @empty", {}, "`bench identify FILE --output"),
+    "no places": ("--modes @modes.csv", {}, "bench init --sensors FILE"),
+    "not new": ("--frame y,-x,z", {"full": X}, "a new or an empty folder"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_names_its_remedy_and_leaves_nothing(tmp_path: Path, mistake: str) -> None:
+    more, nodes, advice = MISTAKES[mistake]
+    if full := "full" in nodes:
+        (tmp_path / "case").mkdir()
+        (tmp_path / "case" / "mine").write_text("precious")
+    universal(tmp_path, **{key: value for key, value in nodes.items() if key != "full"})
+    (tmp_path / "modes.csv").write_text("mode,frequency,a\n1,10,1\n")
+    (tmp_path / "notes.docx").write_text("")
+    (tmp_path / "empty").mkdir()
+    done = init(tmp_path, *more.replace("@", f"{tmp_path}/").split())
+    assert done.exit_code == 2, done.output
+    assert advice in done.output
     assert len(done.output.splitlines()) == 1
-    assert not (tmp_path / "case").exists()
+    assert (tmp_path / "case").exists() == full
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+    if mistake in ("origin", "all at once", "one wrong place"):
+        command = re.search("`(bench init .*?)`", done.output)
+        assert command is not None
+        again = CliRunner().invoke(bench, shlex.split(command[1])[1:])
+        assert again.exit_code == 0, again.output
 
 
-def test_refuses_to_overwrite(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("words", "advice"),
+    [
+        ("strategies list", "Did you mean plugins list?"),
+        ("run nosuch", "`bench init` writes one"),
+        ("diagnose .", "which `bench init` writes"),
+        ("update portal -s baruch -o new", "`elements` with a node at every sensor"),
+        ("identify one.csv", "two or more in one file"),
+        ("identify twice.uff", "the sensor 1:z is there twice"),
+    ],
+)
+def test_other_mistakes_name_their_remedy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str, advice: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if "portal" in words:
+        femubench.init_case("portal")
+    signal = np.random.default_rng(0).standard_normal(2100)
+    rows = "".join(f"{0.01 * i:.2f};{v}\n".replace(".", ",") for i, v in enumerate(signal))
+    Path("one.csv").write_text(f"time;1:z\n{rows}")
+    if "twice" in words:  # two forces, as if they were time
+        write_universal(Path("twice.uff"), responses(tmp_path), func_type=1)
+    done = CliRunner().invoke(bench, words.split())
+    assert done.exit_code == 2, done.output
+    assert advice in done.output
+    assert len(done.output.splitlines()) == 1
+
+
+def responses(folder: Path, noise: float = 1e-3) -> FrequencyResponses:
+    """Return receptances of the chain to a force at its second mass."""
+    hertz, shapes = chain(folder)
+    lines = np.arange(0.2 * hertz[0], 1.1 * hertz[-1], 0.5)
+    modal = 1.0 / (hertz**2 - lines[:, None] ** 2 + 0.02j * hertz * lines[:, None])
+    values = np.einsum("om,fm,im->foi", shapes, modal, shapes[[1, 2]]) / (4.0 * np.pi**2 * MASS)
+    rng = np.random.default_rng(1)
+    values = values * (1.0 + noise * rng.standard_normal(values.shape))
+    xyz = np.outer(0.2 * np.arange(1.0, SPANS + 1.0), [1.0, 0.0, 0.0])
+    every = femubench.Sensors(tuple(f"{k + 1}:z" for k in range(SPANS)), xyz, ("z",) * SPANS)
+    two = femubench.Sensors(every.labels[1:3], xyz[1:3], ("z", "z"))
+    return FrequencyResponses(every, two, lines, values, "receptance")
+
+
+def test_responses_and_the_folder_of_an_identification(tmp_path: Path) -> None:
+    measured = responses(tmp_path)
+    write_universal(tmp_path / "test.uff", measured)
+    done = init(tmp_path)
+    assert done.exit_code == 0, done.output
+    stated = " ".join(done.output.split())
+    assert "0.2 % of the frequencies and 2 % of the shapes was added" in stated
+    direct = femubench.read_case(tmp_path / "case")
+    hertz, _ = chain(tmp_path)
+    assert direct.measurement.frequencies == pytest.approx(hertz, rel=1e-3)
+    assert direct.measurement.frequency_std / hertz == pytest.approx(0.002, rel=0.01)
+    assert direct.measurement.shape_std == pytest.approx(0.02, rel=0.05)
+    found = tmp_path / "found"  # has what `bench identify` writes
+    (tmp_path / "case").rename(found)
+    done = init(tmp_path, "--modes", str(found))
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "case" / "modes.csv").read_bytes() == (found / "modes.csv").read_bytes()
+    (tmp_path / "case").rename(tmp_path / "other")
+    done = init(tmp_path, "--modes", str(tmp_path / "other"), "--modes", str(found))
+    assert done.exit_code == 0, done.output
+    assert "means of 2 records of one state, 8 modes" in " ".join(done.output.split())
+    assert b"frequency_std" in (tmp_path / "case" / "modes.csv").read_bytes()
+
+
+def test_unit_of_a_model_follows_from_its_size_and_mass(tmp_path: Path) -> None:
     universal(tmp_path)
-    (tmp_path / "case").mkdir()
-    (tmp_path / "case" / "mine").write_text("precious")
+    for name in ("K.mtx", "M.mtx"):  # N/mm and tonnes
+        scipy.io.mmwrite(tmp_path / name, 1e-3 * scipy.io.mmread(tmp_path / name))
+    rows = "".join(f"{i + 1},n{i + 1},z,{x:g},0,0\n" for i, x in enumerate(X))
+    (tmp_path / "dofs.csv").write_text(f"row,node,direction,x,y,z\n{rows}")
     done = init(tmp_path, "--frame", "y,-x,z")
-    assert (done.exit_code, "is not empty" in done.output) == (2, True)
-    assert [path.name for path in (tmp_path / "case").iterdir()] == ["mine"]
+    assert done.exit_code == 0, done.output
+    assert "has a mass of 16 kg" in " ".join(done.output.split())
+    assert 'unit = "mm"   # not stated' in (tmp_path / "case" / "case.toml").read_text()
+
+
+def test_scatter_of_records_is_that_of_their_means() -> None:
+    rng, count = np.random.default_rng(3), 40
+    shapes, hertz = rng.standard_normal((12, 6)), 10.0 * np.arange(1.0, 7.0)
+    largest = np.abs(shapes).max(axis=0)
+    records = []
+    for _ in range(count):
+        f = hertz * (1.0 + 0.004 * rng.standard_normal(6))
+        s = shapes + 0.03 * largest * rng.standard_normal(shapes.shape)
+        sensors = femubench.Sensors(tuple(map(str, range(12))), np.zeros((12, 3)), ("z",) * 12)
+        fit = (f, 1e-6 * f, np.full(6, np.nan), -2.0 * s, 1e-6 + 0.0 * s)
+        record = femubench.Measurement(sensors, (1, 2, 3, 4, 5, 6), *fit)
+        records.append(record.select([int(k) + 1 for k in rng.permutation(6)]))
+    found, said = mean_record(records, [Path("a")] * count)
+    at = np.argsort(found.frequencies)
+    assert found.frequencies[at] == pytest.approx(hertz, rel=0.003)
+    root = np.sqrt(count)
+    assert root * found.frequency_std[at] / hertz == pytest.approx(0.004, rel=0.2)
+    assert root * found.shape_std[:, at] / (2.0 * largest) == pytest.approx(0.03, rel=0.2)
+    assert "40 records of one state, 6 modes in all" in said
+    other = replace(records[1], sensors=replace(records[1].sensors, labels=tuple("abcdefghijkl")))
+    with pytest.raises(femubench.InputError, match="not the sensors of a"):
+        mean_record([records[0], other], [Path("a"), Path("b")])
 
 
 def test_table_of_modes_and_of_sensors(tmp_path: Path) -> None:

@@ -171,7 +171,7 @@ class TestEveryCommandOfTheReadme:
         found = femubench.identify("test.uff")
         theirs = pd.read_csv("theirs/modes.csv")
         assert theirs["frequency"].tolist() == found.frequencies.tolist()
-        assert theirs["frequency_std"].tolist() == found.measurement.frequency_std.tolist()
+        assert theirs["fit_std"].tolist() == found.measurement.frequency_std.tolist()
 
     def test_init_of_files_and_update(self) -> None:
         n = 6

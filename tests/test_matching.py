@@ -128,7 +128,7 @@ def test_two_sensors_at_one_place_and_direction(tmp_path: Path) -> None:
         (PLACES, 'unit = "cm"', 'with unit = "m" all fit'),
         (PLACES, 'unit = "in"\ntolerance = 0.5', 'with unit = "m" all fit'),
         (1e-5 * PLACES, "", "the structure 1.92 m (expected more than 0.0192 m"),
-        (np.full((4, 3), np.nan), "", "expected sensors: a table label,x,y,z,direction"),
+        (np.full((4, 3), np.nan), "", "sensors FILE`): a table label,x,y,z,direction"),
     ],
 )
 def test_what_would_fit_is_said(tmp_path: Path, xyz: np.ndarray, keys: str, advice: str) -> None:

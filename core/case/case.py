@@ -17,6 +17,7 @@ from femubench.core.typing import FloatArray
 
 TOLERANCE = 0.005
 BEAM_SHARE = 0.5
+SCATTER = (0.002, 0.02)  # of frequencies and of shapes, from one test to the next
 
 
 @dataclass(frozen=True)

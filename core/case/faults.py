@@ -7,10 +7,14 @@ import tomllib
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
+
+from femubench.core.errors import InputError
 
 KeyPath = tuple[str | int, ...]
 _LONGEST_VALUE = 60
@@ -30,12 +34,34 @@ class BadKey(Exception):  # noqa: N818 - becomes an InputError before anybody se
         self.path, self.what, self.expected = path, what, expected
 
 
+@dataclass(frozen=True)
+class Remedy:
+    """Keys of a case with which a test fits its model, by the options of `bench init`."""
+
+    keys: Mapping[str, str]
+
+    def __str__(self) -> str:
+        parts = []
+        for key, value in self.keys.items():
+            text = {"tolerance": value, "origin": f"[{value}]"}.get(key, f'"{value}"')
+            text = str(value.split(",")) if key == "without" else text
+            parts.append(f"{key.removeprefix('model-')} = {text}")
+            parts[-1] += " of [model]" if key == "model-unit" else ""
+        return " and ".join(parts)
+
+
 class Misfit(Exception):  # noqa: N818 - likewise
     """A place or direction that the structure does not have; has no key yet."""
 
-    def __init__(self, what: str, expected: str) -> None:
+    def __init__(self, what: str, expected: str, remedy: Remedy | None = None) -> None:
         super().__init__(what)
-        self.what, self.expected = what, expected
+        self.what, self.expected, self.remedy = what, expected, remedy
+
+    def at(self, file: Path, line: int | None = None, key: str | None = None) -> InputError:
+        """Return it as the error of a place in a file."""
+        error = InputError(self.what, file=file, line=line, key=key, expected=self.expected)
+        error.remedy = self.remedy
+        return error
 
 
 class WrongDirection(Misfit):

@@ -37,7 +37,8 @@ class CaseFiles:
             expected = f"a folder with a {CASE_FILE}"
             raise InputError("folder does not exist", file=folder, expected=expected)
         if not os.path.lexists(self.case_file):
-            raise InputError("missing file", file=self.case_file, expected="the file of the case")
+            expected = "the file of a case, which `bench init` writes"
+            raise InputError("missing file", file=self.case_file, expected=expected)
         if not self._holds(self.case_file):
             what = "a link that leads out of the case folder, or nowhere"
             raise InputError(what, file=self.case_file, expected="a file inside the folder")

@@ -3,31 +3,38 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import permutations, product
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from femubench.core.case.case import Match
-from femubench.core.case.faults import Misfit, WrongDirection
-from femubench.core.case.frames import Site
-from femubench.core.case.schema import LengthUnit
+from femubench.core.case.faults import Misfit, Remedy, WrongDirection
+from femubench.core.case.frames import FrameSite, Site
+from femubench.core.case.schema import LengthUnit, MeasurementSpec
 from femubench.core.case.tables import PLACES
 from femubench.core.case.units import METRES
 from femubench.core.errors import InputError
+from femubench.core.fem.frame import ACTIVE
 from femubench.core.fem.mesh import ON_MEMBER
-from femubench.core.fem.sensors import Sensors, axis_of, direction_of
+from femubench.core.fem.sensors import Sensors, axis_of, direction_of, moved_names
 from femubench.core.typing import FloatArray
 
 TOLERANCE = 0.01  # of the size of the structure
 AXES = 'three of x, y, z with an optional minus, each once and right-handed, e.g. "x,z,-y"'
 _EXTENT = (0.1, 1.2)  # of the size of the structure, that of a test of it
-_NEAR = 0.05  # of the size of the structure: so far from it half of the sensors may be in a unit
+_NEAR = 0.05  # of the size of the structure: so far from it most sensors of a fit may be
+_MOST = 0.8  # of the sensors must fit: the others may have a wrong place
+_AS_WELL = 1.25  # times the distance of the best fit, within which another one fits as well
+_FAR = 4.0  # times the distance that most sensors keep: one beyond has a wrong place
+_STEPS = 10  # of moving a test to the places nearest to it
+_STATIONS = 41  # points of a member, from which axes and units are sought
 _NAMED = re.compile(r"([+-]?)([xyz])", re.ASCII)
 
 
@@ -39,18 +46,33 @@ class Alignment:
         unit: of its coordinates in m; None where the size of the structure tells it.
         turn: the axes of the model in those of the test, (3, 3).
         tolerance: how far a sensor may be from the structure, of the size of the structure.
+        origin: of the test's origin in m along the axes of the model, (3,).
+        without: labels of sensors that are left out.
+        model_unit: of a model that comes in files; None of one that is in m by definition.
     """
 
     unit: float | None
     turn: FloatArray
     tolerance: float
+    origin: FloatArray = field(default_factory=lambda: np.zeros(3))
+    without: Collection[str] = ()
+    model_unit: LengthUnit | None = None
 
     @classmethod
-    def of(cls, unit: LengthUnit | None, frame: str | None, tolerance: float | None) -> Alignment:
+    def of(cls, spec: MeasurementSpec, model_unit: LengthUnit | None = None) -> Alignment:
         """Return what the keys of a case say; raises Misfit for a frame of axes that is none."""
-        turn = np.eye(3) if frame is None else parse_frame(frame)
-        known = None if unit is None else METRES[unit]
-        return cls(known, turn, TOLERANCE if tolerance is None else tolerance)
+        return cls(
+            None if spec.unit is None else METRES[spec.unit],
+            np.eye(3) if spec.frame is None else parse_frame(spec.frame),
+            TOLERANCE if spec.tolerance is None else spec.tolerance,
+            np.array(spec.origin, dtype=float),
+            spec.without,
+            model_unit,
+        )
+
+    def moved(self, xyz: FloatArray) -> FloatArray:
+        """Return coordinates of the test as those of the model in m, (..., 3)."""
+        return np.asarray((self.unit or 1.0) * xyz @ self.turn.T + self.origin)
 
     def direction(self, name: str) -> str:
         """Return a direction of the test as one of the model."""
@@ -67,13 +89,13 @@ class Placed(NamedTuple):
         sensors: that fit it.
         matches: where each was taken to sit.
         stated: what to say of units and places.
-        turn: from coordinates of the test to those of the model in m, (3, 3).
+        alignment: by which coordinates of the test become those of the model.
     """
 
     sensors: Sensors
     matches: tuple[Match, ...]
     stated: tuple[str, ...]
-    turn: FloatArray
+    alignment: Alignment
 
 
 def parse_frame(text: str) -> FloatArray:
@@ -110,11 +132,14 @@ class Placement:
         site: the structure.
         alignment: how the test lies to it.
         every: all coordinates of the test as they were given, finite, (k, 3).
+        labels, directions: of the sensors that are there.
     """
 
     site: Site
     alignment: Alignment
     every: FloatArray
+    labels: Sequence[str] = ()
+    directions: Sequence[str] = ()
 
     @cached_property
     def size(self) -> float:
@@ -140,15 +165,15 @@ class Placement:
         """Return the unit in which the test fits the structure: m where that may be."""
         if "m" in self._units or not self._units:
             return "m"
-        turned = self.every @ self.alignment.turn.T
-        gap = {unit: float(np.median(self._gaps(turned * METRES[unit]))) for unit in self._units}
+        tried = {unit: replace(self.alignment, unit=METRES[unit]) for unit in self._units}
+        gap = {u: float(np.median(self._gaps(way.moved(self.every)))) for u, way in tried.items()}
         best = min(self._units, key=gap.__getitem__)
         # One wrong coordinate may make any unit fit by size.
         return best if gap[best] <= _NEAR * self.size else "m"
 
     def match_labels(self, labels: Sequence[str]) -> list[Match]:
         """Return the nearest place of every sensor, near enough or not."""
-        points = (self.alignment.unit or 1.0) * self.every @ self.alignment.turn.T
+        points = self.alignment.moved(self.every)
         found = zip(labels, points, self.site.nearest(points), strict=True)
         # What sits where it should keeps its coordinates to the last bit.
         return [
@@ -170,7 +195,7 @@ class Placement:
             f"nearest {match.place} at ({foot})"
         )
         tolerance = f"(tolerance = {self.alignment.tolerance:g} of its size)"
-        raise Misfit(what, f"at most {self.limit:.3g} m {tolerance}{self._advice()}")
+        raise self._misfit(what, f"at most {self.limit:.3g} m {tolerance}")
 
     def check_span(self, matches: Sequence[Match], file: str) -> tuple[str, ...]:
         """Return what to say of sensors that are close together for the size of the structure.
@@ -182,12 +207,10 @@ class Placement:
         if not ON_MEMBER < span < _EXTENT[0] * self.size:
             return ()
         what = f"the sensors span {span:.3g} m, the structure {self.size:.3g} m"
-        question = "is one of the units wrong?"
         if span <= self.limit and any(match.distance > ON_MEMBER for match in matches):
-            advice = self._advice() if self._units else f"; {question}"
             tolerance = f"(tolerance = {self.alignment.tolerance:g} of its size)"
-            raise Misfit(what, f"more than {self.limit:.3g} m {tolerance}{advice}")
-        return (f"{file}: {what}: {question}",)
+            raise self._misfit(what, f"more than {self.limit:.3g} m {tolerance}")
+        return (f"{file}: {what}: is one of the units wrong?",)
 
     def check_apart(self, found: Sequence[tuple[Match, str]]) -> None:
         """Check that no two sensors of different places went to one place and direction.
@@ -208,27 +231,138 @@ class Placement:
                     f"{match.place}, direction {way} ({other.distance:.3g} and "
                     f"{match.distance:.3g} m away)"
                 )
-                raise Misfit(what, f"a finer model, or one of the two left out{self._advice()}")
+                left_out = f'without = ["{match.sensor}"], `bench init --without {match.sensor}`'
+                raise self._misfit(what, f"a finer model, or one of the two left out: {left_out}")
 
-    def _advice(self) -> str:
-        """Return the unit and the frame of axes with which all points of the test would fit."""
-        if not self._units and len(self.every) > 1:
+    def _misfit(self, what: str, expected: str) -> Misfit:
+        """Return the fault, with the keys under which the test would fit where these are clear."""
+        fits = sorted(self._fits() if len(self.every) > 1 else (), key=lambda fit: fit[:3])
+        if not fits:
             sizes = f"{size_of(self.every):.3g} as they stand, the structure {self.size:.3g} m"
-            return f"; the sensors span {sizes}: is one of the units wrong?"
-        for unit in self._units:
-            for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
-                turn = np.zeros((3, 3))
-                turn[range(3), list(order)] = signs
-                points = METRES[unit] * self.every @ turn.T
-                if np.linalg.det(turn) > 0.0 and self._gaps(points).max() <= self.limit:
-                    axes = zip(order, signs, strict=True)
-                    frame = ",".join(f"{'-' if s < 0 else ''}{'xyz'[k]}" for k, s in axes)
-                    other = METRES[unit] != (self.alignment.unit or 1.0)
-                    keys = [f'unit = "{unit}"'] if other else []
-                    same = np.array_equal(turn, self.alignment.turn)
-                    keys += [] if same else [f'frame = "{frame}"']
-                    return f"; with {' and '.join(keys)} all fit" if keys else ""
-        return ""
+            question = "is it the right model, or is one of the units wrong?"
+            found = f"no unit, axes or origin fit: the sensors span {sizes}: {question}"
+            return Misfit(what, f"{expected}; {found}")
+        alike = [fit for fit in fits if fit.kind == fits[0].kind]
+        near = _AS_WELL * min(fit.gap for fit in alike) + ON_MEMBER
+        alike = [fit for fit in alike if fit.gap <= near]
+        proper = [fit for fit in alike if np.linalg.det(fit.way.turn) > 0.0]
+        if not proper:
+            advice = "turn one axis of the test, its coordinates and its directions"
+            mirrored = f"only mirrored axes {frame_text(alike[0].way.turn)!r} fit: {advice}"
+            return Misfit(what, f"{expected}; {mirrored}")
+        remedy = self._remedy(proper[0])
+        if not remedy.keys:
+            return Misfit(what, expected)
+        text = f"{expected}; with {remedy} all fit"
+        if "without" in remedy.keys:
+            text = f"{expected}; put those places right, or with {remedy} the others fit"
+        frames = list(dict.fromkeys(frame_text(fit.way.turn) for fit in proper))
+        if len(frames) > 1:
+            text += f"; by symmetry so they do with {' or '.join(frames[1:4])}: compare MACs"
+        return Misfit(what, text, remedy)
+
+    def _fits(self) -> Iterator[Laying]:
+        """Yield units, axes and offsets with which most of the sensors lie on the structure."""
+        tree, own = cKDTree(cloud_of(self.site)), self.alignment
+        middle = 0.5 * (tree.mins + tree.maxes)
+        count = max(2, int(np.ceil(_MOST * len(self.every))))
+        site = self.site
+        there = set(
+            ACTIVE[site.frame.plane] if isinstance(site, FrameSite) else site.dofs.direction
+        )
+        own_scale = METRES[own.model_unit or "m"]
+        units = [(u, v) for u in METRES.values() for v in (METRES if own.model_unit else (None,))]
+        found = False
+        for origin, (unit, model_unit) in product((False, True), units):
+            factor = unit * own_scale / METRES[model_unit or "m"]
+            size = factor * size_of(self.every) / (self.size or 1.0)
+            if found and origin:
+                return
+            if origin and not _EXTENT[0] <= size <= _EXTENT[1]:
+                continue
+            for turn in signed_axes():
+                points = factor * self.every @ turn.T
+                points += middle - np.median(points, axis=0) if origin else own.origin
+                for _ in range(_STEPS if origin else 1):
+                    gaps, at = tree.query(points)
+                    near = np.argsort(gaps)[:count]
+                    step = (tree.data[at[near]] - points[near]).mean(axis=0)
+                    points = points + step if origin else points
+                gap, spread = float(gaps[near[-1]]), size_of(points[near]) / (self.size or 1.0)
+                if gap > _NEAR * self.size or not _EXTENT[0] <= spread <= _EXTENT[1]:
+                    continue
+                shift = (points - factor * self.every @ turn.T)[0] * unit / factor
+                way = replace(own, unit=unit, turn=turn, origin=shift, model_unit=model_unit)
+                lost = sum(not set(moved_names(way.direction(d))) <= there for d in self.directions)
+                changed = (unit != (own.unit or 1.0)) + (model_unit != own.model_unit)
+                kind = (changed, -round(spread, 1), lost, unit, model_unit or "")
+                found = True
+                yield Laying(kind, not np.array_equal(turn, own.turn), gap, way, points)
+
+    def _remedy(self, fit: Laying) -> Remedy:
+        """Return the keys of a fit that differ from those as they are."""
+        own, way, size = self.alignment, fit.way, self.size or 1.0
+        gaps = self._gaps(fit.points) / size
+        far = gaps > max(_FAR * fit.gap / size, _NEAR)
+        needed, keys = float(gaps[~far].max()), {}
+        if way.model_unit not in (None, own.model_unit):
+            keys["model-unit"] = str(way.model_unit)
+        if way.unit != (own.unit or 1.0):
+            keys["unit"] = next(str(u) for u, metres in METRES.items() if metres == way.unit)
+        if fit.turned:
+            keys["frame"] = frame_text(way.turn)  # axes
+        if np.abs(way.origin - own.origin).max() > ON_MEMBER:
+            keys["origin"] = ",".join(f"{value:.4g}" for value in way.origin)
+        if needed > own.tolerance:
+            keys["tolerance"] = f"{float(f'{1.05 * needed:.2g}'):g}"
+        if far.any():
+            keys["without"] = ",".join(s for s, out in zip(self.labels, far, strict=True) if out)
+        return Remedy(keys)
+
+
+class Laying(NamedTuple):
+    """A way in which most sensors of a test lie on a structure; the best one sorts first.
+
+    Arguments:
+        kind: units changed, minus what the test spans, directions that are lost, the units.
+        turned: whether axes are changed.
+        gap: that most sensors keep to the structure in m.
+        way: it.
+        points: the sensors by it, in m of the structure as it was read, (k, 3).
+    """
+
+    kind: tuple[Any, ...]
+    turned: bool
+    gap: float
+    way: Alignment
+    points: FloatArray
+
+
+def signed_axes() -> Iterator[FloatArray]:
+    """Yield the 24 turns of three axes, then the 24 mirrored ones, (3, 3) each."""
+    every = []
+    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+        turn = np.zeros((3, 3))
+        turn[range(3), list(order)] = signs
+        every.append(turn)
+    yield from sorted(every, key=lambda turn: -np.linalg.det(turn))
+
+
+def frame_text(turn: FloatArray) -> str:
+    """Return signed axes as the key ``frame`` has them."""
+    axes = [int(np.abs(row).argmax()) for row in turn]
+    pairs = zip(turn, axes, strict=True)
+    return ",".join(f"{'-' if row[k] < 0.0 else ''}{'xyz'[k]}" for row, k in pairs)
+
+
+def cloud_of(site: Site) -> FloatArray:
+    """Return points all over a structure in m, (k, 3)."""
+    if not isinstance(site, FrameSite):
+        return site.points
+    places = {joint.name: np.array(joint.xyz) for joint in site.frame.joints}
+    share = np.linspace(0.0, 1.0, _STATIONS)[:, None]
+    ends = [[places[name] for name in member.ends] for member in site.frame.members]
+    return np.vstack([(1.0 - share) * first + share * last for first, last in ends])
 
 
 def match_sensors(
@@ -250,21 +384,24 @@ def match_sensors(
     Raises:
         InputError: when a sensor lies off the structure, or none is left.
     """
-    scale = 1.0
     known = np.asarray(np.isfinite(read.xyz).all(axis=1))
     if not known.any():
         raise InputError("sensors without places", file=file, expected=PLACES)
     rows = [
-        i for i, label in enumerate(read.labels) if known[i] and (wanted is None or label in wanted)
+        i
+        for i, label in enumerate(read.labels)
+        if known[i] and (wanted is None or label in wanted) and label not in alignment.without
     ]
     kept: list[tuple[Match, str]] = []
     stated: tuple[str, ...] = ()
     if rows:
-        test = Placement(site, alignment, read.xyz[rows])
-        unit = test.detect_unit()
-        scale = METRES[unit] if alignment.unit is None else alignment.unit
-        test = replace(test, alignment=replace(alignment, unit=scale))
-        matches = test.match_labels([read.labels[i] for i in rows])
+        labels = tuple(read.labels[i] for i in rows)
+        ways = tuple(read.directions[i] for i in rows)
+        test = Placement(site, alignment, read.xyz[rows], labels, ways)
+        stated_unit, unit = alignment.unit, test.detect_unit()
+        alignment = replace(alignment, unit=stated_unit or METRES[unit])
+        test = replace(test, alignment=alignment)
+        matches = test.match_labels(labels)
         try:
             stated = test.check_span(matches, file.name)
             for i, match in zip(rows, matches, strict=True):
@@ -275,8 +412,8 @@ def match_sensors(
                     kept.append((match, way))
             test.check_apart(kept)
         except Misfit as misfit:
-            raise InputError(misfit.what, file=file, expected=misfit.expected) from None
-        if alignment.unit is None and unit != "m":
+            raise misfit.at(file) from None
+        if stated_unit is None and unit != "m":
             ratio = size_of(test.every) / test.size
             why = f"in m the sensors would span {ratio:.3g} times the structure."
             stated = (f"{file.name}: coordinates were taken in {unit}, since {why}", *stated)
@@ -286,9 +423,8 @@ def match_sensors(
         raise InputError("no sensor fits the structure", file=file, expected=expected)
     found = tuple(match for match, _ in kept)
     places = np.array([match.xyz for match in found])
-    labels = tuple(match.sensor for match in found)
-    sensors = Sensors(labels, places, tuple(way for _, way in kept))
-    return Placed(sensors, found, stated, scale * alignment.turn)
+    sensors = Sensors(tuple(match.sensor for match in found), places, tuple(way for _, way in kept))
+    return Placed(sensors, found, stated, alignment)
 
 
 def describe_matches(matches: Sequence[Match], file: str) -> tuple[str, ...]:

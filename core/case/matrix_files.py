@@ -138,7 +138,8 @@ def frame_places(model: Model, places: Sequence[Place]) -> dict[Place, Place]:
         node = node_at(structure.frame, structure.mesh, place)
         if node is None:
             what = f"the model has changed matrices and no node at {place}"
-            raise BadKey(("modification",), what, "attachments at nodes")
+            expected = "`elements` with a node at every sensor and attachment, or a strategy that "
+            raise BadKey(("model", "members"), what, f"{expected}scales parameters")
         found[place] = Place(joint=names[node])
     return found
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,25 +18,33 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray
 
 FREQUENCY_STD = 0.005  # of the frequency, where the table gives none
+FIT_STD = "fit_std"  # column: deviations of a fit alone, in place of frequency_std
 _SAME_AXIS = 0.999999  # cosine
+_SCALES = 10.0  # a larger ratio of readings is one of scales, not of what sensors see
 _MOST_NUMBERS = 20_000_000  # modes times sensors
 NO_SENSORS = Sensors((), np.zeros((0, 3)), ())
 
 
-def read_modes(file: Path, sensors: Sensors, shape_std: float) -> Measurement:
+def read_modes(
+    file: Path, sensors: Sensors, shape_std: float, without: Collection[str] = ()
+) -> Measurement:
     """Return the modes of a CSV file.
 
     Arguments:
-        file: mode,frequency,frequency_std,damping and a column a sensor, optionally LABEL_std.
+        file: mode,frequency,frequency_std or fit_std,damping and a column a sensor, optionally
+            LABEL_std.
         sensors: whose labels the columns bear; a sensor without a column was not measured.
-        shape_std: deviation of a shape, of its largest component, where the table gives none.
+        shape_std: deviation of a shape, of the largest reading, where the table gives none.
+        without: sensors whose columns are passed over.
 
     Raises:
         InputError: for an unknown column, a mode listed twice, a number that cannot be.
     """
     table = read_table(file)
     labels = sensors.labels
-    known = {*RESERVED, *labels, *(f"{label}_std" for label in labels)}
+    known = {*RESERVED, FIT_STD}
+    known.update(name for s in (*labels, *without) for name in (s, f"{s}_std"))
+    stated = FIT_STD if FIT_STD in table.columns else "frequency_std"
     more = [column[:60] for column in table.columns if column not in known]
     if more and not labels:
         expected = f"{', '.join(RESERVED)}; for columns of shapes {PLACES}"
@@ -58,7 +67,7 @@ def read_modes(file: Path, sensors: Sensors, shape_std: float) -> Measurement:
         frequency = row.number("frequency", "a number > 0 in Hz", lambda v: v >= SMALLEST)
         if frequency is None:
             raise row.error("frequency", "empty cell", "a number > 0 in Hz")
-        std = row.number("frequency_std", "a number >= 0 in Hz, or nothing", _not_negative)
+        std = row.number(stated, "a number >= 0 in Hz, or nothing", _not_negative)
         std = FREQUENCY_STD * frequency if std is None else std
         ratio = row.number("damping", "a ratio >= 0 and < 1, or nothing", lambda v: 0 <= v < 1)
         columns.append((frequency, std, np.nan if ratio is None else ratio))
@@ -103,15 +112,40 @@ def _shapes(table: CsvTable, labels: tuple[str, ...]) -> tuple[FloatArray, Float
 
 
 def with_default_std(shapes: FloatArray, std: FloatArray, share: float) -> FloatArray:
-    """Return deviations with a share of each mode's largest component where there is none.
+    """Return deviations with a share of the largest reading of all modes where there is none.
 
     Arguments:
         shapes, std: (n_sensors, m), nan where missing; a mode without any shape keeps nan.
-        share: the deviation relative to the largest measured component of the mode.
+        share: the deviation relative to `reach`.
     """
-    largest = np.max(np.abs(np.nan_to_num(shapes)), axis=0, initial=0.0)
-    default = share * np.where(largest > 0.0, largest, np.nan)
-    return np.where(np.isnan(std), default[None, :], std)
+    return np.where(np.isnan(std), share * reach(shapes)[None, :], std)
+
+
+def reach(shapes: FloatArray) -> FloatArray:
+    """Return the reading of which the deviations of every mode are a share, (m,).
+
+    That is the largest of all modes: a mode that the sensors hardly see is not measured the
+    better for it. Modes may have scales of their own, so it is at most `_SCALES` times the mode's.
+
+    Arguments:
+        shapes: (n_sensors, m), nan where missing; a mode without any shape gets nan.
+    """
+    own = np.max(np.abs(np.nan_to_num(shapes)), axis=0, initial=0.0)
+    own = np.where(own > 0.0, own, np.nan)
+    every = np.max(np.nan_to_num(own), initial=0.0)
+    return np.asarray(np.minimum(every, _SCALES * own))
+
+
+def with_scatter(measurement: Measurement, shares: tuple[float, float]) -> Measurement:
+    """Return a measurement whose deviations hold what differs from one test to the next as well.
+
+    Arguments:
+        measurement: with the deviations of its fit.
+        shares: of frequencies, and of shapes relative to `reach`.
+    """
+    found = measurement.widen(shares[0] * measurement.frequencies)
+    std = np.hypot(found.shape_std, shares[1] * reach(found.shapes)[None, :])
+    return replace(found, shape_std=std)
 
 
 def match_modes(read: Measurement, file: Path, sensors: Sensors, share: float) -> Measurement:

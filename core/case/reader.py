@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from femubench.core.case.case import Case, Match, Modification
+from femubench.core.case.case import SCATTER, Case, Match, Modification
 from femubench.core.case.checks import FREE_YET_HELD, NOT_HELD, check_unique
 from femubench.core.case.deviations import with_floor
 from femubench.core.case.faults import BadKey, KeyPath, at_key
@@ -21,18 +21,26 @@ from femubench.core.case.matching import Alignment, Placed, match_sensors
 from femubench.core.case.matrices import model_of_matrices, reader_of, reading_with
 from femubench.core.case.model_files import model_of_file, remarks_of
 from femubench.core.case.modes import (
+    FIT_STD,
     FREQUENCY_STD,
     NO_SENSORS,
     match_modes,
     observe_at,
     read_modes,
     select_measured,
+    with_scatter,
 )
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.reducing import reduce_case
 from femubench.core.case.repeats import with_covariance, with_repeats
 from femubench.core.case.response_files import read_responses
-from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, ModificationSpec
+from femubench.core.case.schema import (
+    CaseSpec,
+    FileSpec,
+    FrameSpec,
+    ModificationSpec,
+    ScatterSpec,
+)
 from femubench.core.case.sensors import read_sensors
 from femubench.core.case.tables import SUFFIXES, read_table
 from femubench.core.case.toml_text import locate_fault, spec_of
@@ -288,14 +296,16 @@ class _Building:
         reader: Any = None if read is None else reader_of(path, self.readers)
         if hasattr(reader, "read_outline"):
             with reading_with(reader, path):
-                self.lines = np.asarray(reader.read_outline(path).lines @ found.turn.T)
+                self.lines = found.alignment.moved(reader.read_outline(path).lines)
         return found.sensors, read is not None
 
     def place_sensors(self, path: Path, read: Measurement | None, site: Site, modes: str) -> Placed:
         """Return the sensors of a file and where each was taken to sit."""
         spec = self.spec.measurement
         with at_key("measurement", "frame"):  # of axes
-            alignment = Alignment.of(spec.unit, spec.frame, spec.tolerance)
+            model = self.spec.model
+            unit = model.unit if isinstance(model, FileSpec) else None
+            alignment = Alignment.of(spec, unit)
         if read is None:
             found = read_sensors(path, site, alignment)
         else:
@@ -313,9 +323,21 @@ class _Building:
         share = self.spec.measurement.shape_std
         path, read = self.reading(key, name)
         if read is None:
-            found = read_modes(path, sensors, share)
+            found = read_modes(path, sensors, share, self.spec.measurement.without)
         else:
             found = match_modes(read, path, sensors, share)
+        spec, fitted = self.spec.measurement.scatter, False
+        if read is None and FIT_STD in read_table(path).columns:
+            fitted, spec = True, spec or ScatterSpec(frequencies=SCATTER[0], shapes=SCATTER[1])
+        if spec is not None:
+            found = with_scatter(found, (spec.frequencies, spec.shapes))
+            found = replace(found, assumed=fitted)
+            why = "deviations are those of one fit, no repeats" if fitted else "as stated"
+            self.notes[
+                f"{name}: {why}: a scatter from test to test of {100.0 * spec.frequencies:g} % of "
+                f"the frequencies and {100.0 * spec.shapes:g} % of the shapes was added to them "
+                "(scatter in [measurement])."
+            ] = None
         found, stated = with_floor(found, name, FREQUENCY_STD, share)
         self.notes |= dict.fromkeys(stated)
         return found

@@ -184,8 +184,9 @@ def _of_arrays(file: Path, held: Mapping[str, Any], known: Sensors | None) -> Re
 
 def _sensors(file: Path, labels: Sequence[str], known: Sensors | None) -> Sensors:
     """Return sensors: known ones, or at unknown places along what their labels say."""
-    if not labels or len(set(labels)) < len(labels):
-        what = "a label is listed twice" if labels else "no labels"
+    twice = [label for k, label in enumerate(labels) if label in labels[:k]]
+    if not labels or twice:
+        what = f"the label {twice[0][:40]!r} is listed twice" if labels else "no labels"
         raise InputError(what, file=file, expected="every label once")
     rows = {} if known is None else {label: i for i, label in enumerate(known.labels)}
     xyz, directions = np.full((len(labels), 3), np.nan), []

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, InstanceOf, PlainValidator
 from pydantic_core import PydanticCustomError
 
-from femubench.core.case.case import BEAM_SHARE, TOLERANCE
+from femubench.core.case.case import BEAM_SHARE, SCATTER, TOLERANCE
 from femubench.core.fem.frame import BeamTheory, BendingMass, Place, Plane
 
 T = TypeVar("T")
@@ -367,6 +367,13 @@ class WeightSpec(TomlTable):
     std: Positive = Field(description="a number > 0 in kg")
 
 
+class ScatterSpec(TomlTable):
+    """`scatter` in `[measurement]`."""
+
+    frequencies: NotNegative = Field(SCATTER[0], description="a number >= 0, of the frequency")
+    shapes: NotNegative = Field(SCATTER[1], description="a number >= 0, of the largest reading")
+
+
 class MeasurementSpec(TomlTable):
     """`[measurement]`."""
 
@@ -386,6 +393,9 @@ class MeasurementSpec(TomlTable):
     tolerance: Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)] | None = Field(
         None, description="a number >= 0 and <= 1, of the size of the structure"
     )
+    origin: Vector = Field((0.0, 0.0, 0.0), description=XYZ)
+    without: Many[Text] = Field((), max_length=1000, description="a list of labels of sensors")
+    scatter: ScatterSpec | None = Field(None, description="{frequencies, shapes}")
     repeats: FileName | None = Field(None, description="a CSV file in the case folder")
     covariance: FileName | None = Field(None, description="a CSV file in the case folder")
     variables: dict[Name, Text] = Field(

@@ -41,7 +41,8 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
     if len(table.rows) > _MOST_SENSORS:
         raise InputError("too many sensors", file=file, expected=f"at most {_MOST_SENSORS}")
     labels: dict[str, None] = {}
-    for row in table.rows:
+    rows = [row for row in table.rows if row.cells["label"] not in alignment.without]
+    for row in rows:
         label = row.text("label")
         if label in labels or label in RESERVED:
             what = f"{label!r} is listed twice" if label in labels else f"{label!r} is reserved"
@@ -49,36 +50,35 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
         labels[label] = None
     if not labels:
         raise InputError("no sensors", file=file, expected="a row for every sensor")
-    directions = [row.direction() for row in table.rows]
+    directions = [row.direction() for row in rows]
     if by_place:
-        pairs = zip(table.rows, directions, strict=True)
+        pairs = zip(rows, directions, strict=True)
         points = [_point_at(row, way, site) for row, way in pairs]
         return Placed(
             Sensors(tuple(labels), np.array(points, dtype=float), tuple(directions)),
             (),
             (),
-            np.eye(3),
+            alignment,
         )
-    every = np.array([row.vector() for row in table.rows], dtype=float)
-    test = Placement(site, alignment, every)
-    matches = tuple(test.match_labels(list(labels)))
-    for row, match in zip(table.rows, matches, strict=True):
+    every = np.array([row.vector() for row in rows], dtype=float)
+    test = Placement(site, alignment, every, tuple(labels), tuple(directions))
+    matches = tuple(test.match_labels(test.labels))
+    for row, match in zip(rows, matches, strict=True):
         try:
             test.check_near(match)
         except Misfit as misfit:
-            raise row.error("x", misfit.what, misfit.expected) from None
+            raise misfit.at(file, row.line, "x") from None
     directions = [alignment.direction(way) for way in directions]
-    for row, match, way in zip(table.rows, matches, directions, strict=True):
+    for row, match, way in zip(rows, matches, directions, strict=True):
         _check_sensor(row, match.xyz, way, site, "x")
     try:
         close = test.check_span(matches, file.name)
         test.check_apart(list(zip(matches, directions, strict=True)))
     except Misfit as misfit:
-        raise InputError(misfit.what, file=file, expected=misfit.expected) from None
+        raise misfit.at(file) from None
     xyz = np.array([match.xyz for match in matches], dtype=float)
     sensors = Sensors(tuple(labels), xyz, tuple(directions))
-    turn = (alignment.unit or 1.0) * alignment.turn
-    return Placed(sensors, matches, (*close, *describe_matches(matches, file.name)), turn)
+    return Placed(sensors, matches, (*close, *describe_matches(matches, file.name)), alignment)
 
 
 def _point_at(row: CsvRow, direction: str, site: Site) -> Vector:

@@ -3,28 +3,37 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from femubench.core.case.case import Case
+from femubench.core.case.case import SCATTER, Case
+from femubench.core.case.faults import Remedy
 from femubench.core.case.files import CASE_FILE, LARGEST_FILE
 from femubench.core.case.matrices import reader_of, reading_with
-from femubench.core.case.model_files import further_files
+from femubench.core.case.model_files import ModelFiles, further_files, read_model
+from femubench.core.case.modes import FIT_STD
 from femubench.core.case.reader import read_case
+from femubench.core.case.records import COVARIANCE, MODES, REFERENCES, SENSORS
+from femubench.core.case.response_files import read_responses
 from femubench.core.case.schema import LengthUnit
 from femubench.core.case.table_text import csv_bytes
 from femubench.core.case.tables import SUFFIXES, read_table
+from femubench.core.case.units import METRES, NEWTONS
 from femubench.core.case.writing import new_folder
 from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
 from femubench.core.files import check_regular
 from femubench.core.roles import Reader
 
+# Mass over the cube of the diagonal, kg/m3: a mast of 1 km to a block of steel.
+_DENSITIES = (1e-4, 2e4)
 MATCHES, PICTURE = "matches.csv", "matches.png"
 
 
@@ -34,15 +43,18 @@ class Beginning:
 
     Arguments:
         model: a file with the model, or with its stiffness alone.
-        modes: a file with the measured modes.
+        modes: the file with the measured modes, the folder of an identification or a file of
+            responses; several such records are repeats.
         mass, dofs: files with the mass, and with labels or places of the rows of matrices.
         sensors: a file with the places of sensors, where `modes` has none.
         model_unit: of the lengths of the model; None where it was not stated.
-        unit, frame, tolerance: of the test, as the keys of ``[measurement]``.
+        unit, frame, tolerance, origin, without: of the test, as the keys of ``[measurement]``.
+        tables: what was identified, by name: the file that it comes from, and the table.
+        stated: what to say of it.
     """
 
     model: Path
-    modes: Path
+    modes: tuple[Path, ...]
     mass: Path | None = None
     dofs: Path | None = None
     sensors: Path | None = None
@@ -50,11 +62,37 @@ class Beginning:
     unit: LengthUnit | None = None
     frame: str | None = None
     tolerance: float | None = None
+    origin: str | None = None
+    without: str | None = None
+    tables: Mapping[str, tuple[Path, bytes]] = field(default_factory=dict)
+    stated: tuple[str, ...] = ()
 
-    def files(self) -> dict[str, Path]:
-        """Return the files that are at hand, by what they are."""
-        named = {key: getattr(self, key) for key in ("model", "mass", "dofs", "modes", "sensors")}
-        return {key: path for key, path in named.items() if path is not None}
+    @classmethod
+    def of(cls, model: Any, modes: Sequence[Any], *more: Any, **stated: Any) -> Beginning:  # noqa: ANN401
+        """Return it with paths; raises InputError where model or modes are missing."""
+        if model is None or not modes:
+            missing = "--model" if model is None else "--modes"
+            expected = "a file with the model and one with the modes"
+            raise InputError("is missing", key=missing, expected=expected)
+        return cls(Path(model), tuple(Path(path) for path in modes), *more, **stated)
+
+    def files(self) -> tuple[Path, ...]:
+        """Return the files that are at hand."""
+        modes = () if self.tables else self.modes
+        sensors = None if SENSORS in self.tables else self.sensors
+        every = (self.model, self.mass, self.dofs, *modes, sensors)
+        return tuple(path for path in every if path is not None)
+
+    def command(self, folder: Path, remedy: Remedy) -> str:
+        """Return the command that begins the case with other keys."""
+        words = ["bench", "init", str(folder)]
+        files = ("model", "mass", "dofs", "modes", "sensors")
+        axes = ("model-unit", "unit", "frame", "origin", "tolerance", "without")
+        for key in (*files, *axes):
+            value = remedy.keys.get(key, getattr(self, key.replace("-", "_")))
+            for one in value if isinstance(value, tuple) else (value,):
+                words += [] if one is None else [f"--{key}", str(one)]
+        return shlex.join(words)
 
 
 def start_case(
@@ -77,20 +115,31 @@ def start_case(
     Raises:
         InputError: when the folder holds anything, or for what is wrong in the files.
     """
+    guessed = given.model_unit is None
+    if guessed:
+        given = replace(given, model_unit=_likely_unit(given, readers))
     with new_folder(folder) as fresh:
         copies = _copied(given, fresh, readers)
-        used, held_out = _shared_out(given.modes, readers)
-        keys = _Keys(folder.resolve().name, given, copies, used, held_out)
+        for name, (_, content) in given.tables.items():
+            (fresh / name).write_bytes(content)
+        modes = fresh / MODES if given.tables else given.modes[0]
+        used, held_out = _shared_out(mode_numbers(modes, readers), given.modes[0])
+        keys = _Keys(folder.resolve().name, given, copies, used, held_out, guessed)
         (fresh / CASE_FILE).write_text(keys.text(readers), encoding="utf-8")
         try:
             case = read_case(fresh, readers=readers)
         except InputError as error:
             # The file that the user has, and not its copy.
             origins = {fresh / name: path for path, name in copies.items()}
+            origins |= {fresh / name: path for name, (path, _) in given.tables.items()}
             file = None if error.file is None else origins.get(Path(error.file))
-            line = error.line if file is not None else None
+            line = error.line if file is not None and file.suffix in SUFFIXES else None
+            expected = error.expected
+            if isinstance(error.remedy, Remedy) and expected is not None:
+                command = given.command(folder, error.remedy)
+                expected = expected.replace(f"with {error.remedy}", f"with `{command}`")
             raise InputError(
-                error.what, file=file, line=line, key=error.key, expected=error.expected
+                error.what, file=file, line=line, key=error.key, expected=expected
             ) from None
         (fresh / CASE_FILE).write_text(keys.text(readers, case), encoding="utf-8")
         if case.matches:
@@ -98,16 +147,28 @@ def start_case(
         case = read_case(fresh, readers=readers)
         if draw is not None and case.matches:
             draw(case, fresh / PICTURE)
-    return replace(case, folder=folder)
+    return replace(case, folder=folder, notes=(*given.stated, *case.notes))
+
+
+def _likely_unit(given: Beginning, readers: Sequence[Reader]) -> LengthUnit:
+    """Return the unit in which a model is as heavy for its size as a structure can be."""
+    files = ModelFiles(given.model, given.mass, given.dofs)
+    model = read_model(files, readers)
+    size = float(np.linalg.norm(np.ptp(model.dofs.xyz, axis=0))) if len(model.dofs) else 0.0
+    density = model.total_mass / size**3 if size > 0.0 else 0.0
+    units: tuple[LengthUnit, ...] = ("m", "mm", "in")
+    low, high = _DENSITIES
+    likely = [u for u in units if low <= density * NEWTONS[u] / METRES[u] ** 4 <= high]
+    return next(iter(likely), "m")
 
 
 def _copied(given: Beginning, fresh: Path, readers: Sequence[Reader]) -> dict[Path, str]:
     """Copy the files into a folder; return from every file to its name there."""
-    names = {path: path.name for path in given.files().values()}
+    names = {path: path.name for path in given.files()}
     check_regular(given.model, LARGEST_FILE)
     for further in further_files(given.model, readers):
         names.setdefault(further, os.path.relpath(further, given.model.parent))
-    taken: dict[str, Path] = dict.fromkeys((CASE_FILE, MATCHES, PICTURE), fresh)
+    taken: dict[str, Path] = dict.fromkeys((CASE_FILE, MATCHES, PICTURE, *given.tables), fresh)
     for source, name in names.items():
         if name.startswith(".."):
             what = f"{given.model.name} includes it, which lies outside of its folder"
@@ -120,23 +181,39 @@ def _copied(given: Beginning, fresh: Path, readers: Sequence[Reader]) -> dict[Pa
     return names
 
 
-def _shared_out(modes: Path, readers: Sequence[Reader]) -> tuple[list[int], list[int]]:
-    """Return the labels of the modes to use, and of the upper third, which is held out."""
-    if modes.suffix.lower() in SUFFIXES:
-        table = read_table(modes)
+def mode_numbers(file: Path, readers: Sequence[Reader]) -> list[int]:
+    """Return the labels of the modes of a file by frequency; none for a file of responses.
+
+    Raises:
+        InputError: for a kind of file that nobody reads, or one that is broken.
+    """
+    if file.suffix.lower() in SUFFIXES:
+        table = read_table(file)
+        if table.columns[0] in ("frequency", "time"):
+            return []
         table.check_columns(("mode", "frequency"), table.columns)
         found = [(row.number("frequency") or 0.0, row.whole("mode")) for row in table.rows]
-    else:
-        reader = reader_of(modes, readers)
-        if reader is None:
-            known = ", ".join([*SUFFIXES, *(s for r in readers for s in r.suffixes)])
-            raise InputError("unknown kind of file", file=modes, expected=known)
-        with reading_with(reader, modes):
-            read = reader.read_modes(modes)
-        found = list(zip(read.frequencies.tolist(), read.numbers, strict=True))
-    if not found:
-        raise InputError("no modes", file=modes, expected="frequencies and mode shapes")
-    numbers = [number for _, number in sorted(found)]
+        return [number for _, number in sorted(found)]
+    reader = reader_of(file, readers)
+    if reader is None:
+        known = ", ".join([*SUFFIXES, *(s for r in readers for s in r.suffixes)])
+        expected = f"{known}, or a folder that `bench identify` writes"
+        raise InputError("unknown kind of file", file=file, expected=expected)
+    try:
+        with reading_with(reader, file):
+            read = reader.read_modes(file)
+    except InputError:
+        with suppress(InputError):
+            read_responses(file, readers)
+            return []
+        raise
+    return [read.numbers[k] for k in np.argsort(read.frequencies)]
+
+
+def _shared_out(numbers: Sequence[int], file: Path) -> tuple[list[int], list[int]]:
+    """Return the labels of the modes to use, and of the upper third, which is held out."""
+    if not numbers:
+        raise InputError("no modes", file=file, expected="frequencies and mode shapes")
     count = min(round(len(numbers) / 3) or 1, len(numbers) - 1)
     first = len(numbers) - count
     return sorted(numbers[:first]), sorted(numbers[first:])
@@ -151,10 +228,13 @@ class _Keys:
     copies: Mapping[Path, str]
     used: Sequence[int]
     held_out: Sequence[int]
+    guessed: bool
 
     def text(self, readers: Sequence[Reader], case: Case | None = None) -> str:
         """Return it; with a case that was read from a first one, also what that found."""
-        source = " and ".join(path.name for path in self.given.files().values())
+        given = self.given
+        every = (*given.files(), *(given.modes if given.tables else ()))
+        source = " and ".join(path.name for path in every)
         lines = [
             f"# Written by `bench init` from {source}.",
             "# Every key is explained in docs/case-format.md; an unknown key is an error.",
@@ -178,11 +258,12 @@ class _Keys:
 
     def _title(self, readers: Sequence[Reader]) -> str:
         """Return the title that a test has in its file."""
-        reader: Any = reader_of(self.given.modes, readers)
+        file = self.given.modes[0]
+        reader: Any = None if file.is_dir() else reader_of(file, readers)
         if not hasattr(reader, "read_outline"):
             return ""
-        with reading_with(reader, self.given.modes):
-            return str(reader.read_outline(self.given.modes).title)[:200]
+        with reading_with(reader, file):
+            return str(reader.read_outline(file).title)[:200]
 
     def _model(self, case: Case | None) -> Iterator[str]:
         given = self.given
@@ -191,8 +272,8 @@ class _Keys:
         for key, path in (("file", given.model), ("mass", given.mass), ("dofs", given.dofs)):
             if path is not None:
                 yield f"{key} = {_quoted(self.copies[path])}"
-        stated = "" if given.model_unit else "   # not stated: m, N and kg were taken"
-        yield f'unit = "{given.model_unit or "m"}"{stated}'
+        stated = "   # not stated: taken from its size and mass" if self.guessed else ""
+        yield f'unit = "{given.model_unit}"{stated}'
         if case is not None:
             yield f"# It {sizes_of(case.model)}."
         yield "# free = true   # if it hung free: nothing that holds it to ground is then suspected"
@@ -206,20 +287,36 @@ class _Keys:
     def _measurement(self, case: Case | None) -> Iterator[str]:
         given = self.given
         yield "[measurement]"
-        if given.sensors is not None:
+        for said in given.stated:
+            yield f"# {_clean(said)}"
+        if SENSORS in given.tables:
+            yield f'sensors = "{SENSORS}"'
+        elif given.sensors is not None:
             yield f"sensors = {_quoted(self.copies[given.sensors])}"
-        yield f"modes = {_quoted(self.copies[given.modes])}"
+        yield f"modes = {_quoted(MODES if given.tables else self.copies[given.modes[0]])}"
+        if COVARIANCE in given.tables:
+            yield f'covariance = "{COVARIANCE}"'
+        if REFERENCES in given.tables:
+            yield f"# {REFERENCES}: what every response was measured to."
+        if FIT_STD.encode() in given.tables.get(MODES, (None, b""))[1][:80]:
+            shares = "frequencies = {:g}, shapes = {:g}".format(*SCATTER)
+            yield f"scatter = {{{shares}}}   # from test to test, added to what the fit says"
         if given.unit is not None:
             yield f'unit = "{given.unit}"   # of the coordinates of the sensors'
         if given.frame is not None:
             yield f"frame = {_quoted(given.frame)}   # the model's axes in those of the test"
         if given.tolerance is not None:
             yield f"tolerance = {given.tolerance!r}   # of the size of the structure"
+        if given.origin is not None:
+            yield f"origin = [{given.origin}]   # of the test's origin, in m"
+        if given.without is not None:
+            listed = ", ".join(_quoted(label) for label in given.without.split(","))
+            yield f"without = [{listed}]   # sensors that are left out"
         for note in () if case is None else case.notes:
             yield f"# {_clean(note)}"
         if case is not None and case.matches:
             yield f"# {MATCHES} lists where every sensor was taken to sit."
-        yield "shape_std = 0.015   # of the largest component, where the test states no scatter"
+        yield "shape_std = 0.015   # of the largest reading, where the test states no scatter"
         yield f"used = {list(self.used)}   # what an updating strategy is given"
         share = "the upper third: only the score sees them" if self.held_out else "too few modes"
         yield f"held_out = {list(self.held_out)}   # {share}"

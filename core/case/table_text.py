@@ -15,12 +15,11 @@ from tomlkit.items import Item, Table
 
 from femubench.core.case.frame_keys import Keys
 from femubench.core.case.frame_tables import KEYS, columns_of
-from femubench.core.case.modes import with_default_std
+from femubench.core.case.modes import reach, with_default_std
 from femubench.core.case.schema import LARGEST, SMALLEST
 from femubench.core.case.tables import RESERVED
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.measurement import Measurement
-from femubench.core.typing import FloatArray
 
 SHAPE_STD = 0.015
 
@@ -73,18 +72,19 @@ def sensors_csv(sensors: Sensors) -> bytes:
     return csv_bytes(["label", "x", "y", "z", "direction"], rows)
 
 
-def modes_csv(measurement: Measurement, share: float) -> bytes:
+def modes_csv(measurement: Measurement, share: float, stated: str = RESERVED[2]) -> bytes:
     """Return the table of modes, with a column LABEL_std where deviations are no common share.
 
     Arguments:
         measurement: any.
-        share: the deviation of shapes relative to the largest component of their mode.
+        share: the deviation of shapes relative to the largest reading.
+        stated: name of the column with the deviations of the frequencies.
     """
     m = measurement
     std = np.where(_is_share(m, share), np.nan, m.shape_std)
     own = [s for s in range(len(m.sensors)) if np.isfinite(std[s]).any()]
     labels = m.sensors.labels
-    header = [*RESERVED, *labels]
+    header = [*RESERVED[:2], stated, *RESERVED[3:], *labels]
     header += [f"{labels[s]}_std" for s in own]
     scalars = zip(m.numbers, m.frequencies, m.frequency_std, m.damping, strict=True)
     rows = [
@@ -108,7 +108,7 @@ def _is_share(m: Measurement, share: float) -> Any:  # noqa: ANN401 - a bool arr
 
 
 def common_share(measurements: Sequence[Measurement], known: float | None) -> float:
-    """Return the deviation of shapes, of the largest component, that fits the most of them.
+    """Return the deviation of shapes, of the largest reading, that fits the most of them.
 
     Arguments:
         measurements: those of one case.
@@ -122,10 +122,9 @@ def common_share(measurements: Sequence[Measurement], known: float | None) -> fl
 
 
 def _ratios(m: Measurement) -> list[float]:
-    """Return the deviations over the largest component of their mode, also rounded."""
-    largest: FloatArray = np.max(np.abs(np.nan_to_num(m.shapes)), axis=0, initial=0.0)
+    """Return the deviations over the reading of which they are a share, also rounded."""
     with np.errstate(all="ignore"):
-        ratios = (m.shape_std / largest).ravel()
+        ratios = (m.shape_std / reach(m.shapes)).ravel()
     good = [float(r) for r in ratios[(ratios > 10 * SMALLEST) & (ratios < LARGEST / 10)]]
     return [float(f"{r:.12g}") for r in good] + good
 

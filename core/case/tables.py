@@ -25,10 +25,14 @@ _LONGEST_NUMBER = 100
 _REAL = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _NUMBER = re.compile(_REAL, re.ASCII)
 _COMPLEX = re.compile(rf"\(?(?:({_REAL})(?=[+-]))?({_REAL})[ijIJ]\)?", re.ASCII)
+_DECIMAL = re.compile(r"(?<=\d),(?=\d)", re.ASCII)
 _WHOLE = re.compile(r"\+?\d{1,9}", re.ASCII)
 SUFFIXES = (".csv", ".txt")
 RESERVED = ("mode", "frequency", "frequency_std", "damping")
-PLACES = "sensors: a table label,x,y,z,direction, or label,at,direction"
+PLACES = (
+    "sensors (`bench init --sensors FILE`): a table label,x,y,z,direction, or label,at,direction; "
+    "or the whole folder of `bench identify`: --modes FOLDER"
+)
 
 
 class Complex(NamedTuple):
@@ -178,7 +182,12 @@ def read_table(file: Path) -> CsvTable:
     Raises:
         InputError: for a ragged row, a column without name or named twice, a broken quotation.
     """
-    reader = csv.reader(StringIO(read_text(file, LARGEST_TEXT)), skipinitialspace=True)
+    text = read_text(file, LARGEST_TEXT)
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    # Spreadsheets of half of the world: semicolons between cells, commas in numbers.
+    foreign = ";" in first and "," not in first
+    separator = ";" if foreign else ","
+    reader = csv.reader(StringIO(text), delimiter=separator, skipinitialspace=True)
     lines: list[int] = []
     rows: list[list[str]] = []
     columns: tuple[str, ...] = ()
@@ -197,14 +206,14 @@ def read_table(file: Path) -> CsvTable:
                 expected = f"{len(columns)} as in the first row"
                 raise InputError(what, file=file, line=reader.line_num, expected=expected)
             lines.append(reader.line_num)
-            rows.append(cells)
+            rows.append([_DECIMAL.sub(".", cell) for cell in cells] if foreign else cells)
             if len(rows) > _MOST_ROWS:
                 raise InputError("too many rows", file=file, expected=f"at most {_MOST_ROWS}")
             if len(rows) * len(columns) > _MOST_CELLS:
                 raise InputError("too many cells", file=file, expected=f"at most {_MOST_CELLS}")
     except csv.Error as error:
         what = f"not a table: {error}"
-        expected = "cells separated by commas"
+        expected = "cells separated by commas or by semicolons"
         raise InputError(what, file=file, line=reader.line_num, expected=expected) from None
     if not columns:
         raise InputError("empty file", file=file, expected="a row of column names")

@@ -51,6 +51,7 @@ from femubench.core.case.table_text import (
 )
 from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import Frame
+from femubench.core.fem.mesh import locate
 from femubench.core.fem.model import Model
 from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.modal.measurement import Measurement
@@ -150,6 +151,8 @@ def _differing(one: Measurement, other: Measurement) -> str | None:
     """Return a field in which two measurements differ."""
     for f in fields(Measurement):
         first, second = getattr(one, f.name), getattr(other, f.name)
+        if f.name == "assumed":  # what is written is stated
+            continue
         if f.name == "shape_std":  # of what was not measured it means nothing
             first = np.where(np.isnan(first) & np.isnan(one.shapes), second, first)
         if f.name == "sensors":
@@ -318,6 +321,8 @@ def _model_part(case: Case, known: Known) -> tuple[Keys, Files, tuple[Modificati
     if has_skew_dofs(model):
         what = "the model has changed matrices and flexible connections of skew members"
         raise BadKey(("model",), what, "degrees of freedom along x, y or z")
+    frame = model.frame_structure.frame
+    frame_places(model, [locate(frame, xyz) for xyz in case.measurement.sensors.xyz])
     moved = tuple(_at_nodes(item, model) for item in case.modifications)
     return *matrix_keys(*matrices, frame_geometry(model), model), moved
 

@@ -9,13 +9,22 @@ import click
 
 from femubench.core.cli import options
 from femubench.core.cli.registry import plugins_for, wrap_text
-from femubench.core.errors import InputError, ModelError
+from femubench.core.errors import ModelError
 
 if TYPE_CHECKING:
     from femubench.core.case.case import Case
     from femubench.core.case.schema import LengthUnit
 
 _UNITS = click.Choice(("m", "cm", "mm", "in", "ft"))
+
+
+def _parse_origin(text: str) -> str:
+    """Return three numbers as TOML has them."""
+    try:
+        x, y, z = map(float, text.split(","))
+    except ValueError:
+        raise ValueError(f"{text!r} is no X,Y,Z in m") from None
+    return f"{x}, {y}, {z}"
 
 
 @click.command()
@@ -28,7 +37,11 @@ _UNITS = click.Choice(("m", "cm", "mm", "in", "ft"))
     "--dofs", type=options.PATH, metavar="FILE",
     help="Labels or places of the rows, where the matrices have none.",
 )  # fmt: skip
-@click.option("--modes", type=options.PATH, metavar="FILE", help="The measured modes.")
+@click.option(
+    "--modes", type=options.PATH, metavar="FILE", multiple=True,
+    help="The measured modes: a file of modes or of responses, or the folder that "
+    "`bench identify` wrote. Several are repeats of one test.",
+)  # fmt: skip
 @click.option(
     "--sensors", type=options.PATH, metavar="FILE",
     help="Where the sensors are, if the file of modes does not say.",
@@ -43,6 +56,11 @@ _UNITS = click.Choice(("m", "cm", "mm", "in", "ft"))
     "--tolerance", type=float, metavar="X",
     help="How far a sensor may be from the structure, of its size. Default: 0.01.",
 )  # fmt: skip
+@click.option(
+    "--origin", callback=options.read_with(_parse_origin), metavar="X,Y,Z",
+    help="Where the origin of the test is on the model, in m.",
+)  # fmt: skip
+@click.option("--without", metavar="LABELS", help="Sensors that are left out, by comma.")
 @click.pass_context
 def init(
     ctx: click.Context,
@@ -50,34 +68,32 @@ def init(
     model: Path | None,
     mass: Path | None,
     dofs: Path | None,
-    modes: Path | None,
+    modes: tuple[Path, ...],
     sensors: Path | None,
     unit: LengthUnit | None,
     model_unit: LengthUnit | None,
     frame: str | None,
     tolerance: float | None,
+    origin: str | None,
+    without: str | None,
 ) -> None:
     """Write a case folder into FOLDER, which must be new or empty.
 
     With the files of a model and of a test, these are copied, the sensors matched with the model,
     and a case is written that runs; without any, a commented example.
     """
-    others = (mass, dofs, sensors, unit, model_unit, frame, tolerance)
-    if model is None and modes is None and all(other is None for other in others):
+    others = (mass, dofs, sensors, model_unit, unit, frame, tolerance, origin, without)
+    if model is None and not modes and all(other is None for other in others):
         from femubench.core.library.plugins import init_case
 
         for path in init_case(folder):
             click.echo(f"wrote {path}")
         click.echo(f"Now change it to your structure, and run: bench run {folder}")
         return
-    if model is None or modes is None:
-        missing = "--model" if model is None else "--modes"
-        expected = "a file with the model and one with the modes"
-        raise InputError("is missing", key=missing, expected=expected)
     from femubench.core.case.starting import Beginning
     from femubench.core.library.new_case import begin_case
 
-    given = Beginning(model, modes, mass, dofs, sensors, model_unit, unit, frame, tolerance)
+    given = Beginning.of(model, modes, *others)
     case = begin_case(folder, given, plugins_for(ctx))
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         click.echo(f"wrote {path}")

@@ -70,6 +70,8 @@ class VerbGroup(click.Group):
         """Return the verb; name the nearest ones where it is unknown."""
         if args and args[0] not in VERBS and not args[0].startswith("-"):
             near = get_close_matches(args[0], VERBS, n=2)
+            if args[0] in ("strategies", "effects", "readers"):
+                near = ["plugins list"]
             hint = f" Did you mean {' or '.join(near)}?" if near else ""
             ctx.fail(f"No such command {args[0]!r}.{hint}")
         return super().resolve_command(ctx, args)

@@ -52,6 +52,9 @@ def identify_signals(
         short = len(measured.values) < _FEWEST
         what = f"{len(measured.values)} samples" if short else "a sensor that never moves"
         raise InputError(what, expected=f"{_FEWEST} samples or more, all sensors alive")
+    if measured.values.shape[1] < 2:
+        expected = "two or more in one file, since shapes tell modes from noise, or a force"
+        raise InputError("one sensor alone over time", expected=expected)
     found = _subspaces(measured, most_order)
     rows, orders = np.nonzero(np.isfinite(found.Fn_poles) & (found.Fn_poles > 0.0))
     hz, ratio = found.Fn_poles[rows, orders], found.Xi_poles[rows, orders]
@@ -98,7 +101,11 @@ def _subspaces(measured: TimeSignals, most_order: int) -> Any:  # noqa: ANN401 -
             calc_unc=True, nb=_BLOCKS,
         )  # fmt: skip
         setup.add_algorithms(algorithm)
-        setup.run_all()
+        try:
+            setup.run_all()
+        except np.linalg.LinAlgError:
+            expected = "a longer record, more sensors, or a smaller --order"
+            raise InputError(f"no models of {most_order} poles", expected=expected) from None
         return algorithm.result
 
 

@@ -15,6 +15,7 @@ from difflib import SequenceMatcher
 from math import inf
 from typing import Literal, TypeVar, cast
 
+from femubench.core.case.case import SCATTER
 from femubench.core.errors import InputError
 
 Kind = Literal["prior", "cost", "decision"]
@@ -144,6 +145,11 @@ class Settings:
     )
     reachable_shape_std: float = _prior(
         0.015, "of the largest component", "accelerometers of a careful test; where none is stated"
+    )
+    scatter_of_tests: tuple[float, float] = _prior(
+        SCATTER,
+        "of frequencies, of shapes",
+        "mounting, warmth, who hits: key `scatter` of a case, where one record was identified",
     )
 
     # Where a verdict begins.

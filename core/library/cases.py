@@ -284,4 +284,5 @@ def _folders(word: str, scenarios: Mapping[str, Scenario]) -> Iterable[tuple[str
         raise InputError("folder does not exist", file=path, expected="a folder with a case.toml")
     # All classes of all groups would drown the names.
     known = [name for name in case_names(scenarios) if ":" in word or ":" not in name]
-    raise unknown("case", word, known)
+    listed = "a folder with a case.toml (`bench init` writes one) or a name of `bench scenarios`"
+    raise unknown("case", word, known, f"expected {listed}")

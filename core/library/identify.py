@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from femubench.core.case.records import record_tables
 from femubench.core.case.response_files import Responses, locate_sensors, read_responses
-from femubench.core.case.table_text import common_share, modes_csv, sensors_csv
 from femubench.core.case.writing import new_folder
 from femubench.core.errors import InputError
 from femubench.core.files import check_new, check_regular
@@ -104,10 +104,13 @@ def write_identification(found: Identification, folder: Path, *, source: str = "
     Raises:
         InputError: when nothing can be written there.
     """
-    measurement = found.measurement
     with new_folder(folder) as fresh:
-        share = common_share([measurement], None)
-        (fresh / "modes.csv").write_bytes(modes_csv(measurement, share))
-        (fresh / "sensors.csv").write_bytes(sensors_csv(measurement.sensors))
-        page = way_of("html", "render_modes")(found, source)
-        (fresh / PAGE).write_text(page, encoding="utf-8")
+        for name, content in identification_files(found, source).items():
+            (fresh / name).write_bytes(content)
+
+
+def identification_files(found: Identification, source: str) -> dict[str, bytes]:
+    """Return the tables of a case, and a page, by name."""
+    references = None if found.measured is None else found.measured.references
+    page = way_of("html", "render_modes")(found, source)
+    return {**record_tables(found.measurement, references), PAGE: page.encode()}

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from femubench.core.case.case import Case
-from femubench.core.case.starting import Beginning, start_case
+from femubench.core.case.records import (
+    SENSORS,
+    folder_tables,
+    mean_record,
+    read_record,
+    record_tables,
+)
+from femubench.core.case.starting import Beginning, mode_numbers, start_case
+from femubench.core.display import count_noun
+from femubench.core.library.identify import identification_files, identification_of
+from femubench.core.modal.measurement import Measurement
 from femubench.core.plugin.loader import Plugins
 
 
@@ -20,8 +31,38 @@ def begin_case(folder: Path, given: Beginning, plugins: Plugins) -> Case:
     Raises:
         InputError: when the folder holds anything, or for what is wrong in the files.
     """
+    given = _identified(given, plugins)
+    return start_case(folder, given, tuple(plugins.readers.values()), _draw)
+
+
+def _identified(given: Beginning, plugins: Plugins) -> Beginning:
+    """Return what is at hand with the tables of what was identified, or is to be."""
     readers = tuple(plugins.readers.values())
-    return start_case(folder, given, readers, _draw)
+    first = given.modes[0]
+    if len(given.modes) == 1 and first.is_dir():
+        tables = folder_tables(first)
+        if given.sensors is not None:
+            tables.pop(SENSORS, None)
+        return replace(given, tables={n: (first / n, held) for n, held in tables.items()})
+    if len(given.modes) == 1 and mode_numbers(first, readers):
+        return given
+    records: list[Measurement] = []
+    tables, stated = {}, []
+    for file in given.modes:
+        if file.is_dir():
+            records.append(read_record(file))
+            continue
+        found = identification_of(file, plugins, None, None, given.sensors)
+        records.append(found.measurement)
+        tables = identification_files(found, file.name)
+        low, high = found.band
+        modes = count_noun(len(found), "mode")
+        stated.append(f"{file.name}: {modes} identified from {low:.6g} to {high:.6g} Hz")
+    if len(records) > 1:
+        mean, said = mean_record(records, given.modes)
+        tables, stated = record_tables(mean, fitted=False), [*stated, said]
+    named = {name: (first, content) for name, content in tables.items()}
+    return replace(given, tables=named, stated=tuple(stated))
 
 
 def _draw(case: Case, file: Path) -> None:

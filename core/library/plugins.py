@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -13,7 +13,6 @@ from femubench.core.case.starting import Beginning
 from femubench.core.conformance import SECONDS
 from femubench.core.conformance.checking import CheckResult, findings, subjects
 from femubench.core.conformance.problems import of_case
-from femubench.core.errors import InputError
 from femubench.core.library.cases import CaseLike, as_list, read_cases, usable_plugins
 from femubench.core.library.new_case import begin_case
 from femubench.core.library.new_package import write_package
@@ -23,17 +22,17 @@ from femubench.core.plugin.validation import check_strategy
 def init_case(
     folder: str | PathLike[str],
     model: str | PathLike[str] | None = None,
-    modes: str | PathLike[str] | None = None,
+    modes: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
     **stated: Any,  # noqa: ANN401 - as `Beginning` has it
 ) -> tuple[Path, ...]:
     """Write a case folder from the files of a model and of a test, or an example; return its files.
 
     Arguments:
         folder: new or empty.
-        model, modes: files with the model and with the measured modes; without both a commented
-            example is written.
-        stated: ``mass``, ``dofs`` and ``sensors``, further files; ``model_unit``, ``unit`` and
-            ``tolerance``, and ``frame`` for the axes, as the keys of a case.
+        model, modes: files with the model and with the measured modes or responses, or the folder
+            of an identification; several are repeats. Without both a commented example is written.
+        stated: ``mass``, ``dofs`` and ``sensors``, further files; ``model_unit``, ``unit``,
+            ``tolerance``, ``origin``, ``without`` and ``frame`` for the axes, as `bench init` has.
 
     Raises:
         InputError: when the folder holds anything or cannot be written, or for what is wrong in
@@ -45,12 +44,9 @@ def init_case(
     """
     if model is None and modes is None and not stated:
         return write_example(Path(folder))
-    if model is None or modes is None:
-        missing = "model" if model is None else "modes"
-        expected = "a file with the model and one with the modes"
-        raise InputError("is missing", key=missing, expected=expected)
     paths = {key: Path(stated[key]) for key in ("mass", "dofs", "sensors") if stated.get(key)}
-    given = Beginning(Path(model), Path(modes), **{**stated, **paths})
+    every = [modes] if isinstance(modes, str | PathLike) else modes or ()
+    given = Beginning.of(model, every, **{**stated, **paths})
     begin_case(Path(folder), given, usable_plugins())
     return tuple(sorted(path for path in Path(folder).rglob("*") if path.is_file()))
 

@@ -27,6 +27,7 @@ class Measurement(Shown):
         total_mass: mass of the whole structure and its standard deviation in kg, if weighed.
         frequency_correlation: of the errors of the frequencies, (m, m); None where they are
             independent.
+        assumed: whether a scatter that nobody has measured is in the deviations.
     """
 
     sensors: Sensors
@@ -38,6 +39,7 @@ class Measurement(Shown):
     shape_std: FloatArray
     total_mass: tuple[float, float] | None = None
     frequency_correlation: FloatArray | None = None
+    assumed: bool = False
 
     def __len__(self) -> int:
         return len(self.numbers)

@@ -173,10 +173,13 @@ def did_you_mean(word: str, known: Any) -> str:  # noqa: ANN401 - any iterable o
     return f"; did you mean {' or '.join(repr(name) for name in near)}?" if near else ""
 
 
-def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
-    """Return an error on an unknown name with the near matches, or with all names."""
+def unknown(
+    kind: str, name: str, known: Iterable[str], otherwise: str | None = None
+) -> UnknownNameError:
+    """Return an error on an unknown name with the near matches, or else with all names."""
     known = tuple(dict.fromkeys(known))
-    near = did_you_mean(name, known) or f"; there are {', '.join(known) or 'none'}"
+    otherwise = otherwise or f"there are {', '.join(known) or 'none'}"
+    near = did_you_mean(name, known) or f"; {otherwise}"
     return UnknownNameError(f"no {kind} {name!r}{near}")
 
 

@@ -23,7 +23,9 @@ class SigmaMisstated:
     side: ClassVar[Literal["data"]] = "data"
 
     def suspects(self, model: Model, measurement: Measurement) -> Sequence[Suspect]:
-        """Return frequencies and shapes, where there are some."""
+        """Return frequencies and shapes, where there are some and somebody has stated them."""
+        if measurement.assumed:
+            return []
         factor = Parameter("stated over true", "", 1.5, neutral=1.0, lower=0.2, upper=8.0)
         counts = {
             "frequencies": len(measurement),

@@ -62,7 +62,7 @@ class UniversalReader(ProgramReader):
         Raises:
             InputError: when the file is broken, or holds neither nodes nor modes.
         """
-        return _sensors_and_modes(path, *read_datasets(path, _WANTED, _DRAWN))
+        return _sensors_and_modes(path, read_datasets(path, _WANTED, _DRAWN))
 
     def read_outline(self, path: Path) -> Outline:
         """Return the title of a test, and the lines that draw its structure.
@@ -70,7 +70,7 @@ class UniversalReader(ProgramReader):
         Raises:
             InputError: when the file is broken.
         """
-        datasets, _ = read_datasets(path, _WANTED, _DRAWN)
+        datasets = read_datasets(path, _WANTED, _DRAWN)
         with open_broken(path, "whole datasets"):
             nodes = _nodes(path, datasets)
         pairs = dict.fromkeys(tuple(sorted(pair)) for pair in _lines(datasets, nodes))
@@ -88,13 +88,13 @@ class UniversalReader(ProgramReader):
         """
         from femubench.plugins.readers.universal_functions import read_functions
 
-        datasets, other = read_datasets(path, _WANTED, _DRAWN)
+        datasets = read_datasets(path, _WANTED, _DRAWN)
         has_nodes = any(_of(datasets, *_COORDINATES))
-        places = _sensors_and_modes(path, datasets, other).sensors if has_nodes else None
+        places = _sensors_and_modes(path, datasets).sensors if has_nodes else None
         return read_functions(path, places)
 
 
-def _sensors_and_modes(path: Path, datasets: Sequence[Dataset], other: set[int]) -> Measurement:
+def _sensors_and_modes(path: Path, datasets: Sequence[Dataset]) -> Measurement:
     # A dataset that is cut short may lack any column.
     with open_broken(path, "whole datasets"):
         nodes, factor = _nodes(path, datasets), _length_factor(path, datasets)
@@ -112,10 +112,8 @@ def _sensors_and_modes(path: Path, datasets: Sequence[Dataset], other: set[int])
         modes = [mode for mode in modes if mode.frequency > 0.0]
     if not nodes and not modes:
         expected = "datasets 15 or 2411 with nodes, 55 or 2414 with modes"
-        what = "neither nodes nor modes"
-        if 58 in other:
-            what += "; frequency responses (dataset 58) must be turned into modes first"
-        raise InputError(what, file=path, expected=expected)
+        expected += "; `bench init` and `bench identify` find those of responses (58)"
+        raise InputError("neither nodes nor modes", file=path, expected=expected)
     return _measurement(path, nodes, modes)
 
 

@@ -16,8 +16,8 @@ Dataset: TypeAlias = Mapping[str, Any]
 
 def read_datasets(
     path: Path, wanted: Collection[int], spare: Collection[int] = ()
-) -> tuple[list[Dataset], set[int]]:
-    """Return the datasets of some numbers, and the numbers of the others.
+) -> list[Dataset]:
+    """Return the datasets of some numbers.
 
     Arguments:
         path: of the file.
@@ -32,7 +32,6 @@ def read_datasets(
     if path.stat().st_size > _LARGEST * 2**20:
         raise InputError("file is too large", file=path, expected=f"at most {_LARGEST} MiB")
     found: list[Dataset] = []
-    other: set[int] = set()
     try:
         file: Any = pyuff.UFF(str(path))
         types = [int(number) for number in file.get_set_types()]
@@ -40,7 +39,6 @@ def read_datasets(
         raise InputError(f"cannot be read: {error}", file=path) from None
     for i, number in enumerate(types):
         if number not in wanted:
-            other.add(number)
             continue
         try:
             # pyuff prints what it does not know.
@@ -51,4 +49,4 @@ def read_datasets(
                 continue
             key = f"dataset {number} (block {i + 1})"
             raise InputError(f"cannot be read: {error}", file=path, key=key) from None
-    return found, other
+    return found

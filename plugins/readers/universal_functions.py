@@ -50,7 +50,7 @@ def read_functions(path: Path, positions: Sensors | None) -> FrequencyResponses 
     """
     length = force = 1.0
     datasets: list[Dataset] = []
-    for dataset in read_datasets(path, (58, 164))[0]:
+    for dataset in read_datasets(path, (58, 164)):
         if dataset["type"] == 164:
             length, force = float(dataset["length"]), float(dataset["force"])
         else:
@@ -153,8 +153,10 @@ def _responses(
         o, i = outputs.index(function.response), inputs.index(function.reference)
         if np.isfinite(values[0, o, i]):
             node, direction = function.response
-            what = f"the response at {node}:{direction} to one force is there twice"
-            raise InputError(what, file=path, key=_KEY, expected="every response once")
+            force = "{}:{}".format(*function.reference)
+            what = f"the response at {node}:{direction} to the force at {force} is there twice"
+            expected = "every response once: records of one state are files of their own"
+            raise InputError(what, file=path, key=_KEY, expected=expected)
         values[:, o, i] = function.values
     quantity: Any = quantities.pop()
     return FrequencyResponses(
@@ -165,8 +167,11 @@ def _responses(
 def _signals(path: Path, functions: Sequence[_Function], known: Mapping[str, Any]) -> TimeSignals:
     x = _shared_axis(path, functions)
     places = [function.response for function in functions]
-    if len(set(places)) < len(places):
-        raise InputError("a sensor is there twice", file=path, key=_KEY, expected="every one once")
+    for k, (node, direction) in enumerate(places):
+        if (node, direction) in places[:k]:
+            what = f"the sensor {node}:{direction} is there twice"
+            expected = "every one once: records of one state are files of their own"
+            raise InputError(what, file=path, key=_KEY, expected=expected)
     step = (x[-1] - x[0]) / (len(x) - 1)
     if np.abs(np.diff(x) - step).max() > 0.01 * step:
         raise InputError("uneven steps of time", file=path, key=_KEY, expected="even steps")
