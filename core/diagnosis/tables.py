@@ -170,7 +170,7 @@ def list_causes(
     posterior = examination.posterior
     spread = find_spread(posterior, explanation)
     own = examination.own_error(explanation.fit.state)
-    passengers = _passengers(explanation)
+    passengers = _passengers(explanation, spread)
     causes = causes_in(explanation, 1.0, posterior.earned, spread=spread, own=own)
     first = len(causes) - len(explanation.parts)
     tied = _tied(posterior, explanation)
@@ -200,18 +200,23 @@ def list_causes(
     return found
 
 
-def _passengers(explanation: Explanation) -> list[bool]:
-    """Return which causes may as well be left out, the rest as it is; never the only one."""
+def _passengers(explanation: Explanation, spread: FloatArray) -> list[bool]:
+    """Return which causes may as well be left out, the rest as it is; never the only one.
+
+    Chi-square is the same without them, or no size differs from nothing by two deviations.
+    """
     state, parts = explanation.fit.state, explanation.parts
     if len(parts) < 2:
         return [False] * len(parts)
     ends = np.cumsum([len(part.hypothesis.parameters) for part in parts])
     pieces = np.split(state.x, ends[:-1])
+    sized = np.split(np.abs(state.x) > settings.notable_deviations * spread, ends[:-1])
     found = []
     for k in range(len(parts)):
         rest = np.concatenate([x for j, x in enumerate(pieces) if j != k])
         without = state_at(state.problem, (*parts[:k], *parts[k + 1 :]), rest)
-        found.append(without.chi2 - state.chi2 < settings.notable_deviations**2)
+        gain = without.chi2 - state.chi2
+        found.append(gain < settings.notable_deviations**2 or not sized[k].any())
     return found if not all(found) else [False] * len(parts)
 
 

@@ -41,7 +41,7 @@ _UNKNOWN = 1.0  # deviation of the logarithm of a group from which on it is one 
 _SHIFT = 0.5  # of the first elastic eigenvalue, below zero
 _SPARE = 6  # modes above those that have to be right
 _NOMINAL = 30  # elastic modes that are there as they are, at least
-_ROUNDS = 16  # of residuals to a group and factor
+_ROUNDS = 24  # of residuals to a group and factor
 _A_ROUND = 16  # vectors that one of them adds at most
 _APART = 1e-7  # sine below which a vector lies in the span of the others
 _SHARE = 0.3  # of the tolerance, below which a residual does not matter
@@ -262,7 +262,10 @@ class _Enriched:
         self.mass = frame.mass
         self.answers = np.zeros((frame.model.size, 0))
         self._turn = np.eye(start)  # from the base and the answers to what is orthonormal in A
-        self._weight = frame.mass  # of the base and the answers, before they are turned
+        # Of the base and the answers, before they are turned. A soft group is a difference of
+        # large numbers, so that what is orthonormal but for rounding is not taken for it.
+        self._weight, self._gram = frame.mass, np.eye(start)
+        self.shifted = self._gram
         # On the rows of the group: motions, A and M times these, and forces of the group.
         self.inside, self.forces = frame.base[rows], frame.forces[rows]
         # Rows of a symmetric matrix are its columns.
@@ -303,7 +306,7 @@ class _Enriched:
         """Return the first elastic eigenvalues with a factor on the group, and coordinates."""
         change = (factor - 1.0) * (self.inside.T @ self.moved)
         mass, shift = self.mass, self.frame.shift
-        shifted = np.eye(len(mass)) + (shift if self.part.is_mass else 1.0) * change
+        shifted = self.shifted + (shift if self.part.is_mass else 1.0) * change
         return _ritz(mass + change if self.part.is_mass else mass, shifted, shift, self.count)
 
     def _respond(
@@ -338,7 +341,7 @@ class _Enriched:
         if not part.is_mass:
             # What the span then adds to an answer makes it softer.
             border = (factor - 1.0) * (self.moved.T @ own)
-            within = np.eye(len(self.mass)) + (factor - 1.0) * (self.inside.T @ self.moved)
+            within = self.shifted + (factor - 1.0) * (self.inside.T @ self.moved)
             energy += (factor - 1.0) * (own.T @ (part.matrix @ own))
             energy -= border.T @ la.solve(within, border, assume_a="pos")
         # The span leaves nothing of an answer that it has.
@@ -367,18 +370,20 @@ class _Enriched:
         def by(forces: FloatArray) -> FloatArray:
             return np.vstack([frame.base.T @ forces, self.answers.T @ forces])
 
-        # A times an answer, as it is: a soft group is a difference of large numbers.
         pushed, weighted = frame.energy(answer), frame.model.mass_times(answer)
-        known = self._turn.T @ by(pushed)
-        gram = answer.T @ pushed - known.T @ known
+        side, corner = by(pushed), answer.T @ pushed
+        known = self._turn.T @ side
+        gram = corner - known.T @ known
         values, turn = la.eigh(0.5 * (gram + gram.T))
         strong = values > _APART * values[-1]
         turn = turn[:, strong] / np.sqrt(values[strong])
         # An answer less what the span has of it, in coordinates of the base and all answers.
         border, padded = by(weighted), np.zeros((answer.shape[1], before))
         self._weight = np.block([[self._weight, border], [border.T, answer.T @ weighted]])
+        self._gram = np.block([[self._gram, side], [side.T, 0.5 * (corner + corner.T)]])
         self._turn = np.block([[self._turn, -self._turn @ known @ turn], [padded, turn]])
         self.mass = self._turn.T @ self._weight @ self._turn
+        self.shifted = self._turn.T @ self._gram @ self._turn
         self.answers = np.hstack([self.answers, answer])
         news = {"inside": answer, "forces": pushed, "heavy": weighted}
         for name, new in news.items():
