@@ -45,7 +45,7 @@ _ROUNDS = 24  # of residuals to a group and factor
 _A_ROUND = 16  # vectors that one of them adds at most
 _APART = 1e-7  # sine below which a vector lies in the span of the others
 _SHARE = 0.3  # of the tolerance, below which a residual does not matter
-_FAINT = 1e-6  # of the squared strength of all forces of a group, below which one has no response
+_FAINT = 1e-4  # of the squared strength of all forces of a group, below which one has no response
 _SPREAD = 3  # times the room: motions that are weighed before the best of them stay
 _ROWS = 8192  # of motions that are turned at once
 
