@@ -257,8 +257,8 @@ def with_groups(
                     found[spec.name] = read_matrix(path, model.size, readers)
     priors = {spec.name: spec.prior for spec in specs if spec.prior is not None}
     kinds = {spec.name: spec.kind for spec in specs if spec.kind is not None}
-    found = replace(model, groups=groups, mass_groups=mass_groups)
-    return replace(found, group_priors=priors, group_kinds=kinds)
+    model = replace(model, groups=groups, mass_groups=mass_groups)
+    return replace(model, group_priors=priors, group_kinds=kinds)
 
 
 def _rows(entry: int | str, geometry: MatrixGeometry) -> list[int]:
