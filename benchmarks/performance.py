@@ -147,6 +147,12 @@ SECTIONS = (
         "hypotheses",
         (Series("diagnosis of a lattice", (3, 4)),),
     ),
+    Section(
+        "bricks",
+        "A ladder of bricks in 40 groups, read and reduced to its basis",
+        "dofs",
+        (Series("bricks in groups, read and reduced", (6, 10)),),
+    ),
 )
 
 
@@ -193,6 +199,7 @@ class Bar:
 
 
 _GRID, _LATTICE = "modes of a planar grid", "modes of a lattice"
+_BRICKS = "bricks in groups, read and reduced"
 _FACTORISED, _NULL = "one factorisation, lattice", "jobs that do nothing"
 BARS = (
     Bar("`eigsh` as called, times as long, 27 702 dofs", 40, "lattice",
@@ -214,6 +221,9 @@ BARS = (
     Bar("resume 100 000 results, s", 3, "store", "resume", 100000),
     Bar("diagnosis beyond 60 solutions, ms a hypothesis", 2, "diagnosis",
         "diagnosis of a lattice", 4, "ms"),
+    Bar("reading and reducing 101 040 dofs in 40 groups, s", 120, "bricks", _BRICKS, 10),
+    Bar("the same, MB", 2000, "bricks", _BRICKS, 10, "peak_mb"),
+    Bar("diagnosis in its basis, s", 60, "bricks", _BRICKS, 10, "diagnosis"),
 )  # fmt: skip
 
 

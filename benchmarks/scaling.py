@@ -9,30 +9,37 @@ and of the anchor next to it. `python benchmarks/performance.py` calls it for ev
 from __future__ import annotations
 
 import json
+import multiprocessing
 import sys
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from diagnosis_cost import MODES as DIAGNOSED_MODES, SOLVES, case_of, lattice as uneven_lattice
-from large_structures import lattice, planar_grid
+from large_structures import brick_ladder, lattice, planar_grid
 from processor_time import least, peak, timed
 from scipy.optimize import least_squares
 from scipy.sparse import csc_array, csc_matrix
 from scipy.sparse.linalg import LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
+from femubench.core.case.case import Case
+from femubench.core.case.reader import read_case
+from femubench.core.case.writing import write_case
 from femubench.core.change.hypothesis import by_themselves, hypotheses_of
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.fem.frame import Frame, Place, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
+from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import Modes, solve_modes
 from femubench.core.modal.factorisation import LU, Cholesky, cholmod_obstacle
 from femubench.core.modal.many_changes import Change, modes_of_changes
+from femubench.core.modal.measurement import Measurement as Measured
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
 from femubench.core.plugin.loader import list_effects
 from femubench.core.typing import FloatArray
@@ -256,6 +263,46 @@ def _diagnosed(joints: int) -> Row:
     return {"hypotheses": known, **row, "anchor": solution, "ms": beyond, "peak_mb": peak()}
 
 
+def _write_ladder(bay: int, folder: Path) -> None:
+    """Write a ladder of bricks as a case, with the modes that it has with a weld 200 times softer.
+
+    Ten used modes and two held out, at a corner of each fourth of the rails, three directions each.
+    """
+    model = brick_ladder(bay)
+    stiffness = model.stiffness - 0.995 * model.groups["weld 6a"]
+    modes = solve_modes(replace(model, stiffness=stiffness), 12 + 6).elastic
+    x, y, z = model.dofs.xyz.T
+    at = [np.argmin(abs(x - s * x.max()) + abs(y - side) + z)
+          for side in (0.0, y.max()) for s in np.linspace(0.0, 1.0, 5)]  # fmt: skip
+    rows = np.concatenate([np.arange(3) + 3 * (row // 3) for row in at])
+    sensors = Sensors(tuple(f"S{row}" for row in rows), model.dofs.xyz[rows],
+                      tuple(model.dofs.direction[row] for row in rows))  # fmt: skip
+    hz, shapes = modes.natural_frequencies[:12], modes.shapes[rows, :12]
+    numbers = tuple(range(1, 13))
+    std = np.full(shapes.shape, 0.01 * np.abs(shapes).max(axis=0))
+    data = Measured(sensors, numbers, hz, 1e-3 * hz, np.full(12, np.nan), shapes, std, None)
+    named = "ladder of bricks", "", "computed", folder
+    write_case(folder, Case(*named, model, data, numbers[:10], numbers[10:]))
+
+
+def _read_and_diagnosed(bay: int) -> Row:
+    """Return what it takes to read and reduce a ladder of bricks, and what its diagnosis takes."""
+    with tempfile.TemporaryDirectory() as folder:
+        made = Path(folder) / "ladder"
+        # In a process of its own, whose memory is not that of reading.
+        writer = multiprocessing.get_context("spawn").Process(
+            target=_write_ladder, args=(bay, made)
+        )
+        writer.start()
+        writer.join()
+        row = timed(read_case, made)
+    case, row["peak_mb"] = row.pop("answer"), peak()
+    found = timed(diagnose, case)
+    names = [cause.place for cause in found["answer"].causes]
+    return {"dofs": case.whole.size, **row, "coordinates": case.model.size,
+            "diagnosis": found["seconds"], "named": names, "notes": case.notes}  # fmt: skip
+
+
 MEASUREMENTS: dict[str, Measurement] = {
     "modes of a planar grid": lambda joints: _solved(planar_grid(joints)),
     "modes of a lattice": lambda joints: _solved(lattice(joints)),
@@ -277,6 +324,7 @@ MEASUREMENTS: dict[str, Measurement] = {
     "load and leaderboard": lambda count: _stored(count, "load"),
     "resume": lambda count: _stored(count, "resume"),
     "diagnosis of a lattice": _diagnosed,
+    "bricks in groups, read and reduced": _read_and_diagnosed,
 }
 
 

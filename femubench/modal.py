@@ -19,6 +19,7 @@ from femubench.core.modal.frf import (
 from femubench.core.modal.generalised_mass import mass_normalised as mass_normalised
 from femubench.core.modal.group_prior import (
     group_prior_std as group_prior_std,
+    largest_factor as largest_factor,
     support_groups as support_groups,
 )
 from femubench.core.modal.many_changes import modes_of_changes as modes_of_changes

@@ -343,4 +343,4 @@ def test_what_alone_keeps_the_mass_positive_is_no_passenger(problems: dict[str, 
     with pytest.raises(ModelError, match="indefinite"):
         state_at(problem, (part,), away)
     both = state_at(problem, (part, part), np.concatenate([away, -away]))
-    assert find_passengers(both) == [False, False]
+    assert find_passengers(both, np.ones(2)) == [False, False]

@@ -147,9 +147,9 @@ def test_frequencies_of_the_basis_are_those_of_the_whole_model(name: str) -> Non
 
 
 def test_nominal_frequencies_are_exact(case: Case) -> None:
-    whole = solve_modes(MODEL, 36).elastic.natural_frequencies[:14]
-    own = solve_modes(case.model).elastic.natural_frequencies[:14]
-    np.testing.assert_allclose(own, whole, rtol=1e-8)
+    whole = solve_modes(MODEL, 42).elastic.natural_frequencies[:30]
+    own = solve_modes(case.model).elastic.natural_frequencies[:30]
+    np.testing.assert_allclose(own, whole, rtol=1e-7)
 
 
 def test_a_case_is_read_into_the_basis_and_weighs_what_it_weighed(case: Case) -> None:

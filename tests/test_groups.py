@@ -8,11 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnosis_problems import problem_of
 
 import femubench
 from femubench import Case, InputError, Measurement, Model, Sensors, read_case, solve_modes
 from femubench.core.case.writing import write_case
 from femubench.core.fem.model_parameters import matrix_slopes, with_values
+from femubench.core.fit.modal_fit import state_at
+from femubench.core.fit.static_response import Basis
+from femubench.core.inference.model_error import error_slopes
 from femubench.core.run.jobs import missing_capability
 from femubench.effect import Parameter
 from femubench.fem import (
@@ -215,8 +219,40 @@ def test_wide_priors_are_not_sampled_over_useless_polynomials() -> None:
     np.testing.assert_allclose(found, data.frequencies, rtol=0.02)
 
 
+def test_what_a_group_is_says_how_far_it_may_change() -> None:
+    joint = replace(MODEL, group_kinds={"left": "joint"})
+    assert group_prior_std(joint, "left") == pytest.approx(group_prior_std(MODEL, "foot"))
+    (stiffer,) = MemberStiffness().parameters(joint, "group:left")
+    assert stiffer.value(stiffer.range[1]) == pytest.approx(1.0)
+    assert stiffer.value(stiffer.range[0]) < -0.999
+    uppers = {
+        change.places[0]: change.parameters[0].upper
+        for change in scale_groups(joint, "stiffness", own_prior=True)
+    }
+    assert uppers["group:left"] == 2.0
+    assert uppers["group:foot"] > 20.0
+
+
+def test_groups_are_classes_of_model_error() -> None:
+    slopes = error_slopes(problem_of(MODEL, DATA, ()), Basis.of(MODEL, DATA).modes)
+    step = 1e-4
+    for kind, names, quantity in (
+        ("group stiffness", ("left", "right"), "E"),
+        ("joint groups", ("foot", "head"), "E"),
+        ("group mass", ("half",), "density"),
+    ):
+        for name, slope in zip(names, slopes[kind].T, strict=True):
+            ends = [
+                with_group_factors(MODEL, [Property(name, quantity, (f"group:{name}",))], [1.0 + s])
+                for s in (step, -step)
+            ]
+            raw = [state_at(problem_of(m, DATA, ()), (), np.zeros(0)).raw for m in ends]
+            expected = (raw[1] - raw[0]) / (2.0 * step)
+            np.testing.assert_allclose(slope, expected, atol=1e-3 * np.abs(expected).max())
+
+
 def test_groups_read_back_as_they_were_written(tmp_path: Path) -> None:
-    model = replace(MODEL, group_priors={"foot": 3.0})
+    model = replace(MODEL, group_priors={"foot": 3.0}, group_kinds={"left": "joint"})
     case = femubench.cases["frame"]
     own = Case(**{**vars(case), "name": "beam", "model": model, "measurement": DATA})
     own = replace(own, used=(1, 2, 3), held_out=(4, 5), modifications=(), reference=None)
@@ -224,6 +260,8 @@ def test_groups_read_back_as_they_were_written(tmp_path: Path) -> None:
     back = read_case(tmp_path / "beam").model
     assert (list(back.groups), list(back.mass_groups)) == (list(TRUTH), ["half"])
     assert dict(back.group_priors) == {"foot": 3.0}
+    assert dict(back.group_kinds) == {"left": "joint"}
+    assert own.error_width == 1.0
     for name in TRUTH:
         assert abs(back.groups[name] - model.groups[name]).max() == 0.0
     assert abs(back.mass_groups["half"] - model.mass_groups["half"]).max() == 0.0

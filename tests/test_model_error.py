@@ -12,6 +12,7 @@ from scipy.stats import multivariate_normal
 
 from femubench import Model
 from femubench.core.challenge.structures import structure_named
+from femubench.core.diagnosis.tables import _passengers
 from femubench.core.fem.frame import Factor, JointSpring, Place
 from femubench.core.fit.modal_fit import Problem, State, fit, state_at
 from femubench.core.fit.noise import Noise
@@ -237,6 +238,23 @@ def test_scales_that_are_fitted_make_less_sure_than_a_noise_that_is_known(
         odds.append((cause.log_weight - cause.log_prior) - (nothing.log_weight - nothing.log_prior))
     assert odds[1] > 5.0
     assert 0.5 * odds[1] < odds[0] < 0.9 * odds[1]
+
+
+def test_a_cause_whose_size_may_be_nothing_is_a_passenger(problem: Problem) -> None:
+    places = ("local-stiffness-loss", f"{MEMBER.name}/2"), ("added-mass", JOINT)
+    parts = tuple(part_at(problem, *place) for place in places)
+    x = np.array([1.5, 1.5])
+    present = replace(problem, offset=-state_at(problem, parts, x).raw)
+    found = fit(present, parts, x)
+    assert found is not None
+    explanation = Explanation(Base((), 0.0), found, 1)
+    size = np.abs(found.state.x)
+    for spread, expected in (
+        (0.1 * size, [False, False]),
+        (size * (0.1, 0.6), [False, True]),
+        (size, [False, False]),  # never the only one
+    ):
+        assert _passengers(explanation, spread) == expected
 
 
 def test_unseen_data_lie_within_what_is_foreseen(

@@ -77,8 +77,8 @@ class Case(Shown):
             mass that counts as ordinary in a diagnosis; 0 turns it off.
         reference: modes of the same structure as it was, which the causes sought are not in.
         reference_used: labels of those that a diagnosis is given; the others serve its proof.
-        model_error: factor on the widths of what a beam model gets wrong; 0 turns it off. None is
-            1 with a reference, which says much of it, and 0 without.
+        model_error: factor on the widths of what a model gets wrong; 0 turns it off. None is 1
+            with a reference, which says much of it, or with groups, and 0 without.
         beam_share: how probable it is, before any datum, that the structure behaves like a beam
             model with ordinary scatter.
         structure: the physical structure, which several cases may share; empty for one that no
@@ -142,7 +142,8 @@ class Case(Shown):
         """Return the factor on the widths of the model error."""
         if self.model_error is not None:
             return self.model_error
-        return 0.0 if self.reference is None else 1.0
+        grouped = bool(self.model.groups or self.model.mass_groups)
+        return 1.0 if grouped or self.reference is not None else 0.0
 
     @property
     def used_reference(self) -> Measurement | None:

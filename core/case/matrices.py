@@ -256,7 +256,9 @@ def with_groups(
                         path = files.path(file)
                     found[spec.name] = read_matrix(path, model.size, readers)
     priors = {spec.name: spec.prior for spec in specs if spec.prior is not None}
-    return replace(model, groups=groups, mass_groups=mass_groups, group_priors=priors)
+    kinds = {spec.name: spec.kind for spec in specs if spec.kind is not None}
+    model = replace(model, groups=groups, mass_groups=mass_groups)
+    return replace(model, group_priors=priors, group_kinds=kinds)
 
 
 def _rows(entry: int | str, geometry: MatrixGeometry) -> list[int]:

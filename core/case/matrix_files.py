@@ -191,6 +191,8 @@ def matrix_keys(
                 files[table[key]] = matrix_market(parts[name])
         if name in model.group_priors:
             table["prior"] = float(model.group_priors[name])
+        if name in model.group_kinds:
+            table["kind"] = model.group_kinds[name]
         tables.append(table)
     return (keys | {"groups": tables} if tables else keys), files
 

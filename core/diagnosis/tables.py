@@ -171,7 +171,7 @@ def list_causes(
     posterior = examination.posterior
     spread = find_spread(posterior, explanation)
     own = examination.own_error(explanation.fit.state)
-    passengers = find_passengers(explanation.fit.state)
+    passengers = find_passengers(explanation.fit.state, spread)
     causes = causes_in(explanation, 1.0, posterior.earned, spread=spread, own=own)
     first = len(causes) - len(explanation.parts)
     tied = _tied(posterior, explanation)
@@ -201,13 +201,17 @@ def list_causes(
     return found
 
 
-def find_passengers(state: State) -> list[bool]:
-    """Return which causes may as well be left out, the rest as it is; never the only one."""
+def find_passengers(state: State, spread: FloatArray) -> list[bool]:
+    """Return which causes may as well be left out, the rest as it is; never the only one.
+
+    Chi-square is the same without them, or no size differs from nothing by two deviations.
+    """
     parts = state.parts
     if len(parts) < 2:
         return [False] * len(parts)
     ends = np.cumsum([len(part.hypothesis.parameters) for part in parts])
     pieces = np.split(state.x, ends[:-1])
+    sized = np.split(np.abs(state.x) > settings.notable_deviations * spread, ends[:-1])
     found = []
     for k in range(len(parts)):
         rest = np.concatenate([x for j, x in enumerate(pieces) if j != k])
@@ -215,8 +219,9 @@ def find_passengers(state: State) -> list[bool]:
             without = state_at(state.problem, (*parts[:k], *parts[k + 1 :]), rest)
         except ModelError:  # the others take away more mass than there is without this one
             found.append(False)
-        else:
-            found.append(without.chi2 - state.chi2 < settings.notable_deviations**2)
+            continue
+        gain = without.chi2 - state.chi2
+        found.append(gain < settings.notable_deviations**2 or not sized[k].any())
     return found if not all(found) else [False] * len(parts)
 
 

@@ -130,6 +130,7 @@ class Model(Shown):
         groups, mass_groups: named parts of stiffness and mass of a model from files, sparse (n, n)
             each.
         group_priors: by name of a group, a factor of so much up or down is as likely as not.
+        group_kinds: by name of a group, what it is: a word of `modal.group_prior.KINDS`.
     """
 
     mass: SparseArray
@@ -143,6 +144,7 @@ class Model(Shown):
     free: bool = False
     mass_groups: Mapping[str, SparseArray] = field(default_factory=dict)
     group_priors: Mapping[str, float] = field(default_factory=dict)
+    group_kinds: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, source: Frame | Structure) -> Model:

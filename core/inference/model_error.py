@@ -28,6 +28,7 @@ from femubench.core.fit.modal_fit import Problem, State, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import Modes
+from femubench.core.modal.group_prior import STRUCTURE_STD, group_prior_std
 from femubench.core.typing import FloatArray, IntArray
 
 
@@ -36,6 +37,9 @@ def class_widths() -> dict[str, float]:
     return {
         "element stiffness": settings.width_element_stiffness,
         "element mass": settings.width_element_mass,
+        "group stiffness": settings.width_group_stiffness,
+        "joint groups": settings.width_joint_groups,
+        "group mass": settings.width_group_mass,
         "stiffness of everything": settings.width_everything,
         "density of everything": settings.width_everything,
         "flexibility of joint types": settings.width_joint_types,
@@ -62,6 +66,7 @@ def error_slopes(problem: Problem, modes: Modes) -> dict[str, FloatArray]:
         "sensor gains": _gains(nominal),
         **_shapes(nominal),
     }
+    found |= _groups(nominal, rigid_first(modes).shapes)
     if structure is not None:
         rows = scatter_slopes(problem, modes)
         count = len(structure.properties)
@@ -110,6 +115,35 @@ def _everything(nominal: State, sign: float, mass: float) -> FloatArray:
     values = nominal.eigenvalues[nominal.partner]
     forces[:, :, 0] = sign * nominal.vectors[:, nominal.partner] * values
     return nominal.rows(forces, np.array([mass]))
+
+
+def _groups(nominal: State, shapes: FloatArray) -> dict[str, FloatArray]:
+    """Return the slopes of a relative change of every group of matrices, by how well it is known.
+
+    Arguments:
+        nominal: the model as drawn.
+        shapes: of its modes, in the order of the coordinates, (n, N).
+    """
+    model, near = nominal.problem.model, nominal.vectors[: shapes.shape[1], nominal.partner]
+    values = nominal.eigenvalues[nominal.partner]
+    sure = {n: group_prior_std(model, n) < 2.0 * STRUCTURE_STD for n in model.groups}
+    classes = {
+        "group stiffness": [part for name, part in model.groups.items() if sure[name]],
+        "joint groups": [part for name, part in model.groups.items() if not sure[name]],
+        "group mass": list(model.mass_groups.values()),
+    }
+    found = {}
+    for name, parts in classes.items():
+        heavy = name == "group mass"
+        forces = np.zeros((len(nominal.vectors), len(values), len(parts)))
+        for i, part in enumerate(parts):
+            own = shapes.T @ (part @ (shapes @ near))
+            forces[: len(own), :, i] = -values * own if heavy else own
+        bare = [replace(model, mass=part, mass_change=None) for part in parts if heavy]
+        mass = [own.total_mass for own in bare] or [0.0] * len(parts)
+        if parts:
+            found[name] = nominal.rows(forces, np.array(mass))
+    return found
 
 
 def general_slopes(state: State) -> FloatArray:

@@ -88,6 +88,15 @@ class Settings:
     width_element_stiffness: float = _prior(
         0.02, "relative", "sections and moduli scatter along a structure"
     )
+    width_group_stiffness: float = _prior(
+        0.03, "relative", "thickness and modulus of a part of matrices are off as a whole"
+    )
+    width_joint_groups: float = _prior(
+        0.3, "relative", "the same of a joint or a support, which are drawn by rule of thumb"
+    )
+    width_group_mass: float = _prior(
+        0.02, "relative", "masses of parts scatter less: they can be weighed"
+    )
     width_element_mass: float = _prior(0.01, "relative", "masses scatter less: they can be weighed")
     width_everything: float = _prior(
         0.03, "relative", "modulus and density of a delivery are off as a whole"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -10,9 +12,32 @@ from femubench.core.modal.eigen import cache_by_model
 from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.typing import FloatArray, SparseArray
 
-STRUCTURE_STD = 0.1  # of ln(factor)
-SUPPORT_FACTOR = 5.0  # as likely as not
 QUARTILE = 0.6744897501960817  # of the standard normal distribution
+
+
+@dataclass(frozen=True)
+class GroupKind:
+    """What is known of a group of some kind before any measurement.
+
+    Arguments:
+        std: standard deviation of ln(factor).
+        most: the largest factor that is believed.
+        why: one line.
+    """
+
+    std: float
+    most: float
+    why: str
+
+
+_LOOSE = float(np.log(5.0) / QUARTILE)  # a factor of five is as likely as not
+KINDS = {
+    "part": GroupKind(0.1, np.inf, "moduli and thicknesses are delivered within tolerances"),
+    "joint": GroupKind(_LOOSE, 2.0, "a joint is drawn whole: it gapes or slips, and stiffens by no "
+                       "more than what a fillet adds"),
+    "support": GroupKind(_LOOSE, np.inf, "ground and clamps are hardly ever known"),
+}  # fmt: skip
+STRUCTURE_STD = KINDS["part"].std
 _FREE = 1e-8  # of the energy that the entries would have without cancelling each other
 _HELD = 0.1  # of it; a part of the structure with some dofs removed has less
 
@@ -52,8 +77,8 @@ def _energy(part: SparseArray, rigid: FloatArray) -> float:
 def group_prior_std(model: Model, name: str) -> float:
     """Return the standard deviation of ln(factor) of a group.
 
-    What the case states: a factor of so much up or down is as likely as not. Else 0.1, and what
-    belongs to a factor of five for a support.
+    What the case states: a factor of so much up or down is as likely as not. Else that of its
+    kind (`KINDS`), stated or, for what holds to ground, found.
 
     Arguments:
         model: from matrices.
@@ -65,6 +90,23 @@ def group_prior_std(model: Model, name: str) -> float:
     """
     if name in model.group_priors:
         return float(np.log(model.group_priors[name]) / QUARTILE)
-    if name in support_groups(model):
-        return float(np.log(SUPPORT_FACTOR) / QUARTILE)
-    return STRUCTURE_STD
+    return _kind_of(model, name).std
+
+
+def largest_factor(model: Model, name: str) -> float:
+    """Return the largest factor on a group that is believed; infinite for most kinds.
+
+    Arguments:
+        model: from matrices.
+        name: of a group of its stiffness or mass.
+
+    Examples:
+        >>> modal.largest_factor(model, "deck")
+        inf
+    """
+    return _kind_of(model, name).most
+
+
+def _kind_of(model: Model, name: str) -> GroupKind:
+    held = "support" if name in support_groups(model) else "part"
+    return KINDS[model.group_kinds.get(name, held)]

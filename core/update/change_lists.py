@@ -18,7 +18,12 @@ from femubench.core.fem.joints import JointGroup, all_elements, elements_at, joi
 from femubench.core.fem.model import Model
 from femubench.core.fem.slopes import Matrix
 from femubench.core.fem.structure import Structure
-from femubench.core.modal.group_prior import STRUCTURE_STD, group_prior_std, support_groups
+from femubench.core.modal.group_prior import (
+    STRUCTURE_STD,
+    group_prior_std,
+    largest_factor,
+    support_groups,
+)
 from femubench.core.plugin.loader import list_effects
 from femubench.core.roles import Effect
 
@@ -169,7 +174,8 @@ def scale_groups(model: Model, matrix: Matrix, *, own_prior: bool) -> list[Chang
         else:
             limit = 100.0 if matrix == "stiffness" and name in support_groups(model) else 20.0
         at = f"{matrix} {place}", quantity, (place,)
-        found.append(scale_property(*at, prior_std=std, lower=1.0 / limit, upper=limit))
+        upper = min(limit, largest_factor(model, name) if matrix == "stiffness" else limit)
+        found.append(scale_property(*at, prior_std=std, lower=1.0 / limit, upper=upper))
     return found
 
 

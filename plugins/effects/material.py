@@ -39,7 +39,7 @@ from femubench.fem import (
     stiffness_matrices,
     with_group_factors,
 )
-from femubench.modal import group_prior_std, support_groups
+from femubench.modal import group_prior_std, largest_factor, support_groups
 
 _SURE = 3.0  # standard deviations of the weighed mass
 
@@ -62,10 +62,11 @@ class MaterialEffect(FrameEffect):
         """Return the relative change; of a group with a prior of its own, that of a factor."""
         name = f"change of {self.constant}"
         group = place.removeprefix(GROUP)
-        own = group in model.group_priors or group in support_groups(model)
-        if model.structure is None and place.startswith(GROUP) and own:
-            std = group_prior_std(model, group)
-            return (Parameter(name, "", std, scaling="factor", wording="change"),)
+        known = {*model.group_priors, *model.group_kinds, *support_groups(model)}
+        if model.structure is None and place.startswith(GROUP) and group in known:
+            most = largest_factor(model, group) if self.constant == "E" else np.inf
+            given = group_prior_std(model, group), 0.0, -np.inf, most - 1.0
+            return (Parameter(name, "", *given, scaling="factor", wording="change"),)
         return (Parameter(name, "", 0.1, lower=-0.9, wording="change"),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
