@@ -167,11 +167,13 @@ def reader_of(file: Path, readers: Sequence[Reader]) -> Reader | None:
 def reading_with(reader: Reader, file: Path) -> Iterator[None]:
     """Turn whatever a reader plugin raises into one line that names it and the file.
 
-    What it may take of memory grows with the file, whatever the file claims to hold.
+    What it may take of memory grows with the file, whatever the file claims to hold; a reader whose
+    files are small for what they describe has `read_memory(file)`, in bytes.
     """
     size = file.stat().st_size if file.is_file() else 0
     try:
-        with limit_memory(_MEMORY + _PER_BYTE * size):
+        own = getattr(reader, "read_memory", None)
+        with limit_memory(_MEMORY + (own(file) if own else _PER_BYTE * size)):
             yield
     except ModelError as error:
         raise InputError(
