@@ -27,7 +27,7 @@ _HELD = {"ENCASTRE": (0, 1, 2), "PINNED": (0, 1, 2), "XSYMM": (0,), "YSYMM": (1,
 
 
 @dataclass
-class Deck:
+class SolidDeck:
     """What an input file says of a linear model of solids.
 
     Arguments:
@@ -64,14 +64,14 @@ class Deck:
         return found if len(found) > 1 else {}
 
 
-def read_deck(path: Path) -> Deck:
+def read_deck(path: Path) -> SolidDeck:
     """Return what an input file says.
 
     Raises:
         InputError: for what changes stiffness or mass and is not read, and for a broken file.
     """
-    deck, blocks = Deck(path), _Blocks(path)
-    for block in blocks:
+    deck = SolidDeck(path)
+    for block in _read_blocks(path):
         _READ.get(block.keyword, _refuse)(deck, block)
     return deck
 
@@ -107,7 +107,7 @@ def read_solids(path: Path) -> Model:
     )
 
 
-def _point_masses(deck: Deck, row: Mapping[int, int]) -> SparseArray:
+def _point_masses(deck: SolidDeck, row: Mapping[int, int]) -> SparseArray:
     """Return the mass matrix of the masses at nodes."""
     pairs = [(n, value) for name, value in deck.masses.items() for n in deck.sets.get(name, ())]
     at = [3 * row[deck.elements[n][1][0]] + d for n, _ in pairs for d in range(3)]
@@ -116,7 +116,7 @@ def _point_masses(deck: Deck, row: Mapping[int, int]) -> SparseArray:
 
 
 def _assemble(
-    deck: Deck,
+    deck: SolidDeck,
     numbers: Sequence[int],
     row: Mapping[int, int],
     xyz: FloatArray,
@@ -239,44 +239,39 @@ class _Block:
                 raise self.refuse(what, "whole numbers", number) from None
 
 
-class _Blocks:
-    """The blocks of an input file, included ones in place."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def __iter__(self) -> Iterator[_Block]:
-        block, in_step = None, False
-        for file, number, line in nodes.read_lines(self.path):
-            if not line.startswith("*"):
-                if block is not None:
-                    block.lines.append((number, [cell.strip() for cell in line.split(",")]))
-                continue
+def _read_blocks(path: Path) -> Iterator[_Block]:
+    """Return the blocks of an input file, those of included ones in place."""
+    block, in_step = None, False
+    for file, number, line in nodes.read_lines(path):
+        if not line.startswith("*"):
             if block is not None:
-                yield block
-            keyword, *words = line[1:].split(",")
-            keyword = keyword.upper().replace(" ", "")
-            pairs = (word.partition("=") for word in words)
-            options = {k.strip().upper(): v.strip().strip('"') for k, _, v in pairs}
-            in_step = keyword == "STEP" or (in_step and keyword != "ENDSTEP")
-            block = _Block(file, number, keyword, options, [], in_step)
+                block.lines.append((number, [cell.strip() for cell in line.split(",")]))
+            continue
         if block is not None:
             yield block
+        keyword, *words = line[1:].split(",")
+        keyword = keyword.upper().replace(" ", "")
+        pairs = (word.partition("=") for word in words)
+        options = {k.strip().upper(): v.strip().strip('"') for k, _, v in pairs}
+        in_step = keyword == "STEP" or (in_step and keyword != "ENDSTEP")
+        block = _Block(file, number, keyword, options, [], in_step)
+    if block is not None:
+        yield block
 
 
-def _refuse(deck: Deck, block: _Block) -> None:
+def _refuse(deck: SolidDeck, block: _Block) -> None:
     """Refuse what is not known to change nothing."""
     if not (block.in_step or _IGNORED.fullmatch(block.keyword)):
         raise block.refuse(f"*{block.keyword} is not read", INSTEAD)
 
 
-def _instance(deck: Deck, block: _Block) -> None:
+def _instance(deck: SolidDeck, block: _Block) -> None:
     if block.lines or "instances" in deck.named:
         raise block.refuse("parts that are moved, or there twice", "one part where it lies")
     deck.named["instances"] = ""
 
 
-def _element(deck: Deck, block: _Block) -> None:
+def _element(deck: SolidDeck, block: _Block) -> None:
     kind, known = block.option("TYPE"), solid_elements.KINDS
     if kind not in known and kind != "MASS":
         expected = f"{', '.join(known)}, MASS; of others {INSTEAD.partition(', or ')[2]}"
@@ -302,7 +297,7 @@ def _element(deck: Deck, block: _Block) -> None:
         deck.sets.setdefault(name.upper(), {}).update(own)
 
 
-def _set(deck: Deck, block: _Block) -> None:
+def _set(deck: SolidDeck, block: _Block) -> None:
     of_elements = block.keyword == "ELSET"
     known = deck.sets if of_elements else deck.node_sets
     name = block.option(block.keyword)
@@ -331,37 +326,37 @@ def _members(
     return known[word.upper()]
 
 
-def _material(deck: Deck, block: _Block) -> None:
+def _material(deck: SolidDeck, block: _Block) -> None:
     deck.materials[block.option("NAME")] = [np.nan] * 3
 
 
-def _elastic(deck: Deck, block: _Block) -> None:
+def _elastic(deck: SolidDeck, block: _Block) -> None:
     if block.options.get("TYPE", "ISO").upper() not in {"ISO", "ISOTROPIC"}:
         raise block.refuse(f"*ELASTIC of type {block.options['TYPE']}", "TYPE=ISO")
     _last_material(deck, block)[:2] = block.first_numbers(2)
 
 
-def _density(deck: Deck, block: _Block) -> None:
+def _density(deck: SolidDeck, block: _Block) -> None:
     _last_material(deck, block)[2:] = block.first_numbers(1)
 
 
-def _last_material(deck: Deck, block: _Block) -> list[float]:
+def _last_material(deck: SolidDeck, block: _Block) -> list[float]:
     if not deck.materials:
         raise block.refuse(f"*{block.keyword} of no material", "*MATERIAL above it")
     return next(reversed(deck.materials.values()))
 
 
-def _section(deck: Deck, block: _Block) -> None:
+def _section(deck: SolidDeck, block: _Block) -> None:
     name = block.option("ELSET")
     deck.sections.pop(name, None)
     deck.sections[name] = block.option("MATERIAL")
 
 
-def _mass(deck: Deck, block: _Block) -> None:
+def _mass(deck: SolidDeck, block: _Block) -> None:
     deck.masses[block.option("ELSET")] = block.first_numbers(1)[0]
 
 
-def _boundary(deck: Deck, block: _Block) -> None:
+def _boundary(deck: SolidDeck, block: _Block) -> None:
     for number, cells in block.lines:
         found = _members(deck.node_sets, cells[0], block, number)
         word = cells[1].upper() if len(cells) > 1 else ""
@@ -382,7 +377,7 @@ _READ = {
 }  # fmt: skip
 
 
-def _materials(deck: Deck) -> dict[int, str]:
+def _materials(deck: SolidDeck) -> dict[int, str]:
     """Return the material of every solid element by number."""
     found: dict[int, str] = {}
     for name, material in deck.sections.items():
