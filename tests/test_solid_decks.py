@@ -173,6 +173,7 @@ def test_an_updated_model_is_a_deck_with_a_material_for_each_group(tmp_path: Pat
     source = PLATES / "plates.inp"
     model = femubench.read_model(source, unit="mm")
     assert set(model.groups) == {"PLATES", "LEFT", "RIGHT"}
+    assert set(model.group_priors) == {"LEFT", "RIGHT"}
     factors = [fem.Property(n, "E", (f"group:{n}",)) for n in ("LEFT", "PLATES")]
     updated = fem.with_group_factors(model, factors, [0.4, 1.02])
     femubench.write_model(updated, tmp_path, like=source, unit="mm")

@@ -12,7 +12,7 @@ from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Dofs, Model
 from femubench.core.modal.eigen import DENSE_LIMIT
-from femubench.core.modal.group_prior import QUARTILE, group_prior_std
+from femubench.core.modal.group_prior import QUARTILE, group_prior_std, support_groups
 from femubench.core.modal.grouped_reduction import GroupedReduction, reduce_groups
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
@@ -88,7 +88,11 @@ def _small_model(model: Model, found: GroupedReduction) -> Model:
         stiffness=sp.csc_array(found.stiffness),
         dofs=small,
         geometry=MatrixGeometry(names, small),
-        group_priors={n: float(np.exp(QUARTILE * group_prior_std(model, n))) for n in found.groups},
+        group_priors={
+            n: float(np.exp(QUARTILE * group_prior_std(model, n)))
+            for n in found.groups
+            if n in model.group_priors or n in support_groups(model)
+        },
         groups=sparse(found.groups),
         mass_groups=sparse(found.mass_groups),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,9 @@ from femubench.plugins.readers.reading import DIRECTIONS, needs
 
 INSTEAD = "solid elements alone, or the matrices of *FREQUENCY, SOLVER=MATRIXSTORAGE next to it"
 REST = "rest"
+# A set of elements of less than this share of the mass is a weld, a bolt or glue, of whose stiffness
+# as little is known as of a support.
+JOINT_SHARE, JOINT_PRIOR = 0.02, 5.0
 # What changes neither stiffness nor mass, or is of a step, whose supports alone count.
 _IGNORED = re.compile(
     "(END)?(ASSEMBLY|PART|STEP)|ENDINSTANCE|HEADING|INCLUDE|NODE|SURFACE|SYSTEM|PREPRINT|RESTART|"
@@ -89,7 +92,7 @@ def read_solids(path: Path) -> Model:
     if lost := [n for n in used if str(n) not in places]:
         raise InputError(f"node {lost[0]} of an element has no place", file=path, expected="*NODE")
     row, xyz = {n: i for i, n in enumerate(used)}, np.array([places[str(n)] for n in used])
-    groups = deck.groups()
+    groups, heavy = deck.groups(), {}
     kept = np.array([(n, d) not in deck.held for n in used for d in range(3)])
     parts: dict[str, SparseArray] = {}
     mass = _point_masses(deck, row)
@@ -97,7 +100,8 @@ def read_solids(path: Path) -> Model:
         own, inertia = _assemble(deck, numbers, row, xyz, material)
         parts[name] = sp.csc_array(own[kept][:, kept])
         mass += inertia
-    return matrix_model(
+        heavy[name] = float(inertia.sum())
+    model = matrix_model(
         sp.csc_array(mass[kept][:, kept]),
         sp.csc_array(sum(parts.values())),
         np.repeat([str(n) for n in used], 3)[kept].tolist(),
@@ -105,6 +109,8 @@ def read_solids(path: Path) -> Model:
         np.repeat(xyz, 3, axis=0)[kept],
         parts if groups else {},
     )
+    small = [name for name in model.groups if heavy[name] < JOINT_SHARE * sum(heavy.values())]
+    return replace(model, group_priors=dict.fromkeys(small, JOINT_PRIOR))
 
 
 def _point_masses(deck: SolidDeck, row: Mapping[int, int]) -> SparseArray:
