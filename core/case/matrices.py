@@ -167,11 +167,13 @@ def reader_of(file: Path, readers: Sequence[Reader]) -> Reader | None:
 def reading_with(reader: Reader, file: Path) -> Iterator[None]:
     """Turn whatever a reader plugin raises into one line that names it and the file.
 
-    What it may take of memory grows with the file, whatever the file claims to hold.
+    What it may take of memory grows with the file, whatever the file claims to hold; a reader whose
+    files are small for what they describe has `read_memory(file)`, in bytes.
     """
     size = file.stat().st_size if file.is_file() else 0
     try:
-        with limit_memory(_MEMORY + _PER_BYTE * size):
+        own = getattr(reader, "read_memory", None)
+        with limit_memory(_MEMORY + (own(file) if own else _PER_BYTE * size)):
             yield
     except ModelError as error:
         raise InputError(
@@ -239,7 +241,8 @@ def with_groups(
         with at_key("groups", i):
             if spec.dofs is not None and (spec.stiffness is not None or spec.mass is not None):
                 raise BadKey(("dofs",), "a group of dofs with files", "either files or dofs")
-            if spec.stiffness is None and spec.mass is None and spec.dofs is None:
+            known = spec.name in {*model.groups, *model.mass_groups}
+            if not known and spec.stiffness is None and spec.mass is None and spec.dofs is None:
                 raise BadKey((), "a group without a part", "stiffness, mass or dofs")
             if spec.dofs is not None:
                 inside = np.zeros(len(geometry.dofs))
@@ -258,7 +261,7 @@ def with_groups(
     priors = {spec.name: spec.prior for spec in specs if spec.prior is not None}
     kinds = {spec.name: spec.kind for spec in specs if spec.kind is not None}
     model = replace(model, groups=groups, mass_groups=mass_groups)
-    return replace(model, group_priors=priors, group_kinds=kinds)
+    return replace(model, group_priors=priors, group_kinds={**model.group_kinds, **kinds})
 
 
 def _rows(entry: int | str, geometry: MatrixGeometry) -> list[int]:

@@ -275,9 +275,12 @@ class _Keys:
         stated = "   # not stated: taken from its size and mass" if self.guessed else ""
         yield f'unit = "{given.model_unit}"{stated}'
         if case is not None:
-            yield f"# It {sizes_of(case.model)}."
+            yield f"# It {sizes_of(case.whole or case.model)}."
         yield "# free = true   # if it hung free: nothing that holds it to ground is then suspected"
         if case is not None and case.model.structure is not None:
+            return
+        if case is not None and case.model.groups:
+            yield f"# Parts that may be wrong by a factor: {', '.join(case.model.groups)}"
             return
         yield "# Parts that may be wrong by a factor are the parameters of most strategies:"
         yield "# [[model.groups]]"

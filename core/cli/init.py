@@ -97,16 +97,16 @@ def init(
     case = begin_case(folder, given, plugins_for(ctx))
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         click.echo(f"wrote {path}")
-    _tell(case)
+    _show_match(case)
     click.echo(f"Now look at {folder / 'case.toml'}, and run: bench run {folder}")
 
 
-def _tell(case: Case) -> None:
+def _show_match(case: Case) -> None:
     """Print how well model and test go together, and which modes are held out."""
     from femubench.core.case.starting import sizes_of
     from femubench.core.score.scoring import predict_block
 
-    click.echo(wrap_text(f"The model {sizes_of(case.model)}.", hanging=2))
+    click.echo(wrap_text(f"The model {sizes_of(case.whole or case.model)}.", hanging=2))
     for note in case.notes:
         click.echo(wrap_text(f"Note: {note}", hanging=2))
     if case.matches:

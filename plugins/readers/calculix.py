@@ -9,7 +9,7 @@ import numpy as np
 
 from femubench import InputError, Model
 from femubench.fem import MatrixGeometry, SparseArray, matrix_model
-from femubench.plugins.readers import nodes
+from femubench.plugins.readers import nodes, solid_elements
 from femubench.plugins.readers.reading import (
     DIRECTIONS,
     ProgramReader,
@@ -20,16 +20,19 @@ from femubench.plugins.readers.reading import (
     symmetric,
     whole,
 )
+from femubench.plugins.readers.solid_deck import read_solids, write_factors
 
 _KIND = "row, column, value as *FREQUENCY, SOLVER=MATRIXSTORAGE stores them"
 _LABELS = "node.direction for every row, directions 1 to 6"
 _MOST_ROWS = 1_000_000
+_PER_BYTE = 64  # of memory for one of a file with a matrix
 
 
 class CalculixReader(ProgramReader):
     """Reads the job of an input file: job.sti, job.mas and job.dof next to job.inp.
 
-    Files job_NAME.sti next to them are groups: the part NAME of the stiffness.
+    Files job_NAME.sti next to them are groups: the part NAME of the stiffness. Without these files
+    the matrices are those of the elements of the input file, and its sets of elements are groups.
     """
 
     name: str = "CalculiX"
@@ -44,6 +47,8 @@ class CalculixReader(ProgramReader):
 
     def read_model(self, path: Path) -> Model:
         """Return mass, stiffness, labels and groups of a job, without what is held."""
+        if _is_deck(path):
+            return read_solids(path)
         labels = _labels(path.with_suffix(".dof"))
         n = len(labels)
         places = nodes.read_nodes(path.with_suffix(".inp"))
@@ -57,16 +62,29 @@ class CalculixReader(ProgramReader):
 
     def model_files(self, path: Path) -> Sequence[Path]:
         """Return the files of a job in addition to the one named; raises InputError."""
-        job = [path.with_suffix(suffix) for suffix in (".inp", ".sti", ".mas", ".dof")]
+        suffixes = (".inp",) if _is_deck(path) else (".inp", ".sti", ".mas", ".dof")
+        job = [path.with_suffix(suffix) for suffix in suffixes]
         further = nodes.list_included(job[0])
         return tuple(f for f in (*job, *further, *_groups(path).values()) if f != path)
+
+    def read_memory(self, path: Path) -> int:
+        """Return the bytes that reading takes: a line of a deck is a full matrix of an element."""
+        if not _is_deck(path):
+            return _PER_BYTE * path.stat().st_size
+        files = (path, *nodes.list_included(path))
+        return solid_elements.BYTES * sum(file.stat().st_size for file in files)
 
     def read_nodes(self, path: Path) -> Mapping[str, nodes.Point]:
         """Return the nodes of an input file; raises InputError."""
         return nodes.read_nodes(path.with_suffix(".inp"))
 
     def write_model(self, model: Model, path: Path, original: Path) -> None:
-        """Write .sti, .mas and .dof of an updated model next to each other, and its groups."""
+        """Write .sti, .mas and .dof of an updated model next to each other, and its groups.
+
+        Where the matrices came from a deck, and factors of its groups make the model: the deck.
+        """
+        if _is_deck(original) and write_factors(model, path, original):
+            return
         geometry = model.geometry
         assert isinstance(geometry, MatrixGeometry)
         for suffix, matrix in ((".sti", model.stiffness), (".mas", model.mass)):
@@ -78,6 +96,12 @@ class CalculixReader(ProgramReader):
             for node, direction in zip(model.dofs.node, model.dofs.direction, strict=True)
         ]
         path.with_suffix(".dof").write_text("".join(labels))
+
+
+def _is_deck(path: Path) -> bool:
+    """Return whether an input file stands alone, without any matrix of its job."""
+    own = (path.with_suffix(suffix) for suffix in (".sti", ".mas", ".dof"))
+    return path.suffix.lower() == ".inp" and not any(file.exists() for file in own)
 
 
 def _groups(path: Path) -> dict[str, Path]:

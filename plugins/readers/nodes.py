@@ -22,7 +22,7 @@ def read_nodes(path: Path) -> dict[str, Point]:
     """
     nodes: dict[str, Point] = {}
     inside = False
-    for file, number, line in _lines(path):
+    for file, number, line in read_lines(path):
         if line.startswith("*"):
             keyword, _, options = line[1:].upper().replace(" ", "").partition(",")
             inside = keyword == "NODE"
@@ -49,11 +49,11 @@ def read_nodes(path: Path) -> dict[str, Point]:
 
 def list_included(path: Path) -> tuple[Path, ...]:
     """Return the files that an input file includes, in order, each once."""
-    found = dict.fromkeys(file for file, _, _ in _lines(path))
+    found = dict.fromkeys(file for file, _, _ in read_lines(path))
     return tuple(file for file in found if file != path)
 
 
-def _lines(path: Path, above: Path | None = None, depth: int = 0) -> Iterator[Line]:
+def read_lines(path: Path, above: Path | None = None, depth: int = 0) -> Iterator[Line]:
     """Return file, number and text of every line that says something, included ones in place.
 
     Arguments:
@@ -80,7 +80,7 @@ def _lines(path: Path, above: Path | None = None, depth: int = 0) -> Iterator[Li
             name = line.partition("=")[2].strip().strip('"')
             try:
                 inner = Path(os.path.normpath(path.parent / name))
-                yield from _lines(inner, above, depth + 1)
+                yield from read_lines(inner, above, depth + 1)
             except (OSError, ValueError):
                 what = f"{name[:40]!r} cannot be read"
                 raise InputError(what, file=path, line=number, expected="a file") from None

@@ -1,0 +1,401 @@
+"""A model of solids in groups from an input file of CalculiX or Abaqus alone."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench import InputError, Model
+from femubench.fem import FloatArray, SparseArray, matrix_model
+from femubench.plugins.readers import nodes, solid_elements
+from femubench.plugins.readers.reading import DIRECTIONS, needs
+
+INSTEAD = "solid elements alone, or the matrices of *FREQUENCY, SOLVER=MATRIXSTORAGE next to it"
+REST = "rest"
+JOINT_SHARE = 0.02  # of the mass: a smaller set of elements is a weld, a bolt or glue
+# What changes neither stiffness nor mass, or is of a step, whose supports alone count.
+_IGNORED = re.compile(
+    "(END)?(ASSEMBLY|PART|STEP)|ENDINSTANCE|HEADING|INCLUDE|NODE|SURFACE|SYSTEM|PREPRINT|RESTART|"
+    "DAMPING|EXPANSION|CONDUCTIVITY|SPECIFICHEAT|INITIALCONDITIONS|PHYSICALCONSTANTS|TIMEPOINTS"
+)
+_SAME = 1e-9  # of the largest entry: what rounding leaves of a factor
+_HELD = {"ENCASTRE": (0, 1, 2), "PINNED": (0, 1, 2), "XSYMM": (0,), "YSYMM": (1,), "ZSYMM": (2,)}
+
+
+@dataclass
+class SolidDeck:
+    """What an input file says of a linear model of solids.
+
+    Arguments:
+        path: of the file.
+        elements: kind and nodes by number.
+        sets, node_sets: numbers by name, in capitals.
+        named: names as the file first writes them.
+        materials: modulus, Poisson's ratio and density by name, nan where not given.
+        sections: material by set of elements; the last one counts.
+        masses: mass of the elements of a set.
+        held: node and direction of supports.
+    """
+
+    path: Path
+    elements: dict[int, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
+    sets: dict[str, dict[int, None]] = field(default_factory=dict)
+    node_sets: dict[str, dict[int, None]] = field(default_factory=dict)
+    named: dict[str, str] = field(default_factory=dict)
+    materials: dict[str, list[float]] = field(default_factory=dict)
+    sections: dict[str, str] = field(default_factory=dict)
+    masses: dict[str, float] = field(default_factory=dict)
+    held: set[tuple[int, int]] = field(default_factory=set)
+
+    def groups(self) -> dict[str, list[int]]:
+        """Return the solid elements by group: the smallest sets that share none, and the rest."""
+        solid = [n for n, (kind, _) in self.elements.items() if kind in solid_elements.KINDS]
+        left, found = dict.fromkeys(solid), {}
+        for name in sorted(self.sets, key=lambda name: (len(self.sets[name]), name)):
+            own = self.sets[name]
+            if own and all(number in left for number in own):
+                found[self.named[name]] = list(own)
+                left = {number: None for number in left if number not in own}
+        found |= {REST: list(left)} if left else {}
+        return found if len(found) > 1 else {}
+
+
+def read_deck(path: Path) -> SolidDeck:
+    """Return what an input file says.
+
+    Raises:
+        InputError: for what changes stiffness or mass and is not read, and for a broken file.
+    """
+    deck = SolidDeck(path)
+    for block in _read_blocks(path):
+        _READ.get(block.keyword, _refuse)(deck, block)
+    return deck
+
+
+def read_solids(path: Path) -> Model:
+    """Return mass, stiffness, labels and groups of a deck of solids, without what is held.
+
+    Raises:
+        InputError: as `read_deck`, and for elements without material, density or volume.
+    """
+    needs("skfem", "solids", path)
+    deck, places = read_deck(path), nodes.read_nodes(path)
+    material = _materials(deck)
+    used = dict.fromkeys(n for _, own in deck.elements.values() for n in own)
+    if lost := [n for n in used if str(n) not in places]:
+        raise InputError(f"node {lost[0]} of an element has no place", file=path, expected="*NODE")
+    row, xyz = {n: i for i, n in enumerate(used)}, np.array([places[str(n)] for n in used])
+    groups, heavy = deck.groups(), {}
+    kept = np.array([(n, d) not in deck.held for n in used for d in range(3)])
+    parts: dict[str, SparseArray] = {}
+    mass = _point_masses(deck, row)
+    for name, numbers in (groups or {REST: list(material)}).items():
+        own, inertia = _assemble(deck, numbers, row, xyz, material)
+        parts[name] = sp.csc_array(own[kept][:, kept])
+        mass += inertia
+        heavy[name] = float(inertia.sum())
+    model = matrix_model(
+        sp.csc_array(mass[kept][:, kept]),
+        sp.csc_array(sum(parts.values())),
+        np.repeat([str(n) for n in used], 3)[kept].tolist(),
+        np.tile(DIRECTIONS[:3], len(used))[kept].tolist(),
+        np.repeat(xyz, 3, axis=0)[kept],
+        parts if groups else {},
+    )
+    small = [name for name in model.groups if heavy[name] < JOINT_SHARE * sum(heavy.values())]
+    return replace(model, group_kinds=dict.fromkeys(small, "joint"))
+
+
+def _point_masses(deck: SolidDeck, row: Mapping[int, int]) -> SparseArray:
+    """Return the mass matrix of the masses at nodes."""
+    pairs = [(n, value) for name, value in deck.masses.items() for n in deck.sets.get(name, ())]
+    at = [3 * row[deck.elements[n][1][0]] + d for n, _ in pairs for d in range(3)]
+    values = np.repeat([float(value) for _, value in pairs], 3)
+    return sp.csc_array((values, (at, at)), shape=(3 * len(row), 3 * len(row)))
+
+
+def _assemble(
+    deck: SolidDeck,
+    numbers: Sequence[int],
+    row: Mapping[int, int],
+    xyz: FloatArray,
+    material: Mapping[int, str],
+) -> tuple[SparseArray, SparseArray]:
+    """Return stiffness and mass of some elements, of all kinds among them."""
+    by_kind: dict[str, list[int]] = {}
+    for number in numbers:
+        by_kind.setdefault(deck.elements[number][0], []).append(number)
+    found = []
+    for kind, own in by_kind.items():
+        ends = np.array([[row[node] for node in deck.elements[n][1]] for n in own])
+        values = np.array([deck.materials[material[n]] for n in own])
+        try:
+            found.append(solid_elements.assemble(kind, ends, xyz, values))
+        except ValueError as error:
+            what = f"element {own[error.args[0]]} is turned inside out"
+            raise InputError(what, file=deck.path, expected="a volume above zero") from None
+    stiffness, mass = zip(*found, strict=True)
+    return sum(stiffness), sum(mass)
+
+
+def write_factors(model: Model, path: Path, original: Path) -> bool:
+    """Write a deck in which every group has a material of its own, as stiff and heavy as updated.
+
+    Arguments:
+        model: updated, with the groups of the deck.
+        path: to write.
+        original: the deck that the model came from.
+
+    Returns:
+        Whether factors of groups make the model; without them nothing is written.
+
+    Raises:
+        InputError: as `read_solids`.
+    """
+    deck, before = read_deck(original), read_solids(original)
+    material = _materials(deck)
+    groups = deck.groups() or {REST: list(material)}
+    parts = before.groups or {REST: before.stiffness}
+    whole = model.groups if before.groups else {REST: model.stiffness}
+    heavier = float(model.mass.diagonal().sum() / before.mass.diagonal().sum())
+    heavier = 1.0 if abs(heavier - 1.0) < _SAME else heavier
+    if "instances" in deck.named or set(whole) != set(parts) or (deck.masses and heavier != 1.0):
+        return False
+    factors = {n: float(whole[n].diagonal().sum() / k.diagonal().sum()) for n, k in parts.items()}
+    made = sp.csc_array(sum(factors[name] * part for name, part in parts.items()))
+    for own, other in ((made, model.stiffness), (heavier * before.mass, model.mass)):
+        if abs(own - other).max() > _SAME * abs(other).max():
+            return False
+    sections: list[str] = []
+    for name, numbers in groups.items():
+        for old in dict.fromkeys(material[n] for n in numbers):
+            part = [n for n in numbers if material[n] == old]
+            label = name if len(part) == len(numbers) else f"{name}_{old}"
+            if set(deck.sets.get(label.upper(), ())) != set(part):
+                rows = (part[i : i + 12] for i in range(0, len(part), 12))
+                sections += [f"*ELSET, ELSET={label}", *(", ".join(map(str, r)) for r in rows)]
+            modulus, poisson, density = deck.materials[old]
+            sections += [f"*MATERIAL, NAME={label}", "*ELASTIC"]
+            sections += [f"{modulus * factors[name]!r}, {poisson!r}", "*DENSITY"]
+            sections += [
+                repr(density * heavier),
+                f"*SOLID SECTION, ELSET={label}, MATERIAL={label}",
+            ]
+    path.write_text("\n".join([*_other_lines(original, sections), ""]), encoding="latin-1")
+    return True
+
+
+def _other_lines(path: Path, sections: Sequence[str]) -> Iterator[str]:
+    """Return the lines of a deck and of what it includes with other materials and sections."""
+    left_out, inside, last = ("MATERIAL", "ELASTIC", "DENSITY", "SOLIDSECTION"), False, ""
+    for _, _, line in nodes.read_lines(path):
+        if line.startswith("*"):
+            keyword = line[1:].upper().replace(" ", "").partition(",")[0]
+            if last == "SOLIDSECTION" != keyword:
+                yield from sections
+                sections = ()
+            inside, last = keyword in (*left_out, "INCLUDE"), keyword
+        if not inside:
+            yield line
+    yield from sections
+
+
+@dataclass(frozen=True)
+class _Block:
+    """A keyword with its options, and the cells of its lines."""
+
+    file: Path
+    number: int
+    keyword: str
+    options: dict[str, str]
+    lines: list[tuple[int, list[str]]]
+    in_step: bool
+
+    def refuse(self, what: str, expected: str, number: int | None = None) -> InputError:
+        return InputError(what, file=self.file, line=number or self.number, expected=expected)
+
+    def option(self, name: str) -> str:
+        if not self.options.get(name):
+            raise self.refuse(f"*{self.keyword} without {name}", f"{name}=...")
+        return self.options[name].upper()
+
+    def first_numbers(self, count: int) -> list[float]:
+        """Return the numbers of the first line."""
+        number, cells = self.lines[0] if self.lines else (self.number, [])
+        try:
+            return [float(cell) for cell in cells[:count] + [""] * (count - len(cells))]
+        except ValueError:
+            what = f"{','.join(cells)[:40]!r} below *{self.keyword}"
+            raise self.refuse(what, f"{count} numbers", number) from None
+
+    def whole_numbers(self) -> Iterator[tuple[int, list[int]]]:
+        """Return line and numbers of every line, empty cells left out."""
+        for number, cells in self.lines:
+            try:
+                yield number, [int(cell.rpartition(".")[2]) for cell in cells if cell]
+            except ValueError:
+                what = f"{','.join(cells)[:40]!r} below *{self.keyword}"
+                raise self.refuse(what, "whole numbers", number) from None
+
+
+def _read_blocks(path: Path) -> Iterator[_Block]:
+    """Return the blocks of an input file, those of included ones in place."""
+    block, in_step = None, False
+    for file, number, line in nodes.read_lines(path):
+        if not line.startswith("*"):
+            if block is not None:
+                block.lines.append((number, [cell.strip() for cell in line.split(",")]))
+            continue
+        if block is not None:
+            yield block
+        keyword, *words = line[1:].split(",")
+        keyword = keyword.upper().replace(" ", "")
+        pairs = (word.partition("=") for word in words)
+        options = {k.strip().upper(): v.strip().strip('"') for k, _, v in pairs}
+        in_step = keyword == "STEP" or (in_step and keyword != "ENDSTEP")
+        block = _Block(file, number, keyword, options, [], in_step)
+    if block is not None:
+        yield block
+
+
+def _refuse(deck: SolidDeck, block: _Block) -> None:
+    """Refuse what is not known to change nothing."""
+    if not (block.in_step or _IGNORED.fullmatch(block.keyword)):
+        raise block.refuse(f"*{block.keyword} is not read", INSTEAD)
+
+
+def _instance(deck: SolidDeck, block: _Block) -> None:
+    if block.lines or "instances" in deck.named:
+        raise block.refuse("parts that are moved, or there twice", "one part where it lies")
+    deck.named["instances"] = ""
+
+
+def _element(deck: SolidDeck, block: _Block) -> None:
+    kind, known = block.option("TYPE"), solid_elements.KINDS
+    if kind not in known and kind != "MASS":
+        expected = f"{', '.join(known)}, MASS; of others {INSTEAD.partition(', or ')[2]}"
+        raise block.refuse(f"elements of type {kind}", expected)
+    size = len(known[kind].places) if kind in known else 1
+    own: dict[int, None] = {}
+    gathered: list[int] = []
+    for number, found in block.whole_numbers():
+        gathered += found
+        if len(gathered) > size:
+            if gathered[0] in deck.elements:
+                raise block.refuse(f"element {gathered[0]} is there twice", "one", number)
+            if len(gathered) > size + 1:
+                what = f"element {gathered[0]} has too many nodes"
+                raise block.refuse(what, f"{size} nodes of {kind}", number)
+            deck.elements[gathered[0]] = kind, tuple(gathered[1:])
+            own[gathered[0]] = None
+            gathered = []
+    if gathered:
+        raise block.refuse(f"element {gathered[0]} lacks nodes", f"{size} nodes of {kind}")
+    if name := block.options.get("ELSET"):
+        deck.named.setdefault(name.upper(), name)
+        deck.sets.setdefault(name.upper(), {}).update(own)
+
+
+def _set(deck: SolidDeck, block: _Block) -> None:
+    of_elements = block.keyword == "ELSET"
+    known = deck.sets if of_elements else deck.node_sets
+    name = block.option(block.keyword)
+    deck.named.setdefault(name, block.options[block.keyword])
+    own = known.setdefault(name, {})
+    if "GENERATE" in block.options:
+        for number, found in block.whole_numbers():
+            if len(found) not in {2, 3} or found[-1] < 1:
+                raise block.refuse("GENERATE", "first, last, step", number)
+            own.update(dict.fromkeys(range(found[0], found[1] + 1, *found[2:])))
+        return
+    for number, cells in block.lines:
+        for cell in filter(None, cells):
+            own.update(_members(known, cell, block, number))
+
+
+def _members(
+    known: dict[str, dict[int, None]], cell: str, block: _Block, number: int
+) -> dict[int, None]:
+    """Return the numbers that a cell names: one, or those of a set."""
+    word = cell.rpartition(".")[2].strip('"')
+    if word.isdecimal():
+        return {int(word): None}
+    if word.upper() not in known:
+        raise block.refuse(f"no set {word[:40]!r}", "a number, or a set defined above it", number)
+    return known[word.upper()]
+
+
+def _material(deck: SolidDeck, block: _Block) -> None:
+    deck.materials[block.option("NAME")] = [np.nan] * 3
+
+
+def _elastic(deck: SolidDeck, block: _Block) -> None:
+    if block.options.get("TYPE", "ISO").upper() not in {"ISO", "ISOTROPIC"}:
+        raise block.refuse(f"*ELASTIC of type {block.options['TYPE']}", "TYPE=ISO")
+    _last_material(deck, block)[:2] = block.first_numbers(2)
+
+
+def _density(deck: SolidDeck, block: _Block) -> None:
+    _last_material(deck, block)[2:] = block.first_numbers(1)
+
+
+def _last_material(deck: SolidDeck, block: _Block) -> list[float]:
+    if not deck.materials:
+        raise block.refuse(f"*{block.keyword} of no material", "*MATERIAL above it")
+    return next(reversed(deck.materials.values()))
+
+
+def _section(deck: SolidDeck, block: _Block) -> None:
+    name = block.option("ELSET")
+    deck.sections.pop(name, None)
+    deck.sections[name] = block.option("MATERIAL")
+
+
+def _mass(deck: SolidDeck, block: _Block) -> None:
+    deck.masses[block.option("ELSET")] = block.first_numbers(1)[0]
+
+
+def _boundary(deck: SolidDeck, block: _Block) -> None:
+    for number, cells in block.lines:
+        found = _members(deck.node_sets, cells[0], block, number)
+        word = cells[1].upper() if len(cells) > 1 else ""
+        along: Sequence[int] = _HELD.get(word, ())
+        if not along:
+            ends = [cell for cell in cells[1:3] if cell]
+            if not ends or not all(end.isdecimal() for end in ends):
+                what = f"{','.join(cells)[:40]!r} below *BOUNDARY"
+                raise block.refuse(what, "node or set, first and last direction", number)
+            along = range(int(ends[0]) - 1, int(ends[-1]))
+        deck.held.update((node, d) for node in found for d in along if d < 3)
+
+
+_READ = {
+    "ELEMENT": _element, "ELSET": _set, "NSET": _set, "MATERIAL": _material, "ELASTIC": _elastic,
+    "DENSITY": _density, "SOLIDSECTION": _section, "MASS": _mass, "BOUNDARY": _boundary,
+    "INSTANCE": _instance,
+}  # fmt: skip
+
+
+def _materials(deck: SolidDeck) -> dict[int, str]:
+    """Return the material of every solid element by number."""
+    found: dict[int, str] = {}
+    for name, material in deck.sections.items():
+        values = deck.materials.get(material)
+        if values is None or name not in deck.sets:
+            what = f"no {'material ' + material if values is None else 'set ' + name}"
+            raise InputError(what, file=deck.path, expected="what *SOLID SECTION names")
+        for key, value in zip(("modulus", "Poisson's ratio", "density"), values, strict=True):
+            if not np.isfinite(value):
+                what, expected = f"material {material} has no {key}", "*ELASTIC and *DENSITY"
+                raise InputError(what, file=deck.path, expected=expected)
+        found |= dict.fromkeys(deck.sets[name], material)
+    solid = {n for n, (kind, _) in deck.elements.items() if kind in solid_elements.KINDS}
+    if not solid or (lost := solid - found.keys()):
+        what = f"element {min(lost)} has no section" if solid else "no elements"
+        raise InputError(what, file=deck.path, expected="*ELEMENT and *SOLID SECTION")
+    return {number: found[number] for number in solid}

@@ -1,0 +1,194 @@
+"""Models of solids from an input file alone: matrices of CalculiX, sets as groups, refusals."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+
+import femubench
+from femubench import InputError, Model, fem
+from femubench.fem import FloatArray, MatrixGeometry
+from femubench.plugins.readers.solid_elements import KINDS
+
+CCX = shutil.which("ccx")
+PLATES = Path(__file__).parents[1] / "examples" / "plates"
+SECTION = """*MATERIAL, NAME=steel
+*ELASTIC
+2.1e11, 0.3
+*DENSITY
+7850.
+*SOLID SECTION, ELSET=all, MATERIAL=steel
+"""
+# Two bricks one upon the other, held below.
+COLUMN = """*NODE
+1,0,0,0
+2,1,0,0
+3,1,1,0
+4,0,1,0
+5,0,0,1
+6,1,0,1
+7,1,1,1
+8,0,1,1
+9,0,0,2
+10,1,0,2
+11,1,1,2
+12,0,1,2
+*ELEMENT, TYPE=C3D8, ELSET=all
+1, 1,2,3,4,5,6,7,8
+2, 5,6,7,8,9,10,
+11,12
+*ELSET, ELSET=upper
+2
+*NSET, NSET=foot, GENERATE
+1, 4, 1
+*BOUNDARY
+foot, 1, 3
+"""
+
+
+def element_of(kind: str, places: FloatArray) -> str:
+    """Return an input file of one element that hangs free."""
+    numbers = ",".join(map(str, range(len(places) + 1)[1:]))
+    rows = [f"{i + 1}," + ",".join(map(repr, map(float, p))) for i, p in enumerate(places)]
+    cells = f"1,{numbers}".split(",")
+    lines = [",".join(cells[i : i + 10]) for i in range(0, len(cells), 10)]
+    text = "\n".join(["*NODE", *rows, f"*ELEMENT, TYPE={kind}, ELSET=all", ",\n".join(lines)])
+    return f"{text}\n{SECTION}"
+
+
+def read(folder: Path, text: str) -> Model:
+    """Return the model of an input file."""
+    (folder / "job.inp").write_text(text)
+    return femubench.read_model(folder / "job.inp")
+
+
+def rows_of(model: Model) -> list[tuple[str, str]]:
+    geometry = model.geometry
+    assert isinstance(geometry, MatrixGeometry)
+    nodes = [geometry.names[node] for node in model.dofs.node]
+    return list(zip(nodes, model.dofs.direction, strict=True))
+
+
+def dense(model: Model, rows: Iterable[tuple[str, str]]) -> tuple[FloatArray, FloatArray]:
+    """Return stiffness and mass in the order of rows, those of inner nodes condensed."""
+    own = rows_of(model)
+    at = [own.index(row) for row in rows]
+    inner = [i for i in range(model.size) if i not in at]
+    stiffness = model.stiffness.toarray()
+    coupling = stiffness[np.ix_(inner, at)]
+    condensed = coupling.T @ la.solve(stiffness[np.ix_(inner, inner)], coupling) if inner else 0.0
+    return stiffness[np.ix_(at, at)] - condensed, model.mass.toarray()[np.ix_(at, at)]
+
+
+@pytest.mark.skipif(CCX is None, reason="CalculiX is not there")
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_distorted_element_has_the_matrices_of_calculix(kind: str, tmp_path: Path) -> None:
+    """Also with curved edges, and one whose inner modes are condensed."""
+    places = KINDS[kind].places * [1.0, 0.8, 0.5]
+    places += np.random.default_rng(5).normal(0.0, 0.03, places.shape)
+    step = "*STEP\n*FREQUENCY, SOLVER=MATRIXSTORAGE\n1\n*END STEP\n"
+    own = read(tmp_path, element_of(kind, places) + step)
+    subprocess.run([str(CCX), "job"], cwd=tmp_path, capture_output=True, check=False)
+    assert (tmp_path / "job.sti").exists()
+    theirs = femubench.read_model(tmp_path / "job.inp")
+    for a, b in zip(dense(own, rows_of(own)), dense(theirs, rows_of(own)), strict=True):
+        assert abs(a - b).max() < 1e-12 * abs(b).max()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_element_has_the_mass_of_its_volume_and_six_motions_without_force(
+    kind: str, tmp_path: Path
+) -> None:
+    model = read(tmp_path, element_of(kind, KINDS[kind].places * [0.2, 0.1, 0.3]))
+    volume = 0.2 * 0.1 * 0.3 / (6.0 if len(KINDS[kind].corners) == 4 else 1.0)
+    along_z = np.array([d == "z" for d in model.dofs.direction], dtype=float)
+    assert along_z @ model.mass @ along_z == pytest.approx(7850.0 * volume, rel=1e-12)
+    values = la.eigvalsh(model.stiffness.toarray())
+    assert (abs(values[:6]) < 1e-9 * values[-1]).all()
+    # The reduced brick has six more, which its neighbours hold.
+    assert (values[12:] > 1e-6 * values[-1]).all()
+
+
+def test_sets_of_elements_are_groups_and_supports_take_their_rows(tmp_path: Path) -> None:
+    model = read(tmp_path, COLUMN + SECTION)
+    assert model.size == 24
+    assert set(model.groups) == {"upper", "rest"}
+    parts = sum(part.toarray() for part in model.groups.values())
+    np.testing.assert_allclose(parts, model.stiffness.toarray())
+    upper = np.flatnonzero(model.groups["upper"].toarray().any(axis=1))
+    assert len(upper) == 24
+    held = read(tmp_path, COLUMN.replace("foot, 1, 3", "foot, PINNED\n12, 3") + SECTION)
+    assert held.size == 23
+
+
+def test_a_part_of_abaqus_is_read_like_a_flat_file(tmp_path: Path) -> None:
+    node, rest = COLUMN.partition("*NSET")[::2]
+    mass = "*ELEMENT, TYPE=MASS, ELSET=tip\n3, 12\n*MASS, ELSET=tip\n7.0\n"
+    part = f"*HEADING\n*PART, NAME=p\n{node}{mass}*SOLID SECTION, ELSET=all, MATERIAL=steel\n,\n"
+    text = (
+        f"{part}*END PART\n*ASSEMBLY, NAME=a\n*INSTANCE, NAME=p-1, PART=p\n*END INSTANCE\n"
+        f"*NSET{rest.partition('*BOUNDARY')[0]}*END ASSEMBLY\n"
+        f"{SECTION.partition('*SOLID')[0]}*BOUNDARY\nfoot, ENCASTRE\n"
+    )
+    flat, model = read(tmp_path, COLUMN + SECTION), read(tmp_path, text)
+    assert abs(model.stiffness - flat.stiffness).max() == 0.0
+    assert (model.mass - flat.mass).diagonal().sum() == pytest.approx(21.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "match"),
+    [
+        ("TYPE=C3D8,", "TYPE=S4,", "elements of type S4.*C3D20R.*MATRIXSTORAGE"),
+        ("*ELSET, ELSET=upper", "*TIE, NAME=glue\nupper, all\n*ELSET, ELSET=upper", "TIE is not"),
+        ("*DENSITY\n7850.\n", "", "STEEL has no density"),
+        ("2, 5,6,7,8,9,10,\n11,12", "2, 9,10,11,12,5,6,\n7,8", "element 2 is turned inside out"),
+        ("12,0,1,2\n", "", "node 12 of an element has no place"),
+        ("2, 5,6,7,8,9,10,\n11,12", "2, 5,6", "element 2 lacks nodes"),
+        ("2, 5,6", "1, 5,6", "element 1 is there twice"),
+        ("ELSET=all, MATERIAL", "ELSET=upper, MATERIAL", "element 1 has no section"),
+        ("MATERIAL=steel", "MATERIAL=brass", "no material BRASS"),
+        ("foot, 1, 3", "feet, 1, 3", "no set 'feet'"),
+        ("foot, 1, 3", "foot, left", "first and last direction"),
+        ("*ELASTIC\n", "*ELASTIC, TYPE=ORTHO\n", "TYPE=ISO"),
+        ("2.1e11, 0.3", "steel, 0.3", "2 numbers"),
+        ("*NSET", "*INSTANCE, NAME=p\n5., 0., 0.\n*NSET", "parts that are moved"),
+    ],
+)
+def test_what_is_not_read_is_refused_with_the_reason(
+    old: str, new: str, match: str, tmp_path: Path
+) -> None:
+    text = COLUMN + SECTION
+    assert text.count(old) == 1
+    with pytest.raises(InputError, match=match):
+        read(tmp_path, text.replace(old, new))
+
+
+def test_an_updated_model_is_a_deck_with_a_material_for_each_group(tmp_path: Path) -> None:
+    source = PLATES / "plates.inp"
+    model = femubench.read_model(source, unit="mm")
+    assert set(model.groups) == {"PLATES", "LEFT", "RIGHT"}
+    assert model.group_kinds == {"LEFT": "joint", "RIGHT": "joint"}
+    factors = [fem.Property(n, "E", (f"group:{n}",)) for n in ("LEFT", "PLATES")]
+    updated = fem.with_group_factors(model, factors, [0.4, 1.02])
+    femubench.write_model(updated, tmp_path, like=source, unit="mm")
+    assert [file.name for file in tmp_path.iterdir()] == ["plates.inp"]
+    again = femubench.read_model(tmp_path / "plates.inp", unit="mm")
+    assert set(again.groups) == set(model.groups)
+    assert abs(again.stiffness - updated.stiffness).max() < 1e-12 * updated.stiffness.max()
+    assert abs(again.mass - model.mass).max() < 1e-12 * model.mass.max()
+
+
+def test_a_model_that_no_factor_makes_is_written_as_matrices(tmp_path: Path) -> None:
+    (tmp_path / "new").mkdir()
+    model = read(tmp_path, COLUMN + SECTION)
+    changed = model.stiffness.copy()
+    changed[0, 0] *= 1.5
+    other = fem.matrix_model(model.mass, changed, *zip(*rows_of(model), strict=True))
+    femubench.write_model(other, tmp_path / "new", like=tmp_path / "job.inp")
+    assert {file.suffix for file in (tmp_path / "new").iterdir()} == {".sti", ".mas", ".dof"}
