@@ -241,7 +241,7 @@ class TestNaming:
         assert {h.name for h in shortlist} > {effect.name for effect in KNOWN}
 
     def test_a_model_of_matrices(self, model: Model) -> None:
-        """Groups of a stiffness matrix, no elements, no tolerances."""
+        """Groups of a stiffness matrix, no elements, no tolerances, no model error."""
         n = model.size
         xyz = np.column_stack([np.arange(n, dtype=float), np.zeros((n, 2))])
         dofs = Dofs(np.arange(n), ("z",) * n, xyz)
@@ -260,7 +260,7 @@ class TestNaming:
         rng = np.random.default_rng(3)
         measurement = measured(truth, sensors, USED + HELD_OUT, rng)
         used, held_out = tuple(range(1, USED + 1)), tuple(range(USED + 1, USED + HELD_OUT + 1))
-        case = Case("case", "", "", Path(), bare, measurement, used, held_out)
+        case = Case("case", "", "", Path(), bare, measurement, used, held_out, model_error=0.0)
         diagnosis = diagnose(case, [MemberStiffness(), YoungsModulus()], pairs=False)
         assert [(c.effect, c.place) for c in diagnosis.causes] == [
             ("member-stiffness", "group:rung")

@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal
 
 from femubench import Model
 from femubench.core.challenge.structures import structure_named
-from femubench.core.diagnosis.tables import _passengers
+from femubench.core.diagnosis.tables import find_passengers
 from femubench.core.fem.frame import Factor, JointSpring, Place
 from femubench.core.fit.modal_fit import Problem, State, fit, state_at
 from femubench.core.fit.noise import Noise
@@ -247,14 +247,13 @@ def test_a_cause_whose_size_may_be_nothing_is_a_passenger(problem: Problem) -> N
     present = replace(problem, offset=-state_at(problem, parts, x).raw)
     found = fit(present, parts, x)
     assert found is not None
-    explanation = Explanation(Base((), 0.0), found, 1)
     size = np.abs(found.state.x)
     for spread, expected in (
         (0.1 * size, [False, False]),
         (size * (0.1, 0.6), [False, True]),
         (size, [False, False]),  # never the only one
     ):
-        assert _passengers(explanation, spread) == expected
+        assert find_passengers(found.state, spread) == expected
 
 
 def test_unseen_data_lie_within_what_is_foreseen(

@@ -30,6 +30,7 @@ PART_OF = {"pydantic_core": "pydantic", "markupsafe": "jinja2", "pyoma2": "pyoma
     "ansys": "ansys_mapdl_reader",
     "sksparse": "scikit_sparse",
     "dask": "distributed",
+    "skfem": "scikit_fem",
 }
 RUN = """
 import sys

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.core.case.modes import NO_SENSORS, with_default_std
+from femubench.core.case.modes import NO_SENSORS
 from femubench.core.challenge.structures import Specimen, sensors_on
 from femubench.core.challenge.truth import DataKind
 from femubench.core.errors import ModelError
@@ -134,7 +134,7 @@ def record(
         shapes = shapes + quality.shape_std * noise[1]
     if shapes_up_to is not None:
         shapes[:, shapes_up_to : quality.used] = np.nan
-    std = with_default_std(shapes, np.full(shapes.shape, np.nan), quality.shape_std)
+    std = np.where(np.isnan(shapes), np.nan, quality.shape_std)
     return Measurement(
         sensors=sensors,
         numbers=tuple(range(1, len(frequencies) + 1)),

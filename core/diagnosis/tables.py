@@ -211,7 +211,9 @@ def find_passengers(state: State, spread: FloatArray) -> list[bool]:
         return [False] * len(parts)
     ends = np.cumsum([len(part.hypothesis.parameters) for part in parts])
     pieces = np.split(state.x, ends[:-1])
-    sized = np.split(np.abs(state.x) > settings.notable_deviations * spread, ends[:-1])
+    # The arm of a joint spring is there however stiff it is.
+    rigid = [p.scaling == "compliance" for part in parts for p in part.hypothesis.parameters]
+    sized = np.split(rigid | (np.abs(state.x) > settings.notable_deviations * spread), ends[:-1])
     found = []
     for k in range(len(parts)):
         rest = np.concatenate([x for j, x in enumerate(pieces) if j != k])
