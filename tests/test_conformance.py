@@ -330,7 +330,7 @@ def test_pytest_runs_checks_without_any_test_file(tmp_path: Path) -> None:
     assert "Traceback" not in found.stdout
 
 
-@pytest.mark.slow(5)
+@pytest.mark.nightly
 def test_pytest_without_the_option_does_nothing(tmp_path: Path) -> None:
     assert run_pytest(tmp_path).returncode == 5
     unknown = run_pytest(tmp_path, "--femubench", "god")

@@ -241,7 +241,7 @@ def timed(script: Path) -> float:
 
 @pytest.mark.slow(40)
 @pytest.mark.parametrize(
-    ("kills", "jobs"), [(4, 32), pytest.param(50, 104, marks=pytest.mark.nightly)]
+    ("kills", "jobs"), [(3, 16), pytest.param(50, 104, marks=pytest.mark.nightly)]
 )
 def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(
     kills: int, jobs: int, tmp_path: Path

@@ -56,11 +56,11 @@ def unfolded(page: Any) -> None:
     ("name", "scheme"),
     [
         ("board", "light"),
-        ("diagnosis", "dark"),
-        ("compared", "light"),
         *(
             pytest.param(name, scheme, marks=pytest.mark.nightly)
             for name, scheme in (
+                ("diagnosis", "dark"),
+                ("compared", "light"),
                 # A change of the whole matrix, and one element by element.
                 ("hframe", "dark"),
                 ("frame", "light"),

@@ -245,6 +245,7 @@ def test_intervals_of_a_part_are_over_its_structures(
         assert intervals()[name] == pytest.approx(ends, abs=0.05), name
 
 
+@pytest.mark.nightly
 def test_both_nominal_models_stand_side_by_side(
     view: Callable[..., Any], command: Callable[..., str], tmp_path: Path
 ) -> None:

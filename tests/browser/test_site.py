@@ -77,7 +77,11 @@ def test_axe_finds_nothing_serious(
 
 
 @pytest.mark.parametrize(
-    ("which", "kind"), [("large", "index"), *(("hostile", kind) for kind in KINDS)]
+    ("which", "kind"),
+    [
+        pytest.param("large", "index", marks=pytest.mark.nightly),
+        *(("hostile", kind) for kind in KINDS),
+    ],
 )
 def test_a_small_screen_scrolls_no_chart(
     request: pytest.FixtureRequest, view: Callable[..., Any], which: str, kind: str
