@@ -187,7 +187,8 @@ class TestEveryCommandOfTheReadme:
         assert Path("ours/case.toml").read_text() == Path("theirs/case.toml").read_text().replace(
             "theirs", "ours"
         )
-        call("update", "theirs", "-s", "global", "-o", "updated")
+        printed = call("update", "theirs", "-s", "global", "-o", "updated")
+        assert ": 1 → 1.103" in printed.output
         case = femubench.read_case("ours")
         result = femubench.strategies["global"].update(
             case.model, case.used_measurement(), np.random.default_rng(0)

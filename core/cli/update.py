@@ -24,14 +24,17 @@ from femubench.core.cli.registry import plugins_for
 )  # fmt: skip
 @click.pass_context
 def update(ctx: click.Context, case: str, strategy: str, seed: int, output: Path) -> None:
-    """Write the updated model of CASE in the format that it came in."""
+    """Write the updated model of CASE in the format that it came in, and print what changed."""
     from femubench.core.files import check_new
     from femubench.core.library.models import update_case, write_updated
 
     check_new(output)
     plugins = plugins_for(ctx)
-    read, model = update_case(case, strategy, seed, plugins)
+    read, model, parameters = update_case(case, strategy, seed, plugins)
     write_updated(read, model, output, plugins)
+    for p in parameters:
+        spread = "" if p.std is None else f" ± {p.std:.2g}"
+        click.echo(f"{p.name}: {p.before:.4g} → {p.after:.4g}{spread} {p.unit}".rstrip())
     for path in sorted(output.rglob("*")):
         if path.is_file():
             click.echo(f"wrote {path}")

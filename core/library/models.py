@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -100,8 +102,10 @@ def _readers(unit: LengthUnit) -> tuple[Reader, ...]:
     return tuple(usable_plugins().readers.values())
 
 
-def update_case(case: CaseLike, strategy: str, seed: int, plugins: Plugins) -> tuple[Case, Model]:
-    """Return a case and its model as a strategy updates it, from the model as drawn.
+def update_case(
+    case: CaseLike, strategy: str, seed: int, plugins: Plugins
+) -> tuple[Case, Model, Sequence[Any]]:
+    """Return a case, its model as a strategy updates it, from the drawn one, and its parameters.
 
     Arguments:
         case: a name or a folder.
@@ -125,7 +129,7 @@ def update_case(case: CaseLike, strategy: str, seed: int, plugins: Plugins) -> t
     except (NotApplicable, StrategyFailure) as fault:
         raise InputError(f"{strategy} gives no model: {fault}", file=read.folder) from fault
     assert isinstance(result.model, Model)
-    return read, result.model
+    return read, result.model, result.parameters
 
 
 def write_updated(case: Case, model: Model, folder: Path, plugins: Plugins) -> None:
