@@ -13,6 +13,10 @@ import scipy.linalg as la
 
 import femubench
 from femubench import InputError, Model, fem
+from femubench.core.case.faults import BadKey
+from femubench.core.case.files import CaseFiles
+from femubench.core.case.matrices import with_groups
+from femubench.core.case.schema import GroupSpec
 from femubench.fem import FloatArray, MatrixGeometry
 from femubench.plugins.readers.solid_elements import KINDS
 
@@ -127,6 +131,18 @@ def test_sets_of_elements_are_groups_and_supports_take_their_rows(tmp_path: Path
     assert held.size == 23
 
 
+def test_a_group_of_the_file_takes_a_kind_by_its_name_alone(tmp_path: Path) -> None:
+    model = read(tmp_path, COLUMN + SECTION)
+    (tmp_path / "case.toml").touch()
+    files = CaseFiles(tmp_path)
+    specs = [GroupSpec(name="upper", kind="joint", prior=3.0)]
+    found = with_groups(model, specs, files, ())
+    assert (found.group_kinds, found.group_priors) == ({"upper": "joint"}, {"upper": 3.0})
+    assert set(found.groups) == {"upper", "rest"}
+    with pytest.raises(BadKey, match="a group without a part"):
+        with_groups(model, [GroupSpec(name="lower")], files, ())
+
+
 def test_a_part_of_abaqus_is_read_like_a_flat_file(tmp_path: Path) -> None:
     node, rest = COLUMN.partition("*NSET")[::2]
     mass = "*ELEMENT, TYPE=MASS, ELSET=tip\n3, 12\n*MASS, ELSET=tip\n7.0\n"
@@ -192,3 +208,17 @@ def test_a_model_that_no_factor_makes_is_written_as_matrices(tmp_path: Path) -> 
     other = fem.matrix_model(model.mass, changed, *zip(*rows_of(model), strict=True))
     femubench.write_model(other, tmp_path / "new", like=tmp_path / "job.inp")
     assert {file.suffix for file in (tmp_path / "new").iterdir()} == {".sti", ".mas", ".dof"}
+
+
+@pytest.mark.nightly
+def test_the_soft_joint_of_the_plates_is_named_from_deck_and_test_alone(tmp_path: Path) -> None:
+    """The test is of a finer mesh with a left joint of 0.4 of the stiffness."""
+    femubench.init_case(tmp_path / "case", PLATES / "plates.inp", PLATES / "test.unv")
+    found = femubench.diagnose(tmp_path / "case")
+    assert found.verdict == "named"
+    assert [(cause.effect, cause.place) for cause in found.causes] == [
+        ("member-stiffness", "group:LEFT")
+    ]
+    (size,) = found.causes[0].parameters
+    assert size.std is not None
+    assert abs(size.value + 0.6) < 2.0 * size.std
