@@ -24,7 +24,7 @@ from femubench.core.cli.registry import plugins_for
 )  # fmt: skip
 @click.pass_context
 def update(ctx: click.Context, case: str, strategy: str, seed: int, output: Path) -> None:
-    """Write the updated model of CASE in the format that it came in, and print what changed."""
+    """Write the updated model of CASE in the format that it came in."""
     from femubench.core.files import check_new
     from femubench.core.library.models import update_case, write_updated
 
