@@ -168,12 +168,13 @@ def reading_with(reader: Reader, file: Path) -> Iterator[None]:
     """Turn whatever a reader plugin raises into one line that names it and the file.
 
     What it may take of memory grows with the file, whatever the file claims to hold; a reader whose
-    files are small for what they describe has `read_memory(file)`, in bytes.
+    files are small for what they describe has `read_memory(file)`, in bytes, None for as usual.
     """
     size = file.stat().st_size if file.is_file() else 0
     try:
         own = getattr(reader, "read_memory", None)
-        with limit_memory(_MEMORY + (own(file) if own else _PER_BYTE * size)):
+        needed = own(file) if own else None
+        with limit_memory(_MEMORY + (_PER_BYTE * size if needed is None else needed)):
             yield
     except ModelError as error:
         raise InputError(

@@ -25,7 +25,6 @@ from femubench.plugins.readers.solid_deck import read_solids, write_factors
 _KIND = "row, column, value as *FREQUENCY, SOLVER=MATRIXSTORAGE stores them"
 _LABELS = "node.direction for every row, directions 1 to 6"
 _MOST_ROWS = 1_000_000
-_PER_BYTE = 64  # of memory for one of a file with a matrix
 
 
 class CalculixReader(ProgramReader):
@@ -67,10 +66,10 @@ class CalculixReader(ProgramReader):
         further = nodes.list_included(job[0])
         return tuple(f for f in (*job, *further, *_groups(path).values()) if f != path)
 
-    def read_memory(self, path: Path) -> int:
-        """Return the bytes that reading takes: a line of a deck is a full matrix of an element."""
+    def read_memory(self, path: Path) -> int | None:
+        """Return the bytes that a deck takes, whose lines are full matrices of elements."""
         if not _is_deck(path):
-            return _PER_BYTE * path.stat().st_size
+            return None
         files = (path, *nodes.list_included(path))
         return solid_elements.BYTES * sum(file.stat().st_size for file in files)
 

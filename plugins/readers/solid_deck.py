@@ -52,10 +52,13 @@ class SolidDeck:
     masses: dict[str, float] = field(default_factory=dict)
     held: set[tuple[int, int]] = field(default_factory=set)
 
+    def solids(self) -> list[int]:
+        """Return the elements that are no point masses."""
+        return [n for n, (kind, _) in self.elements.items() if kind in solid_elements.KINDS]
+
     def groups(self) -> dict[str, list[int]]:
         """Return the solid elements by group: the smallest sets that share none, and the rest."""
-        solid = [n for n, (kind, _) in self.elements.items() if kind in solid_elements.KINDS]
-        left, found = dict.fromkeys(solid), {}
+        left, found = dict.fromkeys(self.solids()), {}
         for name in sorted(self.sets, key=lambda name: (len(self.sets[name]), name)):
             own = self.sets[name]
             if own and all(number in left for number in own):
@@ -83,9 +86,15 @@ def read_solids(path: Path) -> Model:
     Raises:
         InputError: as `read_deck`, and for elements without material, density or volume.
     """
+    deck = read_deck(path)
+    return _model_of(deck, _materials(deck))
+
+
+def _model_of(deck: SolidDeck, material: Mapping[int, str]) -> Model:
+    """Return the model of a deck whose solid elements have these materials."""
+    path = deck.path
     needs("skfem", "solids", path)
-    deck, places = read_deck(path), nodes.read_nodes(path)
-    material = _materials(deck)
+    places = nodes.read_nodes(path)
     used = dict.fromkeys(n for _, own in deck.elements.values() for n in own)
     if lost := [n for n in used if str(n) not in places]:
         raise InputError(f"node {lost[0]} of an element has no place", file=path, expected="*NODE")
@@ -157,8 +166,9 @@ def write_factors(model: Model, path: Path, original: Path) -> bool:
     Raises:
         InputError: as `read_solids`.
     """
-    deck, before = read_deck(original), read_solids(original)
+    deck = read_deck(original)
     material = _materials(deck)
+    before = _model_of(deck, material)
     groups = deck.groups() or {REST: list(material)}
     parts = before.groups or {REST: before.stiffness}
     whole = model.groups if before.groups else {REST: model.stiffness}
@@ -394,7 +404,7 @@ def _materials(deck: SolidDeck) -> dict[int, str]:
                 what, expected = f"material {material} has no {key}", "*ELASTIC and *DENSITY"
                 raise InputError(what, file=deck.path, expected=expected)
         found |= dict.fromkeys(deck.sets[name], material)
-    solid = {n for n, (kind, _) in deck.elements.items() if kind in solid_elements.KINDS}
+    solid = set(deck.solids())
     if not solid or (lost := solid - found.keys()):
         what = f"element {min(lost)} has no section" if solid else "no elements"
         raise InputError(what, file=deck.path, expected="*ELEMENT and *SOLID SECTION")
