@@ -20,6 +20,7 @@ from femubench.core.fit.modal_fit import fit
 from femubench.core.inference.examine import examine
 from femubench.core.inference.posterior import Explanation, Posterior
 from femubench.core.inference.prior import log_prior, textbook_bases
+from femubench.core.inference.search import Search
 from femubench.core.inference.settings import settings
 from femubench.effect import FrameEffect, Parameter
 from femubench.fem import Frame, PointMass
@@ -265,3 +266,22 @@ def test_causes_that_do_not_go_together_are_no_explanation() -> None:
     found = fit(problem, parts, high, steps=0)
     assert found is not None
     assert check_joint_fit(found) is None
+
+
+def test_causes_found_on_one_textbook_set_are_tried_on_the_others() -> None:
+    """Without what the explanation fits of its own set, which is no cause on another."""
+    known = effects_named("shear-deformation", "added-mass")
+    problem = problem_of(MODEL, measured(MODEL, FRAME), known)
+    search = Search(problem, known)
+    drawn, sheared = textbook_bases(problem.space.projections)
+    found = [search.on(base) for base in (drawn, sheared)]
+    own = found[1].problem
+    parts = [part_at(own, "added-mass", "J5"), part_at(own, "shear-deformation", "all")]
+    led = fit(own, parts, np.array([0.3, -1.0]))
+    assert led is not None
+    (carried,) = search.carry(Explanation(sheared, led, 2), found)
+    assert (carried.base, carried.searched, carried.place) == (drawn, ("added-mass",), "J5")
+    part = part_at(problem, "added-mass", "J5")
+    alone = fit(problem, (part,), np.array([0.3]))
+    assert alone is not None
+    assert carried.chi2 == pytest.approx(alone.state.chi2, rel=1e-6)

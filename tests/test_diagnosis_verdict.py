@@ -15,12 +15,14 @@ from femubench import Case, Diagnosis, InputError, Measurement, Model, diagnose
 from femubench.core.case.modes import NO_SENSORS
 from femubench.core.challenge.structures import structure_named
 from femubench.core.change.hypothesis import by_themselves
+from femubench.core.diagnosis import proof
 from femubench.core.diagnosis.scatter import scatter_rows
 from femubench.core.diagnosis.verdict import (
     Decision,
     Sufficiency,
     angle_between,
     decide,
+    fitted_otherwise,
     inseparable,
     most_believed,
 )
@@ -120,7 +122,7 @@ def test_both_tails_of_chi_square_are_said_with_their_numbers(data: Data) -> Non
 # --- decisions --------------------------------------------------------------------------------
 
 
-NO_SHAPES = SimpleNamespace(scale_count=0, measurement=(), shape_rows=((), ()))
+NO_SHAPES = SimpleNamespace(scale_count=0, measurement=(), shape_rows=(np.zeros(0), np.zeros(0)))
 
 
 def explained(
@@ -152,6 +154,7 @@ def explained(
                 x=np.zeros(len(names)),
                 residual=np.full(data, np.sqrt(chi2 / data)),
                 problem=SimpleNamespace(data=NO_SHAPES),
+                partner=(),
             ),
             log_evidence=float(np.log(probability)),
         ),
@@ -246,6 +249,19 @@ def test_what_unseen_data_bear_out_stands_first() -> None:
     assert decision.angles == pytest.approx((0.0, 90.0))
 
 
+def test_what_unseen_data_refute_at_its_textbook_value_is_tried_as_fitted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    book = explained((), 0.7, chi2=57.0, book=("a",))
+    fitted, plain = explained(("a",), 0.2, chi2=53.0), explained((), 0.01, chi2=66.0)
+    found = posterior(book, fitted, plain)
+    assert (found.key(book), fitted_otherwise(found, book)) == (("a",), [fitted])
+    seen: Any = SimpleNamespace(posterior=found, best=book)
+    for borne in (fitted, None):
+        monkeypatch.setattr(proof, "_judged", lambda case, seen, e, b=borne: (e is b, 0.0))
+        assert proof.find_held(None, seen) is borne  # type: ignore[arg-type]
+
+
 def test_a_group_covers_nearly_all_that_is_not_nothing() -> None:
     """Whatever the angles: those are in the evidence."""
     for share, expected in ((0.9, "ambiguous"), (0.96, "named")):
@@ -303,12 +319,12 @@ def test_textbook_physics_in_all_that_is_left_is_named_whatever_else_is_there() 
 
 
 def test_a_cause_that_some_names_lack_is_not_named_for_sure() -> None:
-    """Neither where they share nothing, nor where what they share is the smaller part."""
-    nothing = explained((), 1e-6, chi2=1000.0)
+    """Neither where they share nothing, nor where what they share leaves more than noise."""
+    nothing = explained((), 1e-6, chi2=1e4)
     apart = posterior(nothing, explained(("b",), 0.5), explained(("c",), 0.5, direction=ACROSS))
     weak = posterior(
         nothing,
-        explained(("a",), 0.01, chi2=900.0),
+        explained(("a",), 0.01, chi2=120.0),
         explained(("a", "b"), 0.5, chi2=60.0),
         explained(("a", "c"), 0.5, chi2=61.0, direction=ACROSS),
     )

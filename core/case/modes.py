@@ -20,7 +20,7 @@ from femubench.core.typing import FloatArray
 FREQUENCY_STD = 0.005  # of the frequency, where the table gives none
 FIT_STD = "fit_std"  # column: deviations of a fit alone, in place of frequency_std
 _SAME_AXIS = 0.999999  # cosine
-_SCALES = 10.0  # a larger ratio of readings is one of scales, not of what sensors see
+LARGEST_SCALE = 10.0  # a larger ratio of readings is one of scales, not of what sensors see
 _MOST_NUMBERS = 20_000_000  # modes times sensors
 NO_SENSORS = Sensors((), np.zeros((0, 3)), ())
 
@@ -125,7 +125,8 @@ def reach(shapes: FloatArray) -> FloatArray:
     """Return the reading of which the deviations of every mode are a share, (m,).
 
     That is the largest of all modes: a mode that the sensors hardly see is not measured the
-    better for it. Modes may have scales of their own, so it is at most `_SCALES` times the mode's.
+    better for it. Modes may have scales of their own, so it is at most `LARGEST_SCALE` times that
+    of the mode.
 
     Arguments:
         shapes: (n_sensors, m), nan where missing; a mode without any shape gets nan.
@@ -133,7 +134,7 @@ def reach(shapes: FloatArray) -> FloatArray:
     own = np.max(np.abs(np.nan_to_num(shapes)), axis=0, initial=0.0)
     own = np.where(own > 0.0, own, np.nan)
     every = np.max(np.nan_to_num(own), initial=0.0)
-    return np.asarray(np.minimum(every, _SCALES * own))
+    return np.asarray(np.minimum(every, LARGEST_SCALE * own))
 
 
 def with_scatter(measurement: Measurement, shares: tuple[float, float]) -> Measurement:

@@ -12,7 +12,7 @@ import scipy.linalg as la
 from scipy.special import chdtrc, logsumexp
 
 from femubench.core.case.case import Case
-from femubench.core.diagnosis.verdict import elsewhere, inseparable
+from femubench.core.diagnosis.verdict import elsewhere, fitted_otherwise, inseparable
 from femubench.core.fem.model import Model
 from femubench.core.fit.discrepancy import Discrepancy
 from femubench.core.fit.extended_model import extend_model, raw_residual
@@ -456,7 +456,7 @@ def find_held(
 
     That is the best guess, unless all data together, used and unseen, speak for another name of
     the group: decisively, or at all where unseen data refute the best guess. Where no name is
-    borne out, it is the same name at a place about as likely, or None.
+    borne out, it is the same name with other sizes fitted or at a place about as likely, or None.
 
     Arguments:
         case: what holds the unseen data.
@@ -469,8 +469,8 @@ def find_held(
     others = inseparable(posterior)[0][1:] if name else ()
     with effort.piece("unseen"):
         first = _judged(case, examination, best)
-    places = elsewhere(posterior, best) if name and not first[0] else []
-    places = places[: settings.largest_group]
+    places = [*fitted_otherwise(posterior, best), *elsewhere(posterior, best)]
+    places = places[: settings.largest_group] if name and not first[0] else []
     effort.expect("unseen", len(others) + len(places))
     rivals = []
     for key in others:

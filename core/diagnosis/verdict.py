@@ -16,6 +16,7 @@ from femubench.core.inference.posterior import (
     Posterior,
     fits_better,
 )
+from femubench.core.inference.search import adequacy
 from femubench.core.inference.settings import settings
 from femubench.core.schema.diagnosis import Verdict
 from femubench.core.ties import alike, by_probability
@@ -114,13 +115,12 @@ def decide(
 
 
 def find_shared(posterior: Posterior, first: Key) -> Key:
-    """Return the causes of a name that nearly all have, where these explain nearly all it does."""
+    """Return the causes of a name that nearly all have, where these alone leave noise."""
     shared = tuple(name for name in first if posterior.inclusion(name) >= settings.nearly_all)
-    core = [e.chi2 for e in posterior.explanations if posterior.key(e) == shared]
-    nothing = posterior.nothing.chi2
-    explained = nothing - min(core, default=np.inf)
-    whole = nothing - posterior.best(first).chi2
-    return shared if explained >= settings.nearly_all * whole else ()
+    shown = tuple(name for name in posterior.best(first).searched if name in shared)
+    core = [e for e, _ in posterior.members(shared) if e.searched == shown]
+    left = (adequacy(e.fit.state, e.unknowns) for e in core)
+    return shared if max(left, default=0.0) > settings.noise_p else ()
 
 
 def most_believed(p: float) -> float:
@@ -220,6 +220,15 @@ def credible(shares: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
         found.append((place, share))
         covered += share
     return tuple(found)
+
+
+def fitted_otherwise(posterior: Posterior, explanation: Explanation) -> list[Explanation]:
+    """Return the same name where what is fitted is taken from a handbook, or the reverse."""
+    found: dict[Key, Explanation] = {}
+    for other, _ in posterior.members(posterior.key(explanation)):
+        if set(other.searched) != set(explanation.searched):
+            found.setdefault(other.searched, other)
+    return list(found.values())
 
 
 def elsewhere(posterior: Posterior, explanation: Explanation) -> list[Explanation]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -130,6 +130,8 @@ class Search:
         explanations += [e for e in bare if e.base.names not in searched]
         if self.pairs and self.names and _best(explanations).log_weight > self.floor:
             explanations += self.combine(found)
+            for best in by_weight(explanations)[: settings.candidates]:
+                explanations += self.carry(best, found)
             self.effort.expect("together", 0)
             self.effort.expect("more", 0)
             for best in by_weight(explanations)[: settings.candidates]:
@@ -144,6 +146,30 @@ class Search:
         state = state_at(*enrich_problem(self.problem, base.parts), base.x)
         alone = replace(state, parts=(), x=np.zeros(0))
         return Explanation(base, Fit(alone, log_evidence(alone)), self.names)
+
+    def carry(self, explanation: Explanation, found: Iterable[Found]) -> list[Explanation]:
+        """Return the causes of an explanation on the other textbook sets, as far as they are none.
+
+        Where a change is large only one set may have led the search to it.
+        """
+        book = explanation.base.names
+        counts = [len(part.hypothesis.parameters) for part in explanation.parts]
+        pairs = zip(
+            (part.hypothesis for part in explanation.parts),
+            np.split(explanation.fit.state.x, np.cumsum(counts)[:-1]),
+            strict=True,
+        )
+        kept = [(_cause_at(h), x) for h, x in pairs if h.name not in book] if counts else []
+        result = []
+        for item in found:
+            known = {_cause_at(p.hypothesis): p for p in item.problem.space.projections}
+            if item.base.names == book or not kept or any(key not in known for key, _ in kept):
+                continue
+            problem, parts = enrich_problem(item.problem, [known[key] for key, _ in kept])
+            fitted = fit(problem, parts, np.concatenate([x for _, x in kept]))
+            if fitted is not None:
+                result.append(Explanation(item.base, fitted, self.names))
+        return result
 
     def split(self, explanation: Explanation) -> list[Explanation]:
         """Return an explanation with more values at one of its places, where there are more."""
@@ -340,6 +366,11 @@ class Search:
                 seed = Explanation(found.base, alone, self.names)
                 result += self.grow(found, seed, tried)
         return result
+
+
+def _cause_at(hypothesis: Hypothesis) -> tuple[str, str, int]:
+    """Return what a cause is called, where it sits and how many values it has."""
+    return hypothesis.name, hypothesis.place, len(hypothesis.parameters)
 
 
 def _first_of_a_name(screened: Sequence[Screened]) -> list[Screened]:

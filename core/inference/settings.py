@@ -16,7 +16,9 @@ from math import inf
 from typing import Literal, TypeVar, cast
 
 from femubench.core.case.case import SCATTER
+from femubench.core.case.modes import LARGEST_SCALE
 from femubench.core.errors import InputError
+from femubench.core.modal.group_prior import KINDS
 
 Kind = Literal["prior", "cost", "decision"]
 Value = float | tuple[float, ...]
@@ -159,6 +161,19 @@ class Settings:
         SCATTER,
         "of frequencies, of shapes",
         "mounting, warmth, who hits: key `scatter` of a case, where one record was identified",
+    )
+    scale_of_readings: float = _prior(
+        LARGEST_SCALE,
+        "ratio of readings",
+        "of two modes; a larger one is no matter of what sensors see",
+    )
+    tolerance_of_groups: tuple[float, ...] = _prior(
+        tuple(kind.std for kind in KINDS.values()),
+        "of ln(factor)",
+        "of parts, joints, supports: within tolerances, loose, hardly known",
+    )
+    stiffest_joint: float = _prior(
+        KINDS["joint"].most, "factor", "a joint is drawn whole and stiffens by a fillet at most"
     )
 
     # Where a verdict begins.
