@@ -19,8 +19,8 @@ from femubench.reports.cells import (
 Data = Mapping[str, Any]
 
 MEANINGS = {
-    "none": "the data show nothing that the model lacks; anything smaller than the sizes listed "
-    "below would not have shown",
+    "none": "the data show nothing beyond noise and what models of this kind get wrong; anything "
+    "smaller than the sizes listed below would not have shown",
     "named": "one explanation stands alone, or all that stand share it",
     "ambiguous": "several explanations stand, and these data cannot tell them apart",
     "unknown": "even the best explanation leaves more than noise: something is missing that no "

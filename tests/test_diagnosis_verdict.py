@@ -422,6 +422,17 @@ def test_a_clean_model_lacks_nothing_and_says_what_it_would_have_seen(clean: Dia
     applicable = {effect.name for effect in known if effect.places(MODEL)}
     assert {row.effect for row in clean.smallest_visible} == applicable
     assert all(row.size > 0.0 for row in clean.smallest_visible)
+    assert "show nothing that the model lacks" in clean.sentence
+
+
+def test_where_models_of_this_kind_are_as_wrong_the_sentence_says_by_how_much() -> None:
+    test = measured(MODEL, FRAME, count=6, shapes=0)
+    off = 1.0 + 0.02 * np.random.default_rng(4).standard_normal(6)
+    case = case_of(MODEL, replace(test, frequencies=off * test.frequencies), 6)
+    found = diagnose(replace(case, model_error=1.0), effects_named("density"))
+    size = found.gain_rms.used_percent[0]
+    assert (found.verdict, size > 1.0) == ("none", True)
+    assert found.sentence.startswith(f"The model is {size:.2g} % off in the used modes (rms), and")
 
 
 @pytest.mark.parametrize("effect", ["added-mass", "joint-rotation"])

@@ -215,7 +215,8 @@ def _written(
         causes = [cause for cause in causes if cause.effect in decision.shared]
         top = sum(p for key, p in posterior.names.items() if set(decision.shared) <= set(key))
     stated = decision, causes, options, top, proof.gain_rms
-    said = sentence_of(*stated, reference=case.reference is not None)
+    bare = posterior.best(()).fit.state.problem.noise
+    said = sentence_of(*stated, reference=case.reference is not None, beam=bare.beam)
     faults = (repaired, loose) if decision.verdict != "unknown" else ([], [])
     named = bool(decision.group)
     nothing = examination.nominal
@@ -362,6 +363,6 @@ def _error_notes(examination: Examination, leader: Explanation) -> tuple[str, ..
     stated = ", ".join(f"{row.name} {100.0 * row.scale:.2g} %" for row in largest)
     return (
         f"What the drawing itself gets wrong, above all: {stated} (standard deviations). That the "
-        "structure is a beam model but for ordinary scatter has probability "
+        "model is right but for ordinary scatter has probability "
         f"{examination.like_a_beam:.2g}.",
     )
