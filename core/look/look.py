@@ -8,7 +8,12 @@ from femubench.core.fem.model import Model
 from femubench.core.look.freedom import look_at_freedom
 from femubench.core.look.mesh import look_at_mesh
 from femubench.core.look.modes import Seen
-from femubench.core.look.readings import look_at_band, look_at_deviations, look_at_sensors
+from femubench.core.look.readings import (
+    look_at_band,
+    look_at_deviations,
+    look_at_sensors,
+    look_at_units,
+)
 from femubench.core.look.theory import look_at_materials, look_at_slenderness
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
@@ -43,7 +48,8 @@ def look(
     if model.structure is not None:
         for part in (look_at_slenderness, look_at_mesh, look_at_materials):
             found += part(seen)
-    found += look_at_freedom(seen) + look_at_deviations(seen) + look_at_sensors(seen)
+    for part in (look_at_freedom, look_at_units, look_at_deviations, look_at_sensors):
+        found += part(seen)
     if band is not None:
         found += look_at_band(seen, band)
     return tuple(found)

@@ -7,6 +7,7 @@ import numpy as np
 from femubench.core.inference.settings import settings
 from femubench.core.look.modes import Seen
 from femubench.core.modal.pairing import LEAST_SENSORS, pair_modes
+from femubench.core.modal.questions import question_measurement
 from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.typing import FloatArray, IntArray
 
@@ -31,6 +32,12 @@ def look_at_deviations(seen: Seen) -> list[LookWarning]:
 def _range(values: FloatArray) -> str:
     low, high = float(values.min()), float(values.max())
     return f"{low:.2g}" if low == high or np.isnan(low) else f"{low:.2g} to {high:.2g}"
+
+
+def look_at_units(seen: Seen) -> list[LookWarning]:
+    """Return what seems wrong with units, numbers and order of the modes."""
+    asked = question_measurement(seen.model, seen.measurement)
+    return [LookWarning(f"{what[0].upper()}{what[1:]}", "all", "") for what in asked]
 
 
 def look_at_sensors(seen: Seen) -> list[LookWarning]:

@@ -18,6 +18,7 @@ from typing import Any
 
 from femubench.core.case.case import Case
 from femubench.core.modal.factorisation import solver_name, solver_note
+from femubench.core.modal.questions import question_measurement
 from femubench.core.plugin.distribution import about
 from femubench.core.plugin.foreign import ForeignStrategy
 from femubench.core.plugin.variants import Variant
@@ -226,7 +227,7 @@ def run_meta(
         "git_commit": git_commit(),
         "structures": {case.name: case.structure or case.name for case in cases},
         "notes": [
-            *(f"{case.name}: {note.rstrip('.')}" for case in cases for note in case.notes),
+            *(f"{case.name}: {note.rstrip('.')}" for case in cases for note in _notes(case)),
             *solver_note(),
         ],
         "cases": {case.name: {"title": case.title, "digest": case.digest} for case in cases},
@@ -241,6 +242,10 @@ def run_meta(
         "rule": Rule().to_json(),
         "reference": {name: item.rms_percent for name, item in references.items()},
     }
+
+
+def _notes(case: Case) -> tuple[str, ...]:
+    return *case.notes, *question_measurement(case.model, case.measurement)
 
 
 def versions(*more: str) -> dict[str, str]:

@@ -1,0 +1,74 @@
+"""What a measurement makes one ask before any fit: units, modes twice, frequencies swapped."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.stats import kendalltau
+
+from femubench.core.fem.model import Model
+from femubench.core.modal.correlation import mac
+from femubench.core.modal.frequency_changes import elastic_modes
+from femubench.core.modal.measurement import Measurement
+from femubench.core.modal.pairing import LEAST_SENSORS, WINDOW, pair_measured
+
+# f_measured / f_predicted where a number was typed in another unit: frequencies go with the root of
+# E / rho and with the depth of sections, and fall with the square of lengths.
+_SLIPS = {
+    1e9**0.5: "as if E had been typed in GPa, where Pa is expected",
+    1e6: "as if coordinates were in mm, where m is expected",
+    1e3: "as if E had been typed in MPa, where Pa is expected, or every length in mm, where m is",
+    60.0: "as if they were in 1/min, where Hz is expected",
+    2.0 * np.pi: "as if they were in rad/s, where Hz is expected",
+    1e-3**0.5: "as if density had been typed in g/cm3, where kg/m3 is expected",
+    1e-3: "as if they were in kHz, where Hz is expected, or sizes of sections in mm, where m is",
+    1e-6: "as if density had been typed in t/mm3, where kg/m3 is expected",
+}
+_NEAR = 1.5  # models are hardly more than half wrong, and no two slips are as close
+_SAME_MAC, _SAME_FREQUENCY = 0.999, 1e-3  # of one mode that two rows hold; relative
+_ALIKE = 0.8  # MAC of a pair by shape alone
+_FEWEST = 4  # modes, of whose order something can be said
+
+
+def question_measurement(model: Model, measurement: Measurement) -> tuple[str, ...]:
+    """Return what seems wrong with units, numbers and order of measured modes, one sentence each.
+
+    Arguments:
+        model: the nominal model.
+        measurement: the modes that a user may see.
+
+    Raises:
+        ModelError: when the model has no modes.
+    """
+    m = measurement
+    found = []
+    for k, number in enumerate(m.numbers):
+        close = np.abs(m.frequencies[:k] / m.frequencies[k] - 1.0) < _SAME_FREQUENCY
+        same = close & (mac(m.shapes[:, :k], m.shapes[:, [k]])[:, 0] > _SAME_MAC)
+        if len(m.sensors) >= LEAST_SENSORS and same.any():
+            first = m.numbers[int(np.argmax(same))]
+            found.append(f"modes {first} and {number} are one mode: leave one out of the table")
+    modes = elastic_modes(model, 2 * len(m) + _FEWEST)
+    readings = np.asarray(model.observe(m.sensors) @ modes.shapes)
+    predicted = modes.natural_frequencies
+    paired = pair_measured(m, modes, readings).index >= 0
+    if 2 * paired.sum() >= len(m):
+        return tuple(found)
+    shaped = np.isfinite(m.shapes).sum(axis=0) >= LEAST_SENSORS
+    rows = columns = np.arange(min(len(m), len(predicted)))
+    if shaped.any():
+        likeness = np.nan_to_num(mac(m.shapes, readings)) * shaped[:, None]
+        rows, columns = linear_sum_assignment(likeness, maximize=True)
+        alike = likeness[rows, columns] > _ALIKE
+        rows, columns = rows[alike], columns[alike]
+    if len(rows) == 0:
+        return tuple(found)
+    ratio = float(np.exp(np.median(np.log(m.frequencies[rows] / predicted[columns]))))
+    if not 1.0 / WINDOW < ratio < WINDOW:
+        slips = [what for size, what in _SLIPS.items() if 1.0 / _NEAR < ratio / size < _NEAR]
+        cause = slips[0] if slips else "a unit is wrong, or it is another structure"
+        found.append(f"measured frequencies are {ratio:.3g} times those of the model, {cause}")
+    elif len(rows) >= _FEWEST and kendalltau(m.frequencies[rows], predicted[columns])[0] < 0.0:
+        found.append("frequencies fall where those of the same shapes in the model rise, as if the "
+                     "rows of frequencies and shapes had different orders")  # fmt: skip
+    return tuple(found)
