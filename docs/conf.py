@@ -42,7 +42,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 root_doc = "docs/index"
 include_patterns = [
     *("*.md", "docs/*.md", "docs/development/*.md", "docs/api/*.rst"),
-    *("scenarios/*/README.md", "scenarios/suite/*/README.md"),
+    *("scenarios/*/README.md", "scenarios/*/*/README.md"),
 ]
 exclude_patterns = ["build", "femubench", ".*"]
 

@@ -329,7 +329,7 @@ def test_a_cause_that_some_names_lack_is_not_named_for_sure() -> None:
         explained(("a", "c"), 0.5, chi2=61.0, direction=ACROSS),
     )
     more = posterior(
-        nothing, explained(("a",), 0.3, chi2=80.0), explained(("a", "b"), 0.7, chi2=70.0)
+        nothing, explained(("a",), 0.3, chi2=75.0), explained(("a", "b"), 0.7, chi2=70.0)
     )
     for found in (apart, weak):
         assert decided(found, 0.5, True).verdict == "ambiguous"

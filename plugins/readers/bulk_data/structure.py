@@ -612,7 +612,7 @@ def _factors(bars: dict[str, Bar]) -> Iterator[Factor]:
     groups: dict[tuple[str, float], list[str]] = {}
     for name, bar in bars.items():
         if bar.of.nsm:
-            if not bar.rho > 0.0:
+            if not bar.rho * bar.of.A > 0.0:
                 expected = "a MAT1 with RHO > 0 with NSM"
                 raise bar.card.error("mass of a bar without density", expected, "NSM")
             groups.setdefault(("rhoA", 1.0 + bar.of.nsm / (bar.rho * bar.of.A)), []).append(name)
