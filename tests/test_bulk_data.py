@@ -301,8 +301,9 @@ BROKEN = {
     "PBAR,12,9,1.,1.,1.": "PBAR 12, MID: there is no MAT1 9",
     "PBARL,12,1,,HAT,,,,,+\n+,1.,1.": "PBARL 12, TYPE: shape 'HAT'",
     "MAT1,2,-7.+10,,.3\nPBAR,12,2,1.,1.,1.": "MAT1 2, E: -7e+10",
-    "MAT1,2,7.+10,,.3,1.-320\nPBAR,12,2,1.-4,1.,1.,1.,1.\nCBAR,2,12,1,2,0.,1.,0.": "PBAR 12, NSM: mass of a "
-    "bar without density",
+    "MAT1,2,7.+10,,.3,1.-320\nPBAR,12,2,1.-4,1.,1.,1.,1.\nCBAR,2,12,1,2,0.,1.,0.": (
+        "PBAR 12, NSM: mass of a bar without density"
+    ),
     "CONM2,9,3,,1.\nGRID,3,,1.,1.,1.": "GRID 3: nothing holds this grid",
     "CONM2,9,2,,1.,,,,,+\n+,9.,,1.,,,1.": "moments of inertia that no body has",
     "CELAS2,9,1.,1,1,2,2": "a spring between two grids across their line",
