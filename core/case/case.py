@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from femubench.core.display import Shown, count_noun, modes_line
+from femubench.core.display import Shown, modes_line
 from femubench.core.fem.alteration import Alteration, alter_model
 from femubench.core.fem.frame import GroundSpring, Place, PointMass
 from femubench.core.fem.model import Model
