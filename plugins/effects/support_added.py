@@ -72,7 +72,7 @@ class SupportAdded(FrameEffect):
                 one_sided=True,
                 least=_SOFTEST * scale,
             ),
-            Parameter("offset", "m", half, lower=-half, upper=half),
+            Parameter("offset", "m", 0.8 * half, lower=-half, upper=half),
         )
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
