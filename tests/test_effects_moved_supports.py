@@ -135,7 +135,7 @@ def tell(
     seed: int,
     count: int = 4,
 ) -> Diagnosis:
-    """Diagnose the beam on rollers beside the measurement of the beam on others."""
+    """Diagnose the beam on rollers, given that it lay on others."""
     rng = np.random.default_rng(seed)
     was, test = (measure(rollers, noise, rng, count) for rollers in (before, now))
     every = test.numbers
@@ -277,7 +277,7 @@ def test_what_is_fastened_does_not_slide() -> None:
     assert SupportAdded().places(free) == SupportRemoved().places(free) == ()
 
 
-def test_they_are_sought_beside_a_reference_alone() -> None:
+def test_they_are_sought_with_a_reference_alone() -> None:
     rng = np.random.default_rng(0)
     test = measure([ROLLER + 0.05], 0.002, rng)
     effects = [SupportPosition(), SupportAdded(), SupportRemoved()]

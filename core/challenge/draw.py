@@ -277,7 +277,7 @@ class BlindCase:
 def registered_effects(*named: str) -> Effects:
     """Return the effects on frames that come with femubench, and those named, by name.
 
-    Blind cases have no reference, beside which alone some are sought.
+    Blind cases have no reference, with which alone some are sought.
 
     Arguments:
         named: effects of any plugin, which is imported here; unknown names are left out.
