@@ -38,6 +38,7 @@ from femubench.core.effect.flexible_ends import (
 )
 from femubench.core.effect.flexible_supports import (
     flexible_supports_change as flexible_supports_change,
+    release_supports as release_supports,
     soften_supports as soften_supports,
 )
 from femubench.core.effect.frame_effect import FrameEffect as FrameEffect

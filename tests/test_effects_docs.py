@@ -40,7 +40,7 @@ def rows_of(heading: str) -> dict[str, list[str]]:
 def models(ladder: FrameBuilder, hframe: FrameBuilder, portal: FrameBuilder) -> list[Model]:
     """Return a frame of each plane, none with shear deformation, and one that carries a weight.
 
-    The last has a joint twice, at the end of either member.
+    One has a joint twice, at the end of either member, the last lies on a roller.
     """
     frames = [ladder(), hframe(mesh=(4, 2, 4)), portal(3, "euler-bernoulli")]
     clamp = Support(Place(joint="L1"), ("x", "z", "ry"))
@@ -50,6 +50,9 @@ def models(ladder: FrameBuilder, hframe: FrameBuilder, portal: FrameBuilder) -> 
     twice = replace(whole.joint(first.ends[0]), name="other side")
     parted = (replace(first, ends=(twice.name, first.ends[1])), *whole.members[1:])
     frames.append(replace(whole, joints=(*whole.joints, twice), members=parted))
+    roller = Support(Place(member="BC", s=0.4), ("z",))
+    held = Support(Place(joint="A"), ("z", "rx", "ry"))
+    frames.append(replace(whole, supports=(held, roller)))
     return [Model.of(frame) for frame in frames]
 
 
@@ -64,7 +67,7 @@ def changed_keys(frame: Frame, other: Frame) -> set[str]:
 
 
 def test_every_effect_is_in_both_tables() -> None:
-    assert len(EFFECTS) == 27
+    assert len(EFFECTS) == 30
     assert list(rows_of(THERE)) == list(rows_of(WRITES))
     assert set(rows_of(THERE)) == set(EFFECTS)
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from femubench.core.display import Shown, count_noun, modes_line
-from femubench.core.fem.frame import GroundSpring, PointMass
+from femubench.core.display import Shown, modes_line
+from femubench.core.fem.alteration import Alteration, alter_model
+from femubench.core.fem.frame import GroundSpring, Place, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.modal.measurement import Measurement
@@ -28,11 +29,34 @@ class Modification:
     masses: tuple[PointMass, ...]
     springs: tuple[GroundSpring, ...]
     measurement: Measurement
+    alteration: Alteration = field(default_factory=Alteration)
 
     def __str__(self) -> str:
-        attached = count_noun(len(self.masses), "mass"), count_noun(len(self.springs), "spring")
+        more = self.alteration
+        kinds = zip(
+            (self.masses, self.springs, more.supports, more.removed, more.exchanged),
+            ("mass", "ground spring", "support", "part removed", "member exchanged"),
+            strict=True,
+        )
+        changed = ", ".join(f"{noun}: {len(own)}" for own, noun in kinds if own)
         modes = modes_line(self.measurement.numbers, self.measurement.frequencies)
-        return f"{self.name}: {', '.join(attached)}; {modes}"
+        return f"{self.name}: {changed}; {modes}"
+
+    @property
+    def places(self) -> tuple[Place, ...]:
+        """Return where something is added."""
+        own = [mass.at for mass in self.masses] + [spring.at for spring in self.springs]
+        return (*own, *(support.at for support in self.alteration.supports))
+
+    def modify(self, model: Model) -> Model:
+        """Return a model with the change.
+
+        Raises:
+            ModelError: when something lies off the structure, or is not there to be taken away.
+            NotApplicable: where members are to be taken of matrices.
+        """
+        attached = model.attach(self.masses, self.springs)
+        return alter_model(attached, self.alteration) if self.alteration else attached
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from femubench.core.case.frame_tables import FrameTables
 from femubench.core.case.frames import CONSTANTS, section_of
 from femubench.core.case.schema import FrameSpec, MaterialSpec, MemberSpec, SectionSpec
 from femubench.core.errors import InputError
-from femubench.core.fem.frame import Factor, Frame, Place, Plane, RigidEnd
+from femubench.core.fem.frame import Factor, Frame, Member, Place, Plane, RigidEnd
 from femubench.core.fem.nominal import MAY_VANISH
 from femubench.core.fem.sections import (
     SHAPES,
@@ -163,12 +163,16 @@ _SAME_KAPPA = 1e-13
 _ANY_NU = 0.3  # a section of case.toml has the kappa of its shape or one number for every nu
 
 
-def frame_keys(frame: Frame, known: Known) -> Keys:
+def frame_keys(frame: Frame, known: Known, spare: Sequence[Member] = ()) -> tuple[Keys, list[Keys]]:
     """Return the table `[model]` of a frame as plain data, every key that is not its default.
 
     Arguments:
         frame: any frame; its fields bear the names of the keys.
         known: names and sizes from the file of the case that it comes from.
+        spare: members by other names, in sections and materials that it keeps for them.
+
+    Returns:
+        the table, and the tables of the spare members.
 
     Raises:
         BadKey: when a section cannot be said in keys, with a path from the top of the file.
@@ -176,9 +180,10 @@ def frame_keys(frame: Frame, known: Known) -> Keys:
     # A beam without length is no arm, and the reader takes none.
     springs = (replace(s, arm_factor=s.arm_factor if s.arm else None) for s in frame.joint_springs)
     plain = keys_of(replace(frame, joint_springs=tuple(springs)), without=("members", "families"))
-    own = known.names("section")
+    everyone = (*frame.members, *spare)
+    own = known.names("section") | {member.name: member.section.name for member in spare}
     contents, seen = [], dict[tuple[int, float, str], Keys]()
-    for member in frame.members:
+    for member in everyone:
         name = own.get(member.name, "")
         key = id(member.section), member.material.nu, name
         if key not in seen:
@@ -197,11 +202,10 @@ def frame_keys(frame: Frame, known: Known) -> Keys:
             continue
         tables[name] = section_keys(section, _ANY_NU, frame.plane, spec)
     sections, section_tables = name_tables(contents, own, tables, "section")
-    contents = [
-        (member.name, keys_of(member.material, without=("name",))) for member in frame.members
-    ]
+    contents = [(member.name, keys_of(member.material, without=("name",))) for member in everyone]
     tables = {name: spec.model_dump() for name, spec in known.materials.items()}
-    materials, material_tables = name_tables(contents, known.names("material"), tables, "material")
+    own = known.names("material") | {member.name: member.material.name for member in spare}
+    materials, material_tables = name_tables(contents, own, tables, "material")
     members = [
         {
             **keys_of(member, without=("section", "material")),
@@ -209,13 +213,14 @@ def frame_keys(frame: Frame, known: Known) -> Keys:
             "section": section,
             "material": material,
         }
-        for member, section, material in zip(frame.members, sections, materials, strict=True)
+        for member, section, material in zip(everyone, sections, materials, strict=True)
     ]
+    members, others = members[: len(frame.members)], members[len(frame.members) :]
     head = {key: value for key, value in plain.items() if not isinstance(value, list)}
     lists = {key: value for key, value in plain.items() if isinstance(value, list)}
     tables = {"materials": material_tables, "sections": section_tables}
     whole = {"joints": lists.pop("joints"), "members": members, **lists}
-    return {"kind": "frame", **head, **tables, **whole}
+    return {"kind": "frame", **head, **tables, **whole}, others
 
 
 def keys_of(item: Any, without: Collection[str] = ()) -> Keys:  # noqa: ANN401 - see below

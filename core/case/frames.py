@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from itertools import chain
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from femubench.core.case.checks import check_frame
-from femubench.core.case.faults import BadKey, Misfit, WrongDirection, at_key
+from femubench.core.case.checks import check_frame, check_unique
+from femubench.core.case.faults import BadKey, KeyPath, Misfit, WrongDirection, at_key
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.case.schema import FrameSpec, SectionSpec, TomlTable
+from femubench.core.case.schema import (
+    ExchangeSpec,
+    FileSpec,
+    FrameSpec,
+    MatricesSpec,
+    ModificationSpec,
+    RemovalSpec,
+    SectionSpec,
+    TomlTable,
+)
 from femubench.core.errors import ModelError
+from femubench.core.fem.alteration import Alteration, Exchange, Removable
 from femubench.core.fem.frame import (
     ACTIVE,
     BeamTheory,
@@ -37,7 +48,7 @@ from femubench.core.fem.frame import (
     Support,
     Vector,
 )
-from femubench.core.fem.mesh import locate, nearest_place, place_xyz
+from femubench.core.fem.mesh import ON_MEMBER, locate, nearest_place, place_xyz
 from femubench.core.fem.sections import SHAPES, Section, constant_kappa
 from femubench.core.fem.sensors import moved_names
 from femubench.core.typing import FloatArray
@@ -224,3 +235,90 @@ def attachments(key: str, specs: Sequence[TomlTable], site: Site) -> tuple[Any, 
             if isinstance(part, Oscillator) and "r" in part.direction:
                 raise Misfit(f"{part.direction!r} is a rotation", "a translation")
     return tuple(parts)
+
+
+def alteration_of(
+    spec: ModificationSpec, site: Site, model: FrameSpec | MatricesSpec | FileSpec
+) -> Alteration:
+    """Return what a modification changes apart from further masses and springs.
+
+    Arguments:
+        spec: its table.
+        site: the structure as drawn.
+        model: the table of the model, whose sections and materials may be named.
+
+    Raises:
+        BadKey: with a path below the modification.
+    """
+    supports = attachments("supports", spec.supports, site)
+    for i, support in enumerate(supports):
+        with at_key("supports", i, "fixed"):
+            for direction in support.fixed:
+                site.check_direction(support.at, direction)
+    if not isinstance(site, FrameSite) or not isinstance(model, FrameSpec):
+        for key in ("remove", "set"):
+            if getattr(spec, key):
+                what = "a model of matrices has no parts that could be changed"
+                raise BadKey((key,), what, "masses, springs or supports")
+        return Alteration(supports)
+    removed = [_removed(i, entry, site) for i, entry in enumerate(spec.remove)]
+    exchanged = [_exchanged(i, entry, site, model) for i, entry in enumerate(spec.set)]
+    names = [(("set", i), e.member) for i, own in enumerate(exchanged) for e in own]
+    check_unique(names)
+    parts = tuple(chain.from_iterable(removed))
+    return Alteration(supports, parts, tuple(chain.from_iterable(exchanged)))
+
+
+def _one_of(path: KeyPath, spec: TomlTable, keys: Sequence[str]) -> str:
+    """Return the only one of some keys that is given."""
+    given = [key for key in keys if getattr(spec, key) is not None]
+    if len(given) != 1:
+        what = f"{' and '.join(given)} at once" if given else "nothing is named"
+        raise BadKey(path, what, f"one of {', '.join(keys)}")
+    return given[0]
+
+
+def _removed(i: int, spec: RemovalSpec, site: FrameSite) -> Sequence[Removable]:
+    """Return the parts of a frame that an entry of `remove` names."""
+    kind = _one_of(("remove", i), spec, ("member", "support", "mass", "spring"))
+    frame, named = site.frame, getattr(spec, kind)
+    if kind == "member":
+        found = [member for member in frame.members if member.name == named]
+        there = [member.name for member in frame.members]
+    else:
+        with at_key("remove", i, kind):
+            xyz = np.array(site.point(named))
+        parts: tuple[Any, ...] = getattr(frame, "masses" if kind == "mass" else f"{kind}s")
+        near = (float(np.linalg.norm(place_xyz(frame, p.at) - xyz)) <= ON_MEMBER for p in parts)
+        found = [part for part, here in zip(parts, near, strict=True) if here]
+        there = list(dict.fromkeys(str(part.at) for part in parts))
+    if not found:
+        expected = ", ".join(there[:20]) or f"the model has no {kind}"
+        raise BadKey(("remove", i, kind), f"there is no {kind} {str(named)!r}", expected)
+    return found
+
+
+def _exchanged(i: int, spec: ExchangeSpec, site: FrameSite, model: FrameSpec) -> list[Exchange]:
+    """Return the members that an entry of `set` names, with what they become."""
+    where = _one_of(("set", i), spec, ("member", "set"))
+    name, frame = getattr(spec, where), site.frame
+    known: Mapping[str, tuple[str, ...]] = {m.name: (m.name,) for m in frame.members}
+    if where == "set":
+        known = {s.name: s.members for s in frame.sets}
+    if name not in known:
+        raise BadKey(("set", i, where), f"there is no {where} {name!r}", ", ".join(known))
+    if spec.section is None and spec.material is None:
+        raise BadKey(("set", i), "nothing is set", "section or material")
+    tables: dict[str, Any] = {"section": model.sections, "material": model.materials}
+    for key, table in tables.items():
+        if getattr(spec, key) is not None and getattr(spec, key) not in table:
+            what = f"there is no {key} {getattr(spec, key)!r}"
+            raise BadKey(("set", i, key), what, ", ".join(table))
+    section = material = None
+    if spec.section is not None:
+        made = section_of(model.sections[spec.section], model.plane, model.beam)
+        section = replace(made, name=spec.section)
+    if spec.material is not None:
+        m = model.materials[spec.material]
+        material = Material(m.E, m.nu, m.rho, spec.material)
+    return [Exchange(member, section, material) for member in known[name]]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from femubench.core.case.case import SCATTER, Case, Match, Modification
 from femubench.core.case.checks import FREE_YET_HELD, NOT_HELD, check_unique
@@ -16,7 +17,13 @@ from femubench.core.case.deviations import with_floor
 from femubench.core.case.faults import BadKey, KeyPath, at_key
 from femubench.core.case.files import LARGEST_CASE, CaseFiles
 from femubench.core.case.frame_tables import FrameTables
-from femubench.core.case.frames import FrameSite, Site, attachments, frame_of
+from femubench.core.case.frames import (
+    FrameSite,
+    Site,
+    alteration_of,
+    attachments,
+    frame_of,
+)
 from femubench.core.case.matching import Alignment, Placed, match_sensors
 from femubench.core.case.matrices import model_of_matrices, reader_of, reading_with
 from femubench.core.case.model_files import model_of_file, remarks_of
@@ -44,8 +51,8 @@ from femubench.core.case.schema import (
 from femubench.core.case.sensors import read_sensors
 from femubench.core.case.tables import SUFFIXES, read_table
 from femubench.core.case.toml_text import locate_fault, spec_of
-from femubench.core.errors import InputError, ModelError
-from femubench.core.fem.frame import Frame
+from femubench.core.errors import InputError, ModelError, NotApplicable
+from femubench.core.fem.frame import Frame, Member
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
 from femubench.core.files import read_text
@@ -358,14 +365,24 @@ class _Building:
         with at_key("modification", i):
             masses = attachments("masses", spec.masses, site)
             springs = attachments("springs", spec.springs, site)
-            if not masses and not springs:
-                raise BadKey((), "nothing is changed", "masses or springs")
-            try:
-                model.attach(masses, springs)
-            except ModelError as error:
-                raise BadKey((), str(error), "a change that the model can take") from None
+            altered = alteration_of(spec, site, self.spec.model)
+            if not (masses or springs or altered):
+                expected = "masses, springs, supports, remove or set"
+                raise BadKey((), "nothing is changed", expected)
         measurement = self.modes(("modification", i, "modes"), spec.modes, sensors)
-        return Modification(spec.name, masses, springs, measurement)
+        change = Modification(spec.name, masses, springs, measurement, altered)
+        with at_key("modification", i):
+            try:
+                changed = change.modify(model)
+            except (ModelError, NotApplicable) as error:
+                raise BadKey((), str(error), "a change that the model can take") from None
+            if any(isinstance(part, Member) for part in altered.removed):
+                seen = np.diff(sp.csr_array(changed.observe(sensors)).indptr) > 0
+                lost = np.isfinite(measurement.shapes).any(axis=1) & ~seen
+                if lost.any():
+                    what = f"sensor {sensors.labels[int(lost.argmax())]!r} sat on what was removed"
+                    raise BadKey(("modes",), what, "no readings there")
+        return change
 
 
 def mark_free(model: Model, free: bool) -> Model:

@@ -58,7 +58,7 @@ def _kept_rows(case: Case) -> IntArray:
     attached = [
         geometry.rows_of[geometry.node(place)]
         for change in case.modifications
-        for place in (*(m.at for m in change.masses), *(s.at for s in change.springs))
+        for place in change.places
     ]
     whole = np.flatnonzero(np.isin(geometry.dofs.node, geometry.dofs.node[read]))
     kept = np.concatenate([whole, *map(np.array, attached)]).astype(np.int64)

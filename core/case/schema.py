@@ -418,6 +418,24 @@ class ReferenceSpec(TomlTable):
     mass: WeightSpec | None = Field(None, description="{value, std} in kg")
 
 
+class RemovalSpec(TomlTable):
+    """An entry of `remove` in `[[modification]]`: one of these keys."""
+
+    member: Name | None = Field(None, description=_MEMBER)
+    support: At | None = Field(None, description=AT)
+    mass: At | None = Field(None, description=AT)
+    spring: At | None = Field(None, description=AT)
+
+
+class ExchangeSpec(TomlTable):
+    """An entry of `set` in `[[modification]]`: a member or a set, and what it becomes."""
+
+    member: Name | None = Field(None, description=_MEMBER)
+    set: Name | None = Field(None, description="the name of a set of [[model.sets]]")
+    section: Name | None = Field(None, description="the name of a section")
+    material: Name | None = Field(None, description="the name of a material")
+
+
 class ModificationSpec(TomlTable):
     """`[[modification]]`."""
 
@@ -425,6 +443,15 @@ class ModificationSpec(TomlTable):
     masses: Many[MassSpec] = Field((), max_length=_MOST, description="a list of {at, mass, offset}")
     springs: Many[SpringSpec] = Field(
         (), max_length=_MOST, description="a list of {at, direction, stiffness}"
+    )
+    supports: Many[SupportSpec] = Field(
+        (), max_length=_MOST, description="a list of {at, fixed = [...]}"
+    )
+    remove: Many[RemovalSpec] = Field(
+        (), max_length=_MOST, description="a list of {member}, {support}, {mass} or {spring}"
+    )
+    set: Many[ExchangeSpec] = Field(
+        (), max_length=_MOST, description="a list of {member, section} or {member, material}"
     )
     modes: FileName = Field(description="a file in the case folder")
 

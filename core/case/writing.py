@@ -50,7 +50,8 @@ from femubench.core.case.table_text import (
     toml_bytes,
 )
 from femubench.core.errors import InputError, ModelError
-from femubench.core.fem.frame import Frame
+from femubench.core.fem.alteration import Alteration, Removable, find_removed
+from femubench.core.fem.frame import Frame, GroundSpring, Member, PointMass, Support
 from femubench.core.fem.mesh import locate
 from femubench.core.fem.model import Model
 from femubench.core.modal.frf import FrequencyResponses
@@ -236,7 +237,7 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
     Raises:
         BadKey: for what no case folder can say.
     """
-    keys, files, modifications = _model_part(case, known)
+    keys, files, modifications, exchanged = _model_part(case, known)
     # Long lists of joints and members go to files of their own.
     for part in ("joints", "members"):
         if len(keys.get(part, ())) > MANY:
@@ -273,9 +274,17 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
             count += 1
             file = f"modified-{slug}-{count}.csv"
         files[file] = modes_csv(item.measurement, share)
-        attached = {"masses": item.masses, "springs": item.springs}
+        more = item.alteration
+        attached = {"masses": item.masses, "springs": item.springs, "supports": more.supports}
         plain = {key: [keys_of(one) for one in many] for key, many in attached.items() if many}
-        tables.append({"name": item.name, **plain, "modes": file})
+        plain["remove"] = _removal_keys(case.model, more.removed)
+        plain["set"] = [
+            {"member": change.member, **{k: own[k] for k in _EXCHANGED if getattr(change, k)}}
+            for change, own in zip(more.exchanged, exchanged, strict=False)
+        ]
+        exchanged = exchanged[len(more.exchanged) :]
+        given = {key: entries for key, entries in plain.items() if entries}
+        tables.append({"name": item.name, **given, "modes": file})
     if case.reference is not None:
         file = "reference.csv"
         files[file] = modes_csv(case.reference, share)
@@ -298,6 +307,24 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
     return {CASE_FILE: toml_bytes(content, comment), **files}
 
 
+_EXCHANGED = ("section", "material")
+_REMOVED: dict[type, str] = {Support: "support", PointMass: "mass", GroundSpring: "spring"}
+
+
+def _removal_keys(model: Model, removed: Sequence[Removable]) -> list[Keys]:
+    """Return entries of `remove` for parts, where an update has put them."""
+    if model.structure is None:
+        return []
+    found = [own for part in removed for own in find_removed(model.structure.frame, part)]
+    entries: list[Keys] = [
+        {"member": own.name}
+        if isinstance(own, Member)
+        else {_REMOVED[type(own)]: keys_of(own)["at"]}
+        for own in found
+    ]
+    return [entry for i, entry in enumerate(entries) if entry not in entries[:i]]
+
+
 def _weight(measurement: Measurement) -> Keys:
     if measurement.total_mass is None:
         return {}
@@ -305,16 +332,21 @@ def _weight(measurement: Measurement) -> Keys:
     return {"mass": {"value": float(value), "std": float(std)}}
 
 
-def _model_part(case: Case, known: Known) -> tuple[Keys, Files, tuple[Modification, ...]]:
-    """Return the table `[model]`, its files, and the modifications at the places of that model."""
+def _model_part(
+    case: Case, known: Known
+) -> tuple[Keys, Files, tuple[Modification, ...], list[Keys]]:
+    """Return the table `[model]`, its files, and the modifications at the places of that model.
+
+    The tables of members as modifications exchange them come last, in the order of these.
+    """
     model = case.model
     if model.structure is not None and not _matrices_changed(model):
         frame = describe_frame(model.structure)
-        keys = frame_keys(frame, known)
-        return keys, frame_files(_model_of(frame)), case.modifications
+        keys, exchanged = frame_keys(frame, known, _exchanged_members(frame, case))
+        return keys, frame_files(_model_of(frame)), case.modifications, exchanged
     matrices = matrices_of(model)
     if isinstance(model.geometry, MatrixGeometry):
-        return *matrix_keys(*matrices, model.geometry, model), case.modifications
+        return *matrix_keys(*matrices, model.geometry, model), case.modifications, []
     if model.structure is None:
         what = "a model without elements and without nodes by name cannot be written"
         raise BadKey(("model",), what, "a frame, or matrices from files")
@@ -324,7 +356,21 @@ def _model_part(case: Case, known: Known) -> tuple[Keys, Files, tuple[Modificati
     frame = model.frame_structure.frame
     frame_places(model, [locate(frame, xyz) for xyz in case.measurement.sensors.xyz])
     moved = tuple(_at_nodes(item, model) for item in case.modifications)
-    return *matrix_keys(*matrices, frame_geometry(model), model), moved
+    return *matrix_keys(*matrices, frame_geometry(model), model), moved, []
+
+
+def _exchanged_members(frame: Frame, case: Case) -> list[Member]:
+    """Return members as modifications exchange them, each by a name of its own."""
+    found, taken = list[Member](), set(frame.member_index)
+    for change in (own for item in case.modifications for own in item.alteration.exchanged):
+        member = frame.members[frame.member_index[change.member]]
+        name = f"{change.member}-changed"
+        while name in taken:
+            name += "-too"
+        taken.add(name)
+        parts = {key: getattr(change, key) or getattr(member, key) for key in _EXCHANGED}
+        found.append(replace(member, name=name, **parts))
+    return found
 
 
 def _model_of(frame: Frame) -> Model:
@@ -336,11 +382,15 @@ def _model_of(frame: Frame) -> Model:
 
 
 def _at_nodes(item: Modification, model: Model) -> Modification:
-    wanted = [mass.at for mass in item.masses] + [spring.at for spring in item.springs]
-    places = frame_places(model, wanted)
+    own = item.alteration
+    if own.removed or own.exchanged:
+        what = f"modification {item.name!r} takes or exchanges parts, and the matrices were updated"
+        raise BadKey(("modification",), what, "a strategy that scales parameters")
+    places = frame_places(model, item.places)
     masses = tuple(replace(mass, at=places[mass.at]) for mass in item.masses)
     springs = tuple(replace(spring, at=places[spring.at]) for spring in item.springs)
-    return replace(item, masses=masses, springs=springs)
+    supports = tuple(replace(support, at=places[support.at]) for support in own.supports)
+    return replace(item, masses=masses, springs=springs, alteration=Alteration(supports))
 
 
 def _matrices_changed(model: Model) -> bool:

@@ -277,6 +277,8 @@ class BlindCase:
 def registered_effects(*named: str) -> Effects:
     """Return the effects on frames that come with femubench, and those named, by name.
 
+    Blind cases have no reference, with which alone some are sought.
+
     Arguments:
         named: effects of any plugin, which is imported here; unknown names are left out.
     """
@@ -286,7 +288,8 @@ def registered_effects(*named: str) -> Effects:
     if not set(named) <= set(found):
         offered = loader.load_plugins().effects
         found |= {name: offered[name] for name in named if name in offered}
-    return {name: e for name, e in sorted(found.items()) if isinstance(e, FrameEffect)}
+    frames = {name: e for name, e in sorted(found.items()) if isinstance(e, FrameEffect)}
+    return {name: effect for name, effect in frames.items() if not effect.acquired}
 
 
 def draw_case(

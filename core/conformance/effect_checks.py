@@ -240,7 +240,7 @@ def _hints(effect: Effect) -> str:
     caution = getattr(effect, "caution", "")
     if not isinstance(caution, str) or (caution and caution[-1] not in ".!?"):
         return f"caution is {caution!r}, expected a sentence"
-    for hint in ("softens", "innate", "handbook"):
+    for hint in ("softens", "innate", "acquired", "handbook"):
         if not isinstance(given := getattr(effect, hint, False), bool):
             return f"{hint} is {given!r}, expected True or False"
     refined = getattr(effect, "refines", None)

@@ -215,10 +215,7 @@ def predict_modified(
             ]
         )
         pairs = zip((case.model, extended), predicted, strict=False)
-        found = [
-            mesh_corrections(model.attach(change.masses, change.springs), hertz)
-            for model, hertz in pairs
-        ]
+        found = [mesh_corrections(change.modify(model), hertz) for model, hertz in pairs]
         # One mesh serves both where the other is not known.
         known = [row for row in found if row is not None]
         rows = [known[0] if row is None and known else row for row in found]

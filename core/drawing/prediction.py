@@ -114,7 +114,7 @@ def _attached(model: Model, change: Modification) -> Model:
     """Return a modified structure, the same one every time, so that it is solved once."""
 
     def make() -> tuple[Modification, Model]:
-        return change, model.attach(change.masses, change.springs)
+        return change, change.modify(model)
 
     return once_for(model, ("attached", id(change)), make)[1]
 

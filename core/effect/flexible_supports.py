@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations_with_replacement
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,7 +25,7 @@ from femubench.core.change.change import Change
 from femubench.core.change.terms import RowOperator, Term
 from femubench.core.effect.attachments import point_motion
 from femubench.core.effect.places import point_of, supports_of
-from femubench.core.fem.frame import Frame, GroundSpring
+from femubench.core.fem.frame import ACTIVE, Frame, GroundSpring
 from femubench.core.fem.model import Model, common_dofs
 from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.modal.eigen import cache_by_model
@@ -111,8 +111,9 @@ def _condensed(model: Model, held: Sequence[Held], columns: Sequence[int]) -> Ch
     """Return what springs under fixed dofs do."""
     if not held:
         return Change((), lambda values: np.zeros((len(values), 0)))
-    stiffness, mass, own = _release_supports(model)
-    free = np.array([own[one] for one in held], dtype=np.int64)
+    released = release_supports(model)
+    stiffness, mass = (released.take(m) for m in (released.model.stiffness, released.model.mass))
+    free = np.array([released.held[one] for one in held], dtype=np.int64)
     inner, inertia = (m[free][:, free].toarray() for m in (stiffness, mass))
     rows = sp.csr_array(sp.vstack([m[free, : model.size] for m in (stiffness, mass)]))
     first, second = _coupled(inner, inertia)
@@ -134,25 +135,47 @@ def _condensed(model: Model, held: Sequence[Held], columns: Sequence[int]) -> Ch
     return Change(tuple(terms), coefficients)
 
 
+class ReleasedSupports(NamedTuple):
+    """A frame whose supports are gone, and what they held.
+
+    Arguments:
+        model: the frame, on dofs of its own.
+        order: its dofs, those of the supported one first, (n + h,).
+        held: from the word of a support and a direction to the position behind those.
+    """
+
+    model: Model
+    order: IntArray
+    held: dict[Held, int]
+
+    def take(self, matrix: SparseArray) -> SparseArray:
+        """Return columns of the frame's dofs, or rows and columns, in order."""
+        columns = sp.csr_array(matrix)[:, self.order]
+        return columns[self.order] if matrix.shape[0] == len(self.order) else columns
+
+
 @cache_by_model
-def _release_supports(model: Model) -> tuple[SparseArray, SparseArray, dict[Held, int]]:
-    """Return stiffness and mass with the dofs of all supports behind the free ones, and which."""
+def release_supports(model: Model) -> ReleasedSupports:
+    """Return a frame without its supports, which still moves as before where it is held.
+
+    Examples:
+        >>> effect.release_supports(model).held
+        {}
+    """
     structure = model.frame_structure
-    listed = supports_of(structure.frame, "support:all").items()
-    held = [(word, d) for word, own in listed for d, k in own.items() if np.isinf(k)]
+    frame, active = structure.frame, ACTIVE[structure.frame.plane]
+    pairs = ((str(point_of(frame, str(s.at))), d) for s in frame.supports for d in s.fixed)
+    held = list(dict.fromkeys(pair for pair in pairs if pair[1] in active))
     # Between the dofs that are held there is no stress of a preload to find.
-    bare = replace(structure.frame, preloads=())
+    bare = replace(frame, preloads=())
     released = Model.of(structure.rebuilt(soften_supports(bare, dict.fromkeys(held, 0.0))))
     frame = released.frame_structure.frame
     rows = [
         point_motion(released, point_of(frame, word))[[DIRECTIONS.index(direction)]].indices[0]
         for word, direction in held
     ]
-    order = [*common_dofs(structure, released.frame_structure), *rows]
-    stiffness, mass = (
-        sp.csr_array(m)[order][:, order] for m in (released.stiffness, released.mass)
-    )
-    return stiffness, mass, {one: model.size + i for i, one in enumerate(held)}
+    order = np.array([*common_dofs(structure, released.frame_structure), *rows], dtype=np.int64)
+    return ReleasedSupports(released, order, {one: model.size + i for i, one in enumerate(held)})
 
 
 def _coupled(inner: FloatArray, inertia: FloatArray) -> tuple[IntArray, IntArray]:

@@ -26,6 +26,7 @@ class FrameEffect(Effect):
             level is worth measuring.
         innate: whether it is there from the day that the structure was built, so that it cannot
             be what differs from a reference.
+        acquired: whether it comes about later alone, so that it is sought with a reference only.
         handbook: whether handbooks give its values without any fit.
         refines: the slug of an effect of which it tells more at the same place: it is tried where
             that one is likely, and weighed with it.
@@ -39,6 +40,7 @@ class FrameEffect(Effect):
     caution: ClassVar[str] = ""
     softens: ClassVar[bool] = False
     innate: ClassVar[bool] = False
+    acquired: ClassVar[bool] = False
     handbook: ClassVar[bool] = False
     refines: ClassVar[str | None] = None
     reading: ClassVar[Reading | None] = None

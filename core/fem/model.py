@@ -44,6 +44,12 @@ class Dofs:
     def __len__(self) -> int:
         return len(self.direction)
 
+    def take(self, rows: IntArray) -> Dofs:
+        """Return some of them, (k,)."""
+        direction = tuple(self.direction[i] for i in rows)
+        axes = None if self.axes is None else self.axes[rows]
+        return Dofs(self.node[rows], direction, self.xyz[rows], axes)
+
     @property
     def internal(self) -> BoolArray:
         """Tell which dofs no motion of a body moves, (n,)."""
@@ -73,6 +79,10 @@ class LowRank:
     def __matmul__(self, vectors: FloatArray) -> FloatArray:
         product: FloatArray = self.basis @ (self.core @ (self.basis.T @ vectors))
         return product
+
+    def take(self, rows: IntArray) -> LowRank:
+        """Return the change of some degrees of freedom, (k,)."""
+        return LowRank(self.basis[rows], self.core)
 
     def toarray(self) -> FloatArray:
         """Return the dense matrix, for small models."""
@@ -247,11 +257,7 @@ class Model(Shown):
         if found is None:
             meshed = self.frame_structure
             frame = meshed.frame.with_attachments(tuple(masses), tuple(springs))
-            new = Model.of(meshed.rebuilt(frame))
-            old_mass, old_stiffness = meshed.matrices()
-            keep = common_dofs(meshed, new.frame_structure)
-            mass, stiffness = self.mass - old_mass, self.stiffness - old_stiffness
-            return _changed_at(new, keep, mass, stiffness, self)
+            return carry_over(self, Model.of(meshed.rebuilt(frame)))
         structure, change = found
         size = change.mass.shape[0]
         mass, stiffness = grow_matrix(self.mass, size), grow_matrix(self.stiffness, size)
@@ -313,6 +319,27 @@ def common_dofs(old: Structure, new: Structure) -> IntArray:
         return np.array([index[key] for key in _keys(old)], dtype=np.int64)
     except KeyError as error:
         raise ModelError("two attachments lie too close to each other on a member") from error
+
+
+def carry_over(model: Model, rebuilt: Model, *, held: bool = False) -> Model:
+    """Return a frame meshed anew, with what an update changed in the matrices of the old one.
+
+    Arguments:
+        held: whether dofs of the old one may be held in the new one; what changed there goes.
+    """
+    old, new = model.frame_structure, rebuilt.frame_structure
+    pairs = zip((model.mass, model.stiffness), old.matrices(), strict=True)
+    changes = [sp.csr_array(own - drawn) for own, drawn in pairs]
+    if held:
+        keys = {key: i for i, key in enumerate(_keys(new))}
+        found = [(i, keys[key]) for i, key in enumerate(_keys(old)) if key in keys]
+        rows, keep = np.array(found, dtype=np.int64).reshape(-1, 2).T
+        changes = [change[rows][:, rows] for change in changes]
+        cut = [c and c.take(rows) for c in (model.mass_change, model.stiffness_change)]
+        model = replace(model, mass_change=cut[0], stiffness_change=cut[1])
+    else:
+        keep = common_dofs(old, new)
+    return _changed_at(rebuilt, keep, changes[0], changes[1], model)
 
 
 def neighbours_of(model: Model, changed: Model, samples: Iterable[Model]) -> tuple[Model, ...]:

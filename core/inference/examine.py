@@ -269,9 +269,10 @@ def _candidates(
     model: Model, effects: tuple[Effect, ...], reference: Measurement | None
 ) -> tuple[tuple[Hypothesis, ...], tuple[Effect, ...]]:
     """Return the hypotheses that are screened, and the effects that may come in."""
-    alone = by_themselves(effects)
     if reference is None:
-        return hypotheses_of(model, alone), effects
+        effects = tuple(e for e in effects if not getattr(e, "acquired", False))
+        return hypotheses_of(model, by_themselves(effects)), effects
+    alone = by_themselves(effects)
     offered = hypotheses_of(model, alone, settings.damage_of_part)
     innate = {id(h.effect) for h in offered if is_innate(h)}
     kept = tuple(e for e in effects if id(e) not in innate)

@@ -11,12 +11,12 @@ from typing import Any
 from msgspec import Struct
 
 from femubench.core.case.case import Case
-from femubench.core.errors import FemubenchError, StrategyFailure
+from femubench.core.errors import FemubenchError, NotApplicable, StrategyFailure
 from femubench.core.run.answers import AnswerError, pack_outcome, unpack_outcome
 from femubench.core.run.jobs import Job, JobOutcome, one_line, perform_job
 from femubench.core.run.model_checks import check_model
 from femubench.core.schema.records import encode
-from femubench.core.schema.results import JobResult, Nominal
+from femubench.core.schema.results import JobResult, Nominal, Status
 from femubench.core.score.predicted_spread import Spread
 from femubench.core.score.scoring import Reference, judge
 
@@ -112,7 +112,8 @@ def _judged(result: JobResult, case: Case, outcome: JobOutcome, reference: Refer
             judgement = judge(case, outcome.model, reference, _spread(outcome))
     except Exception as error:
         reason = str(error) if isinstance(error, FemubenchError) else one_line(error)
-        return replace(result, status="failed", reason=reason, traceback=traceback.format_exc())
+        status: Status = "not-applicable" if isinstance(error, NotApplicable) else "failed"
+        return replace(result, status=status, reason=reason, traceback=traceback.format_exc())
     return replace(result, **vars(judgement))
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from femubench.core.case.case import Modification
 from femubench.core.fem.model import Model, neighbours_of
 from femubench.core.modal.eigen import Modes
 from femubench.core.modal.neighbour_modes import follow_frequencies
@@ -28,11 +29,13 @@ class Spread:
     samples: tuple[Model, ...]
     discrepancy_std: float
 
-    def after(self, changed: Model) -> Spread:
-        """Return the same for the model with a known modification attached."""
-        return replace(
-            self, model=changed, samples=neighbours_of(self.model, changed, self.samples)
-        )
+    def after(self, change: Modification, changed: Model) -> Spread:
+        """Return the same for the model with a known modification, `changed`."""
+        if change.alteration:
+            samples = tuple(change.modify(sample) for sample in self.samples)
+        else:
+            samples = neighbours_of(self.model, changed, self.samples)
+        return replace(self, model=changed, samples=samples)
 
     def std_of(self, modes: Modes, index: IntArray, measured_std: FloatArray) -> list[float | None]:
         """Return the standard deviation of what a test would find about every prediction, in Hz.

@@ -116,17 +116,18 @@ def pair_modified(
 
     Raises:
         ModelError: when the modified model has no modes or a sensor lies off the structure.
+        NotApplicable: where a member is to be taken of matrices.
     """
 
     def make() -> tuple[Modification, Spread | None, tuple[PairedMode, ...]]:
-        changed, modes = model.attach(change.masses, change.springs), None
-        if many is not None:
+        changed, modes = change.modify(model), None
+        if many is not None and not change.alteration:
             count, top = len(change.measurement) + MORE, _highest((change.measurement,))
             modes = many.proven(change.masses, change.springs, count, top)
         if modes is None:
             modes = _modes_for(changed, (change.measurement,))
         # With change and spread, so that nothing else gets their numbers as long as this is kept.
-        moved = spread and spread.after(changed)
+        moved = spread and spread.after(change, changed)
         return change, spread, _predict(changed, modes, change.measurement, change.name, moved)
 
     return once_for(model, ("modified", id(change), id(spread)), make)[2]

@@ -70,7 +70,7 @@ def nearness(case: Case) -> list[tuple[int, float]]:
     """
     found = [_nearness(case.model, case.measurement)]
     for change in case.modifications:
-        model = case.model.attach(change.masses, change.springs)
+        model = change.modify(case.model)
         found.append(_nearness(model, change.measurement))
     return found
 

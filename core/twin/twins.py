@@ -92,8 +92,13 @@ def twin_of(
             it do not.
 
     Raises:
-        NotApplicable: where no family changes it, or its model has no names to change.
+        NotApplicable: where no family changes it, its model has no names to change, or a
+            modification changes more than masses and springs.
     """
+    for change in case.modifications:
+        if change.alteration:
+            what = f"modification {change.name!r} changes more than masses and springs"
+            raise NotApplicable(f"{what}, which twins do not take")
     words = [seed, number, *case.name.encode()]
     rng = np.random.default_rng(np.random.SeedSequence(words))
     found, used, reasons = case, [], []
