@@ -115,12 +115,12 @@ def decide(
 
 
 def find_shared(posterior: Posterior, first: Key) -> Key:
-    """Return the causes of a name that nearly all have, where beyond these nothing is sought."""
+    """Return the causes of a name that nearly all have, where these alone leave noise."""
     shared = tuple(name for name in first if posterior.inclusion(name) >= settings.nearly_all)
-    shown = tuple(name for name in posterior.best(first).searched if name in shared)
-    core = [e for e, _ in posterior.members(shared) if e.searched == shown]
-    left = (adequacy(e.fit.state, e.unknowns) for e in core)
-    return shared if max(left, default=0.0) > settings.adequate_p else ()
+    # Each once: the same effect at two places is one more cause.
+    once = (e for e, _ in posterior.members(shared) if len(set(e.searched)) == len(e.searched))
+    left = (adequacy(e.fit.state, e.unknowns) for e in once)
+    return shared if max(left, default=0.0) > settings.noise_p else ()
 
 
 def most_believed(p: float) -> float:
