@@ -52,7 +52,7 @@ BUDGETS = {
     "scenarios": 750,
     "femubench": 570,
     "tests": 44_490,
-    "truths": 11_744,
+    "truths": 11_871,
     "benchmarks": 7_130,
 }
 ADVICE = (
