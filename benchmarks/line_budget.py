@@ -52,7 +52,7 @@ BUDGETS = {
     "scenarios": 750,
     "femubench": 570,
     "tests": 44_490,
-    "truths": 10_980,
+    "truths": 12_443,
     "benchmarks": 7_130,
 }
 ADVICE = (
