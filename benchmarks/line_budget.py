@@ -45,7 +45,7 @@ BUDGETS = {
     "core/score": 2_390,
     "core/study": 641,
     "core/twin": 1_070,
-    "core/update": 4_326,
+    "core/update": 4_333,
     "plugins": 10_315,
     "reports": 3_980,
     "papers": 3_290,

@@ -30,6 +30,7 @@ from femubench.results import JobResult, PredictiveBoard, leaderboard
 pytestmark = pytest.mark.nightly
 PAGES = ("README.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md"))))
 NUMBERS = {
+    "nine": 9,
     **{"three": 3, "eight": 8, "ten": 10, "eleven": 11, "nineteen": 19, "twenty-three": 23},
     "twenty-seven": 27,
 }
