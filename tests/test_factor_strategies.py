@@ -323,10 +323,10 @@ def test_the_penalty_of_sizes_meets_its_conditions_and_equal_columns_share() -> 
     assert pull[x != 0.0] == pytest.approx(weight * np.sign(x[x != 0.0]), rel=1e-5)
     assert np.abs(pull[x == 0.0]).max() <= weight
     assert not lasso(matrix, right, 5.1 * weight).any()
-    mirrored = np.column_stack([matrix, matrix[:, 0] * (1.0 + 1e-9)])
-    shared = lasso(mirrored, right, weight)
-    assert shared[0] == shared[-1]
-    assert shared[0] + shared[-1] == pytest.approx(x[0])
+    most = int(np.abs(x).argmax())
+    shared = lasso(np.column_stack([matrix, matrix[:, most] * (1.0 + 1e-9)]), right, weight)
+    assert shared[most] == shared[-1]
+    assert 2.0 * shared[-1] == pytest.approx(x[most])
     twice = lasso(np.ones((1, 2)), np.array([3.0]), 1.0)
     assert twice == pytest.approx([1.0, 1.0], rel=1e-6)
 
