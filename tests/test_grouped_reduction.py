@@ -35,6 +35,7 @@ from femubench.fem import (
     matrix_model,
     with_group_factors,
 )
+from femubench.plugins.readers import solid_elements
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
 BAR = Section(4e-4, 1.2e-8, 2.4e-8, 2e-8, 3.6e-8)
@@ -144,6 +145,58 @@ def test_frequencies_of_the_basis_are_those_of_the_whole_model(name: str) -> Non
         )
         own = np.sqrt(np.maximum(small[6:18], 0.0)) / (2.0 * np.pi)
         np.testing.assert_allclose(own, whole.elastic.natural_frequencies[:12], rtol=1e-3)
+
+
+@pytest.fixture(scope="module")
+def bar() -> Model:
+    """Return a stepped bar of bricks, free in space: two parts, glued by a layer of bricks."""
+    pytest.importorskip("skfem")
+    x, y, z = (v.ravel() for v in np.indices((22, 5, 5)))
+    kept = (x < 14) | (y < 4)
+    x, y, z = x[kept], y[kept], z[kept]
+    corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
+    corners = np.vstack([corners, corners + np.array([0, 0, 1])])
+    at = (np.stack([x, y, z], axis=1)[:, None] + corners).reshape(-1, 3)
+    nodes, cells = np.unique(at, axis=0, return_inverse=True)
+    own = {"foot": x < 9, "glue": x == 9, "arm": x > 9}
+    steel = np.tile([2.1e11, 0.3, 7850.0], (len(x), 1))
+    parts = {
+        name: solid_elements.assemble(
+            "C3D8I", cells.reshape(-1, 8)[some], 0.01 * nodes * (1.0, 0.9, 1.1), steel[some]
+        )
+        for name, some in own.items()
+    }
+    found = matrix_model(
+        sum(m for _, m in parts.values()), sum(k for k, _ in parts.values()),
+        np.repeat(np.arange(len(nodes)), 3).astype(str).tolist(), list("xyz") * len(nodes),
+        np.repeat(0.01 * nodes * (1.0, 0.9, 1.1), 3, axis=0), {n: k for n, (k, _) in parts.items()},
+    )  # fmt: skip
+    heavy = {name: m for name, (_, m) in parts.items()}
+    return replace(found, mass_groups=heavy, group_kinds={"glue": "joint"}, free=True)
+
+
+@pytest.mark.slow(20)
+def test_borders_of_many_rows_keep_few_motions_and_the_frequencies(bar: Model) -> None:
+    kept = np.array([0, 1, 2, bar.size - 3, bar.size - 2, bar.size - 1])
+    found = reduce_groups(bar, kept, 12)
+    assert bar.size > 1800
+    assert len(found.mass) < 400
+    assert found.moved < 1e-3
+    nominal = la.eigh(found.stiffness, found.mass, eigvals_only=True)[6:36]
+    whole = solve_modes(bar, 36).elastic.eigenvalues[:30]
+    np.testing.assert_allclose(nominal, whole, rtol=1e-7)
+    for name, factor in (("glue", 1e-3), ("glue", 0.1), ("foot", 0.3), ("arm", 3.0)):
+        changed = bar.stiffness + (factor - 1.0) * bar.groups[name]
+        whole = solve_modes(replace(bar, stiffness=changed), 18).elastic.eigenvalues[:12]
+        change = (factor - 1.0) * found.groups[name]
+        own = la.eigh(found.stiffness + change, found.mass, eigvals_only=True)[6:18]
+        assert np.all(own > (1.0 - 1e-7) * whole)
+        np.testing.assert_allclose(np.sqrt(own), np.sqrt(whole), rtol=1e-3)
+    heavier = bar.mass + 2.0 * bar.mass_groups["arm"]
+    whole = solve_modes(replace(bar, mass=heavier), 18).elastic.eigenvalues[:12]
+    heavy = found.mass + 2.0 * found.mass_groups["arm"]
+    own = la.eigh(found.stiffness, heavy, eigvals_only=True)[6:18]
+    np.testing.assert_allclose(np.sqrt(own), np.sqrt(whole), rtol=1e-3)
 
 
 def test_nominal_frequencies_are_exact(case: Case) -> None:

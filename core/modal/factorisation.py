@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import scipy.sparse as sp
 
+from femubench.core.errors import ModelError
 from femubench.core.modal.superlu_pivots import pivots
 from femubench.core.typing import FloatArray, SparseArray
 
@@ -144,6 +145,11 @@ class DefiniteLU:
         self._factor = factor if factor.negative == 0 else None
         return self._factor is not None
 
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return the inverse times one or several right sides, (n,) or (n, m)."""
+        assert self._factor is not None, "a definite matrix comes first"
+        return self._factor.solve(right)
+
     def compliance(self, basis: SparseArray) -> FloatArray:
         """Return basis' inverse basis of sparse columns, (p, p)."""
         assert self._factor is not None, "a definite matrix comes first"
@@ -153,6 +159,18 @@ class DefiniteLU:
 # A factorised symmetric matrix, and one that is definite, whose place others can take.
 Symmetric: TypeAlias = Cholesky | LU
 Definite: TypeAlias = Cholesky | DefiniteLU
+
+
+def factorise_definite(matrix: SparseArray) -> Definite:
+    """Return a factorised matrix.
+
+    Raises:
+        ModelError: when it is not definite.
+    """
+    found = DefiniteLU() if cholmod_obstacle() else Cholesky(matrix)
+    if not found.factorise(matrix):
+        raise ModelError("a part of the model is not held by its stiffness and has no mass")
+    return found
 
 
 def _blocks(columns: SparseArray) -> Iterator[FloatArray]:

@@ -2,52 +2,65 @@
 
 A diagnosis solves a model hundreds of times with its groups softer, stiffer or heavier. In one
 basis V that holds what all of these do, V' K_g V of every group is enough: the reduced model is a
-small one with the same groups, whatever the mesh. V starts from rigid motions, modes and the
-static response at the degrees of freedom that are kept. Then each group is softened and stiffened
-for itself, and the response to what its modes leave unbalanced there is added until neither this
-response nor the last one moves a frequency. Where all of it is more than there is room for, the
-motions that carry most energy of all these modes stay.
+small one with the same groups, whatever the mesh.
+
+A factor on a group scales its stiffness as a whole. What moves inside a group with its border, and
+how it vibrates with its border held, is therefore the same for every factor. So the inside of every
+group goes first, and the borders keep their softest motions: some thousand coordinates, in which a
+group is a dense block of those that it touches. There the model is solved with each group softened
+and stiffened for itself: all that a factor adds to the modes are answers to forces on the group.
+The motions that carry most energy of all these modes stay, next to the modes of the whole model.
 
 The kept degrees of freedom stay coordinates, so that sensors, masses and springs act on the
 reduced model as on the whole one. No rigid motion moves the other coordinates.
 
-Source: Craig & Bampton (1968), AIAA Journal 6, for kept degrees of freedom; Davidson (1975),
-J. Comput. Phys. 17, for vectors from residuals; Sirovich (1987), Quart. Appl. Math. 45, for those
-that carry most energy; Benner, Gugercin & Willcox (2015), SIAM Review 57,
-for bases in which parameters stay affine.
+Source: Craig & Bampton (1968), AIAA Journal 6, for modes of a part whose border is held; Castanier,
+Tan & Pierre (2001), AIAA Journal 39, for motions of borders; Sirovich (1987), Quart. Appl. Math.
+45, for those that carry most energy; Benner, Gugercin & Willcox (2015), SIAM Review 57, for bases
+in which parameters stay affine.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import DENSE_LIMIT, solve_modes
+from femubench.core.modal.factorisation import factorise_definite
 from femubench.core.modal.group_prior import group_prior_std
 from femubench.core.modal.rigid import rigid_body_vectors
-from femubench.core.modal.sparse_eigen import ShiftedModel
-from femubench.core.typing import FloatArray, IntArray, SparseArray
+from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 # What a joint or a clamp, of which little is known, may turn out to be; and any other part.
 JOINT_FACTORS = (1e-3, 0.03, 3.0)
 PART_FACTORS = (0.3, 3.0)
 _UNKNOWN = 1.0  # deviation of the logarithm of a group from which on it is one of the former
 _SHIFT = 0.5  # of the first elastic eigenvalue, below zero
+_FLOATING = 1e-11  # of the largest k/m: a shift that makes what floats definite
 _SPARE = 6  # modes above those that have to be right
 _NOMINAL = 30  # elastic modes that are there as they are, at least
-_ROUNDS = 24  # of residuals to a group and factor
-_A_ROUND = 16  # vectors that one of them adds at most
-_APART = 1e-7  # sine below which a vector lies in the span of the others
-_SHARE = 0.3  # of the tolerance, below which a residual does not matter
-_FAINT = 1e-4  # of the squared strength of all forces of a group, below which one has no response
-_SPREAD = 3  # times the room: motions that are weighed before the best of them stay
-_ROWS = 8192  # of motions that are turned at once
+_APART = 1e-10  # of the energy of a mode: what the coordinates may lack of it
+_DEPENDENT = 1e-13  # square of the sine below which a vector lies in the span of the others
+_BORDERS = 2400  # coordinates of all borders
+_BORDER = (12, 48)  # and of one, least and most
+_PATCH = (16, 10_000)  # rows around a border: times its own, and at most
+_FAINT = 1e-5  # of the strongest motion of a border
+_HELD = 3.0  # times the highest eigenvalue: modes of a group whose border is held
+_MOST_HELD = 64
+_DENSE = 300  # rows that are solved densely
+_STRONG = 1e-3  # of the energy of a mode, its root, from which on an inside has it
+_SHARE = 1e-4  # of the energy of an answer to forces on a group that the group itself has
+_WEAK = 1e-6  # of the energy of a mode, below which a group adds no motion
+_SOFT = 0.1  # times its stiffness: a joint when motions are weighed
+_LOST = 1e-3  # of the tolerance: energy of motions that are left out
 
 
 @dataclass(frozen=True)
@@ -58,9 +71,8 @@ class GroupedReduction:
         kept: rows of the whole model that are the first coordinates, (b,).
         stiffness, mass: (N, N).
         groups, mass_groups: parts of them by name, (N, N) each.
-        moved: how far off a frequency is, relative: by the response to what its mode leaves
-            unbalanced, and by what there was no room for; the largest of all groups, factors and
-            modes.
+        moved: how far off a frequency is, relative: by what the borders of groups lack of modes,
+            and by what there was no room for; the largest of all groups, factors and modes.
     """
 
     kept: IntArray
@@ -94,43 +106,51 @@ def reduce_groups(
     least = len(kept) + len(modes) + rigid.shape[1]
     if least > most:
         raise ModelError(f"sensors, attachments and modes take {least} coordinates of {most}")
-    groups = _parts_of(model)
-    frame = _Frame(model, float(np.abs(modes.elastic.eigenvalues[0])))
-    unit = np.zeros((model.size, len(kept)))
-    unit[kept, np.arange(len(kept))] = 1.0
-    base = frame.first([rigid, modes.shapes, frame.solver.solve(unit)])
-    softest, pieces, room, moved = [], [], _SPREAD * (most - base.shape[1]), 0.0
-    for name, part in groups.items():
-        known = part.is_mass or group_prior_std(model, name[1]) < _UNKNOWN
-        own = _Enriched(frame, part, count, tolerance)
-        for i, factor in enumerate(PART_FACTORS if known else JOINT_FACTORS):
-            try:
-                reference, left = own.settle(factor, room)
-            except la.LinAlgError:
-                what = f"{factor:g} times the {name[0]} of group {name[1]!r} leaves no model"
-                raise ModelError(what) from None
-            moved = max(moved, left)
-            if i == 0:  # where it moves by itself most, and loses most
-                softest.append((name, factor, reference, left))
-        pieces.append(own.motions())
-        room -= pieces[-1].shape[1]
-    frame.solver.forget()
-    vectors = frame.strongest(pieces, most - base.shape[1])
-    everything = {_K: _Part.of(model.stiffness), _M: _Part.of(model.mass), **groups}
-    parts = {name: part.within(vectors) for name, part in everything.items()}
-    for name, factor, reference, left in softest:
-        change = (factor - 1.0) * parts[name]
-        stiff, heavy = parts[_K], parts[_M]
-        stiff, heavy = (stiff, heavy + change) if groups[name].is_mass else (stiff + change, heavy)
-        values, _ = _ritz(heavy, stiff + frame.shift * heavy, frame.shift, len(reference))
-        off = np.sqrt(np.maximum(values, 0.0)) / reference - 1.0
-        moved = max(moved, left + float(off.max(initial=0.0)))
-    turn = _physical_coordinates(vectors[kept], vectors.T @ frame.energy(rigid))
-    small = {name: turn.T @ part @ turn for name, part in parts.items()}
+    elastic = modes.elastic
+    shift = _SHIFT * abs(float(elastic.eigenvalues[0]))
+    highest = float(elastic.eigenvalues[: count + _SPARE][-1])
+    span = _Substructures(
+        model, kept, rigid, elastic.shapes / np.sqrt(np.abs(elastic.eigenvalues)), highest
+    )
+    exact = np.hstack([rigid, modes.shapes])
+    try:
+        whole = _Reduced(span, model, exact, shift)
+    except la.LinAlgError:
+        raise ModelError("the stiffness is not definite in coordinates of its groups") from None
+    groups = {("stiffness", n): m for n, m in model.groups.items()}
+    groups |= {("mass", n): m for n, m in model.mass_groups.items()}
+    pieces: list[FloatArray] = []
+    settled: dict[tuple[_Name, float], FloatArray] = {}
+    for name, block in whole.blocks.items():
+        factors = PART_FACTORS if name[0] == "mass" else _factors(model, name[1])
+        try:
+            values, motions = whole.vary(block, name[0] == "mass", factors, count, highest)
+        except la.LinAlgError:
+            what = f"the {name[0]} of group {name[1]!r} leaves no model"
+            words = " or ".join(f"{factor:g}" for factor in factors)
+            raise ModelError(f"{words} times {what}") from None
+        settled |= {(name, factor): own for factor, own in zip(factors, values, strict=True)}
+        pieces.append(motions)
+    joints = [n for n in model.groups if _factors(model, n) is JOINT_FACTORS]
+    vectors = whole.strongest(pieces, joints, most, _LOST * tolerance)
+    small = {name: block.within(vectors) for name, block in whole.blocks.items()}
+    small[_K] = vectors.T @ whole.stiffness @ vectors
+    small[_M] = vectors.T @ whole.mass @ vectors
+    moved = 0.0
+    for (name, factor), reference in settled.items():
+        change, is_mass = (factor - 1.0) * small[name], name[0] == "mass"
+        heavy = small[_M] + change if is_mass else small[_M]
+        stiff = small[_K] if is_mass else small[_K] + change
+        own = _ritz(heavy, stiff + shift * heavy, shift, len(reference))[0]
+        moved = max(moved, float((np.sqrt(own / reference) - 1.0).max(initial=0.0)))
+    body = span.forces(whole.energy(rigid))
+    turn = _physical_coordinates(span.shapes[kept] @ vectors, vectors.T @ body)
+    small = {name: turn.T @ part @ turn for name, part in small.items()}
     stiffness, mass = (
         {name: small[kind, name] for name in own}
         for kind, own in (("stiffness", model.groups), ("mass", model.mass_groups))
     )
+    moved += whole.lacking
     return GroupedReduction(kept, small[_K], small[_M], stiffness, mass, moved)
 
 
@@ -138,34 +158,403 @@ _Name = tuple[str, str]
 _K, _M = ("stiffness", ""), ("mass", "")
 
 
-@dataclass
-class _Part:
-    """One of the matrices: the rows that it touches, and itself there."""
+def _factors(model: Model, name: str) -> tuple[float, ...]:
+    """Return what a group of the stiffness may turn out to be, the softest first."""
+    return PART_FACTORS if group_prior_std(model, name) < _UNKNOWN else JOINT_FACTORS
 
-    rows: IntArray
-    matrix: SparseArray
-    is_mass: bool
 
-    @classmethod
-    def of(cls, matrix: SparseArray, *, is_mass: bool = False) -> _Part:
-        rows = np.flatnonzero(np.diff(matrix.tocsc().indptr))
-        whole = len(rows) == matrix.shape[0]
-        return cls(rows, matrix if whole else matrix.tocsr()[rows][:, rows], is_mass)
+@dataclass(frozen=True)
+class _PartialMatrix:
+    """A symmetric matrix that is zero but for some coordinates.
+
+    Arguments:
+        at: these coordinates, (k,).
+        inside: the matrix there, (k, k).
+    """
+
+    at: IntArray
+    inside: FloatArray
 
     def within(self, vectors: FloatArray) -> FloatArray:
-        """Return the matrix in coordinates of some motions, (N, N)."""
-        found = np.zeros((vectors.shape[1],) * 2)
-        for start in range(0, vectors.shape[1], _A_ROUND * 4):
-            own = slice(start, start + _A_ROUND * 4)
-            found[:, own] = vectors[self.rows].T @ (self.matrix @ vectors[self.rows, own])
-        return 0.5 * (found + found.T)
+        """Return the matrix in coordinates of some vectors, (m, m)."""
+        own = vectors[self.at]
+        return np.asarray(own.T @ (self.inside @ own))
+
+    def add_to(self, matrix: FloatArray, factor: float = 1.0) -> None:
+        """Add a multiple of it to a matrix, (N, N)."""
+        matrix[np.ix_(self.at, self.at)] += factor * self.inside
+
+    def bordered(self, sides: FloatArray) -> _PartialMatrix:
+        """Return the matrix with the last coordinates, from what it does with these, (N, m)."""
+        size, new = sides.shape
+        at = np.append(self.at, np.arange(size - new, size))
+        inside = np.pad(self.inside, ((0, new), (0, new)))
+        inside[:, -new:] = sides[at]
+        inside[-new:] = sides[at].T
+        return _PartialMatrix(at, inside)
 
 
-def _parts_of(model: Model) -> dict[_Name, _Part]:
-    return {
-        **{("stiffness", n): _Part.of(m) for n, m in model.groups.items()},
-        **{("mass", n): _Part.of(m, is_mass=True) for n, m in model.mass_groups.items()},
-    }
+@dataclass(frozen=True)
+class _Interior:
+    """What only one part of the stiffness holds, and how coordinates move it.
+
+    Arguments:
+        rows: of the whole model, (i,).
+        at: coordinates that move them, (k,).
+        motions: (i, k).
+    """
+
+    rows: IntArray
+    at: IntArray
+    motions: FloatArray
+
+
+class _Substructures:
+    """The motions of a model that the borders of its groups and their insides have.
+
+    Arguments:
+        model: with groups.
+        kept: rows that are coordinates by themselves, the first ones, (b,).
+        rigid: motions as a body, (n, r).
+        known: modes of unit strain energy, (n, m).
+        highest: eigenvalue up to which modes have to be right.
+    """
+
+    def __init__(
+        self, model: Model, kept: IntArray, rigid: FloatArray, known: FloatArray, highest: float
+    ) -> None:
+        self.size, self.kept = model.size, kept
+        names = list(model.groups)
+        parts = [sp.csr_array(part) for part in model.groups.values()]
+        rest = sp.csr_array(_rest_of(model.stiffness, parts))
+        parts += [rest] if rest.nnz else []
+        touched = np.array([np.diff(part.indptr) > 0 for part in parts])
+        border = touched.sum(axis=0) != 1
+        border[kept] = True
+        owner = np.where(border, -1, touched.argmax(axis=0))
+        heavy = sp.coo_array(model.mass)  # may couple the insides of two groups
+        first, second = owner[heavy.row], owner[heavy.col]
+        border[heavy.row[(first != second) & (np.minimum(first, second) >= 0)]] = True
+        stiff, mass = model.stiffness.diagonal(), model.mass.diagonal()
+        loaded = (mass > 0.0) & (stiff > 0.0)
+        shift = _FLOATING * float((stiff[loaded] / mass[loaded]).max(initial=0.0))
+        whole = sp.csr_array(model.stiffness + shift * model.mass)
+        soft = [(_factors(model, name)[0], part) for name, part in zip(names, parts, strict=False)]
+        size = np.sqrt(whole.diagonal())  # forces and moments alike
+        size = np.where(size > 0.0, size, 1.0)[:, None]
+        at, shapes = [kept], [sp.diags_array(1.0 / size[kept, 0])]
+        free = np.setdiff1d(np.flatnonzero(border), kept)
+        borders = _borders(whole, touched, free)
+        most = int(np.clip(_BORDERS / max(len(borders), 1), *_BORDER))
+        for rows in borders:
+            changes = [(f - 1.0) * part for own, (f, part) in zip(touched, soft, strict=False)
+                       if own[rows[0]]]  # fmt: skip
+            at.append(rows)
+            shapes.append(_traces(whole, changes, size, rows, rigid, known, most))
+        found = sp.coo_array(sp.block_diag(shapes))
+        places = np.concatenate(at)[found.row], found.col
+        self.shapes = sp.csr_array((found.data, places), shape=(self.size, found.shape[1]))
+        self.insides: list[_Interior] = []
+        inertia = sp.csr_array(model.mass)
+        for i in range(len(parts)):
+            rows = np.flatnonzero(~border & (owner == i))
+            if len(rows):
+                softest = soft[i][0] if i < len(names) else 1.0
+                self._eliminate(whole[rows], inertia[rows], rows, known, highest / softest)
+
+    @property
+    def count(self) -> int:
+        """Return the number of coordinates."""
+        return int(self.shapes.shape[1])
+
+    def _eliminate(
+        self, across: SparseArray, inertia: SparseArray, rows: IntArray, known: FloatArray,
+        highest: float,
+    ) -> None:  # fmt: skip
+        """Add what the inside of a part does when its border moves, and when it is held."""
+        inside = sp.csc_array(across[:, rows])
+        solver = factorise_definite(inside)
+        pulled = sp.csc_array(across @ self.shapes)  # shapes are zero inside
+        at = np.flatnonzero(np.diff(pulled.indptr))
+        static = -solver.solve(pulled[:, at].toarray())
+        modes = _held_modes(solver.solve, inside, sp.csc_array(inertia[:, rows]), highest)
+        beyond = solver.solve(across @ known)  # what the border does not make it do at once
+        beyond -= modes @ (modes.T @ (inside @ beyond))
+        values, turn = la.eigh(beyond.T @ (inside @ beyond))
+        strong = values > _STRONG**2
+        more = beyond @ (turn[:, strong] / np.sqrt(values[strong]))
+        new = np.arange(modes.shape[1] + more.shape[1]) + self.count
+        self.shapes.resize(self.size, self.count + len(new))
+        self.insides.append(_Interior(rows, np.append(at, new), np.hstack([static, modes, more])))
+
+    def lift(self, coordinates: FloatArray) -> FloatArray:
+        """Return the motions of the whole model, (n, m)."""
+        found = np.asarray(self.shapes @ coordinates)
+        for part in self.insides:
+            found[part.rows] = part.motions @ coordinates[part.at]
+        return found
+
+    def add(self, vectors: FloatArray) -> None:
+        """Take further motions of the whole model as coordinates, the last ones, (n, m)."""
+        new = np.arange(vectors.shape[1]) + self.count
+        on_border = vectors.copy()
+        for i, part in enumerate(self.insides):
+            on_border[part.rows] = 0.0
+            motions = np.hstack([part.motions, vectors[part.rows]])
+            self.insides[i] = _Interior(part.rows, np.append(part.at, new), motions)
+        self.shapes = sp.hstack([self.shapes, sp.csr_array(on_border)], format="csr")
+
+    def forces(self, force: FloatArray) -> FloatArray:
+        """Return what forces on the whole model do along the coordinates, (N, m)."""
+        found = np.asarray(self.shapes.T @ force)
+        for part in self.insides:
+            found[part.at] += part.motions.T @ force[part.rows]
+        return found
+
+    def reduce(self, matrix: SparseArray) -> _PartialMatrix:
+        """Return a matrix in the coordinates."""
+        matrix = sp.csr_array(matrix)
+        touched = np.diff(matrix.indptr) > 0
+        moving = np.diff(self.shapes[touched].tocsc().indptr) > 0
+        insides = [part for part in self.insides if touched[part.rows].any()]
+        for part in insides:
+            moving[part.at] = True
+        at = np.flatnonzero(moving)
+        place = np.cumsum(moving) - 1
+        shapes = self.shapes[:, at]
+        found = (shapes.T @ (matrix @ shapes)).toarray()
+        for part in insides:
+            own, across = place[part.at], matrix[part.rows]
+            side = shapes.T @ (across.T @ part.motions)
+            found[:, own] += side
+            found[own] += side.T
+            found[np.ix_(own, own)] += part.motions.T @ (across[:, part.rows] @ part.motions)
+        return _PartialMatrix(at, 0.5 * (found + found.T))
+
+
+def _rest_of(whole: SparseArray, parts: Sequence[SparseArray]) -> SparseArray:
+    """Return what parts leave of a matrix, without what rounding left."""
+    found = sp.coo_array(whole - sum(parts, sp.csc_array(whole.shape)))
+    size = np.sqrt(np.abs(whole.diagonal()))
+    real = np.abs(found.data) > 1e-10 * size[found.row] * size[found.col]
+    return sp.csc_array((found.data[real], (found.row[real], found.col[real])), shape=found.shape)
+
+
+def _borders(whole: SparseArray, touched: BoolArray, rows: IntArray) -> list[IntArray]:
+    """Return rows that the same parts touch and that are connected, border by border."""
+    kinds = np.unique(touched[:, rows], axis=1, return_inverse=True)[1]
+    links = sp.coo_array(whole[rows][:, rows])
+    same = kinds[links.row] == kinds[links.col]
+    graph = sp.coo_array((same[same], (links.row[same], links.col[same])), shape=links.shape)
+    number, label = connected_components(graph, directed=False)
+    return [rows[label == i] for i in range(number)]
+
+
+def _traces(
+    whole: SparseArray, changes: Sequence[SparseArray], size: FloatArray, rows: IntArray,
+    rigid: FloatArray, known: FloatArray, most: int,
+) -> SparseArray:  # fmt: skip
+    """Return how a border moves when what is some way off does, (f, k).
+
+    What its forces do there dies out with the distance, so that few motions remain.
+
+    Arguments:
+        whole: the definite stiffness, (n, n).
+        changes: of it, one at a time, (n, n) each.
+        size: roots of the diagonal of it, (n, 1).
+        rows: of the border, (f,).
+        rigid, known: motions of the whole model of which it has the traces, (n, r), (n, m).
+        most: k.
+
+    Source: Babuska & Lipton (2011), Multiscale Model. Simul. 9, for optimal local spaces; Buhr &
+    Smetana (2018), SIAM J. Sci. Comput. 40, for random data.
+    """
+    if len(rows) <= most:
+        return sp.diags_array(1.0 / size[rows, 0])
+    near = [rows]
+    while len(near) < 3 or len(near[-1]) < min(_PATCH[0] * len(rows), _PATCH[1]):
+        near.append(np.unique(whole[near[-1]].indices))
+        if len(near[-1]) == len(near[-2]):  # nothing lies farther off
+            near.pop()
+            break
+    inner = near[-2] if len(near) > 1 else rows
+    outer = np.setdiff1d(near[-1], inner)
+    body = la.orth(rigid[rows] * size[rows], rcond=1e-9)
+
+    def bend(motions: FloatArray) -> FloatArray:
+        scaled = motions * size[rows]
+        return np.asarray(scaled - body @ (body.T @ scaled))
+
+    found = bend(known[rows])
+    # What moves as a body is bent by rounding alone.
+    least = _FAINT * la.norm(size[rows] * known[rows], axis=0) + 1e-300
+    pieces = [found / np.maximum(la.norm(found, axis=0), least)]
+    moved = np.random.default_rng(0).standard_normal((len(outer), most + 8)) / size[outer]
+    own = np.searchsorted(inner, rows)
+    for change in [None, *changes] if len(outer) else []:
+        across = whole[inner] if change is None else whole[inner] + change[inner]
+        solver = factorise_definite(sp.csc_array(across[:, inner]))
+        found = bend(solver.solve(across[:, outer] @ moved)[own])
+        pieces.append(found / max(la.norm(found, 2), 1e-300))
+    shapes, strength, _ = la.svd(np.hstack(pieces), full_matrices=False)
+    shapes = shapes[:, strength > _FAINT * strength[0]][:, : most - body.shape[1]]
+    return sp.coo_array(np.hstack([body, shapes]) / size[rows])
+
+
+def _held_modes(
+    solve: Callable[[FloatArray], FloatArray],
+    stiffness: SparseArray,
+    mass: SparseArray,
+    highest: float,
+) -> FloatArray:
+    """Return modes of what lies inside a border that is held, of unit energy, (i, k)."""
+    size, limit = mass.shape[0], _HELD * highest
+    if size <= _DENSE:
+        mu, modes = la.eigh(mass.toarray(), stiffness.toarray())
+        return np.asarray(modes[:, ::-1][:, mu[::-1] * limit > 1.0][:, :_MOST_HELD])
+    loaded = np.count_nonzero(mass.diagonal())
+    operator = LinearOperator((size, size), matvec=solve, dtype=float)
+    modes, values = np.zeros((size, 0)), np.zeros(0)
+    for count in (min(most, loaded // 2) for most in (8, 24, _MOST_HELD) if loaded > 1):
+        values, modes = eigsh(stiffness, k=count, M=mass, sigma=0.0, OPinv=operator, which="LM",
+                              v0=np.ones(size))  # fmt: skip
+        if values.max() > limit:
+            break
+    return np.asarray(modes / np.sqrt(values))[:, values <= limit]
+
+
+class _Reduced:
+    """A model in coordinates of substructures, with its modes as they are.
+
+    Arguments:
+        span: the coordinates, to which those are added that its modes lack.
+        model: whole.
+        exact: rigid motions and modes, (n, m).
+        shift: s of A = K + s M, in rad^2/s^2.
+    """
+
+    def __init__(self, span: _Substructures, model: Model, exact: FloatArray, shift: float) -> None:
+        self.model, self.shift = model, shift
+        kinds = (
+            ("stiffness", model.stiffness, model.groups),
+            ("mass", model.mass, model.mass_groups),
+        )
+        self.blocks: dict[_Name, _PartialMatrix] = {}
+        totals = []
+        for kind, whole, parts in kinds:
+            own = {(kind, name): span.reduce(part) for name, part in parts.items()}
+            self.blocks |= own
+            total = np.zeros((span.count,) * 2)
+            for block in (*own.values(), span.reduce(_rest_of(whole, list(parts.values())))):
+                block.add_to(total)
+            totals.append(total)
+        exact = exact / np.sqrt(np.einsum("ij,ij->j", exact, self.energy(exact)))
+        forces, new = self.energy(exact), exact
+        factor = la.cho_factor(totals[0] + shift * totals[1])
+        for _ in range(2):  # the second time what rounding left
+            new = new - span.lift(la.cho_solve(factor, span.forces(self.energy(new))))
+        gram = new.T @ self.energy(new)
+        # What the coordinates lack of the energy of a mode raises its eigenvalue.
+        self.lacking = 0.5 * float(gram.diagonal().max(initial=0.0))
+        values, turn = la.eigh(0.5 * (gram + gram.T))
+        strong = values > _APART
+        if strong.any():
+            new = new @ (turn[:, strong] / np.sqrt(values[strong]))
+            span.add(new)
+            for kind, _, parts in kinds:
+                for name, part in parts.items():
+                    block = self.blocks[kind, name]
+                    self.blocks[kind, name] = block.bordered(span.forces(part @ new))
+            everything = np.arange(len(totals[0]))
+            totals = [
+                _PartialMatrix(everything, total).bordered(span.forces(whole @ new)).inside
+                for total, (_, whole, _) in zip(totals, kinds, strict=True)
+            ]
+        self.stiffness, self.mass = totals
+        self.shifted = self.stiffness + shift * self.mass
+        factor = la.cho_factor(self.shifted)
+        self.inverse = la.cho_solve(factor, np.eye(span.count))
+        answers = np.hstack([self.inverse @ span.forces(forces), self.inverse[:, : len(span.kept)]])
+        self.base = _orthonormal(answers, answers.T @ self.shifted @ answers, _DEPENDENT)
+        # In answers to forces along the coordinates, the mass.
+        self._half = self.inverse @ (self.mass @ self.base)
+        self._heavy = self.inverse @ self.mass @ self.inverse
+
+    def energy(self, vectors: FloatArray) -> FloatArray:
+        """Return A times motions of the whole model, (n, m)."""
+        return self.model.stiffness_times(vectors) + self.shift * self.model.mass_times(vectors)
+
+    def vary(
+        self,
+        block: _PartialMatrix,
+        is_mass: bool,
+        factors: Sequence[float],
+        count: int,
+        highest: float,
+    ) -> tuple[list[FloatArray], FloatArray]:
+        """Return the modes with factors on a group: what forces on it add to those without.
+
+        Returns:
+            Their elastic eigenvalues, (m,) each, and the motions that they need in addition, of
+            the energy that modes of unit energy have in them, (N, k).
+        """
+        values, turn = la.eigh(block.inside)
+        some = np.abs(values) > 1e-12 * np.abs(values).max(initial=0.0)
+        pull, sign = turn[:, some] * np.sqrt(np.abs(values[some])), np.sign(values[some])
+        # The answers are inverse[:, at] pull, less what the base has of them.
+        at, base = block.at, self.base
+        known, pushed = base[at].T @ pull, self._half[at].T @ pull
+        gram = pull.T @ self.inverse[np.ix_(at, at)] @ pull - known.T @ known
+        share, ways = la.eigh(0.5 * (gram + gram.T))
+        strong = share > _SHARE / (highest if is_mass else 1.0)
+        ways = ways[:, strong] / np.sqrt(share[strong])
+        within = base.T @ self.mass @ base
+        side = pushed - within @ known
+        heavy = pull.T @ self._heavy[np.ix_(at, at)] @ pull - known.T @ pushed - side.T @ known
+        side, heavy = side @ ways, ways.T @ heavy @ ways
+        mass = np.block([[within, side], [side.T, heavy]])
+        moved = np.vstack([known, ways.T @ gram])
+        own = (moved * sign) @ moved.T
+        found, parts = [], [np.zeros((ways.shape[1], 0))]
+        for factor in factors:
+            change = (factor - 1.0) * own
+            shifted = np.eye(len(own)) + (self.shift if is_mass else 1.0) * change
+            values, x = _ritz(mass + change if is_mass else mass, shifted, self.shift, count)
+            found.append(values)
+            parts.append(x[base.shape[1] :] / np.sqrt(values + self.shift))
+        turn, strength, _ = la.svd(np.hstack(parts), full_matrices=False)
+        turn = ways @ (turn * strength)[:, np.square(strength) > _WEAK]
+        return found, np.asarray(self.inverse[:, at] @ (pull @ turn) - base @ (known @ turn))
+
+    def strongest(
+        self, pieces: list[FloatArray], joints: Sequence[str], most: int, lost: float
+    ) -> FloatArray:
+        """Return the base and the motions of most energy, orthonormal in A, (N, k).
+
+        Arguments:
+            pieces: motions of the energy that modes have in them.
+            joints: groups in which energy weighs less, as when they are soft.
+            most: k at most.
+            lost: energy below which a motion is left out.
+        """
+        weight = self.shifted.copy()
+        for name in joints:
+            self.blocks["stiffness", name].add_to(weight, _SOFT - 1.0)
+        added, base = np.hstack(pieces), self.base
+        side = weight @ base
+        added -= base @ la.solve(base.T @ side, side.T @ added, assume_a="pos")
+        values, turn = la.eigh(added.T @ (weight @ added))
+        strong = np.flatnonzero(values > lost)[::-1][: most - base.shape[1]]
+        found = np.hstack([base, added @ (turn[:, strong] / np.sqrt(values[strong]))])
+        return _orthonormal(found, found.T @ (self.shifted @ found), _DEPENDENT)
+
+
+def _orthonormal(vectors: FloatArray, gram: FloatArray, apart: float) -> FloatArray:
+    """Return an orthonormal basis of vectors by their products, (n, k)."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
+    values, turn = la.eigh(0.5 * scale[:, None] * (gram + gram.T) * scale)
+    some = values > apart * values[-1]
+    return np.asarray(vectors @ (scale[:, None] * turn[:, some] / np.sqrt(values[some])))
 
 
 def _ritz(
@@ -179,217 +568,6 @@ def _ritz(
     elastic = np.flatnonzero(values > 1e-6 * shift)[:count]
     x = x[:, ::-1][:, elastic]
     return values[elastic], x / np.sqrt(np.einsum("ij,ij->j", x, mass @ x))
-
-
-class _Frame:
-    """A model at a shift, and the motions that every group begins with, orthonormal in A."""
-
-    def __init__(self, model: Model, first: float) -> None:
-        self.model, self.shift = model, _SHIFT * first
-        self.solver = ShiftedModel(model, -self.shift)
-        self.base = self.forces = np.zeros((model.size, 0))
-        self.mass = np.zeros((0, 0))
-
-    def energy(self, vectors: FloatArray) -> FloatArray:
-        """Return A times vectors, A = K + s M, (n, m)."""
-        return self.model.stiffness_times(vectors) + self.shift * self.model.mass_times(vectors)
-
-    def first(self, vectors: Iterable[FloatArray]) -> FloatArray:
-        """Keep what every group begins with."""
-        for some in vectors:
-            own, forces = self.apart(some, self.base, self.forces)
-            self.base, self.forces = np.hstack([self.base, own]), np.hstack([self.forces, forces])
-        self.mass = self.base.T @ self.model.mass_times(self.base)
-        return self.base
-
-    def apart(
-        self, vectors: FloatArray, others: FloatArray, forces: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return what others lack of some vectors, orthonormal, and A times it, (n, k) each.
-
-        Arguments:
-            vectors: (n, m).
-            others: orthonormal in A, (n, N).
-            forces: A times these, (n, N).
-        """
-        own = vectors / np.sqrt(
-            np.maximum(np.einsum("ij,ij->j", vectors, self.energy(vectors)), 1e-300)
-        )
-        for _ in range(2):  # the second time what rounding left
-            own -= others @ (forces.T @ own)
-            force = self.energy(own)
-            values, turn = la.eigh(own.T @ force)
-            strong = np.flatnonzero(values > _APART**2)[::-1]
-            turn = turn[:, strong] / np.sqrt(values[strong])
-            own, force = own @ turn, force @ turn
-        return own, force
-
-    def strongest(self, pieces: list[FloatArray], most: int) -> FloatArray:
-        """Return the base and what is added to it, the motions of most energy, (n, N).
-
-        Arguments:
-            pieces: motions apart from the base, of the energy that modes have in them.
-            most: how many are added.
-        """
-        start = self.base.shape[1]
-        found = np.hstack([self.base, *pieces])
-        own = found[:, start:]
-        pieces.clear()
-        gram = np.zeros((own.shape[1],) * 2)
-        for at in range(0, own.shape[1], _A_ROUND * 4):
-            some = slice(at, at + _A_ROUND * 4)
-            own[:, some] -= self.base @ (self.forces.T @ own[:, some])
-        for at in range(0, own.shape[1], _A_ROUND * 4):
-            some = slice(at, at + _A_ROUND * 4)
-            gram[:, some] = own.T @ self.energy(own[:, some])
-        values, turn = la.eigh(0.5 * (gram + gram.T))
-        strong = np.flatnonzero(values > _APART**2 * values.max(initial=0.0))[::-1][:most]
-        turn = turn[:, strong] / np.sqrt(values[strong])
-        for at in range(0, len(own), _ROWS):
-            own[at : at + _ROWS, : len(strong)] = own[at : at + _ROWS] @ turn
-        return found[:, : start + len(strong)]
-
-
-class _Enriched:
-    """The motions that one group asks for in addition to those that every group begins with.
-
-    Only forces on the group's rows have a response, so all but inertia is known from these rows.
-    """
-
-    def __init__(self, frame: _Frame, part: _Part, count: int, tolerance: float) -> None:
-        self.frame, self.part, self.count, self.tolerance = frame, part, count, tolerance
-        rows, start = part.rows, frame.base.shape[1]
-        self.mass = frame.mass
-        self.answers = np.zeros((frame.model.size, 0))
-        self._turn = np.eye(start)  # from the base and the answers to what is orthonormal in A
-        # Of the base and the answers, before they are turned. A soft group is a difference of
-        # large numbers, so that what is orthonormal but for rounding is not taken for it.
-        self._weight, self._gram = frame.mass, np.eye(start)
-        self.shifted = self._gram
-        # On the rows of the group: motions, A and M times these, and forces of the group.
-        self.inside, self.forces = frame.base[rows], frame.forces[rows]
-        # Rows of a symmetric matrix are its columns.
-        self.heavy = sp.csc_array(frame.model.mass)[:, rows].T.tocsr() @ frame.base
-        self.moved = part.matrix @ self.inside
-        model = frame.model
-        diagonal = model.stiffness.diagonal() + frame.shift * model.mass.diagonal()
-        self._size = np.sqrt(diagonal[rows])  # forces and moments alike
-        self._modes: list[FloatArray] = []
-
-    def settle(self, factor: float, room: int) -> tuple[FloatArray, float]:
-        """Add what the modes with a factor on the group lack.
-
-        Returns:
-            Their natural frequencies, rad/s, (m,), and how far off these are, relative.
-        """
-        left = 0.0
-        for _ in range(_ROUNDS):
-            values, x = self._solve(factor)
-            added, left = self._respond(factor, values, x, room)
-            if not added:
-                break
-        energy = values + self.frame.shift
-        self._modes.append(x[len(self.frame.mass) :] / np.sqrt(energy))
-        return np.sqrt(np.maximum(values, 0.0)), left
-
-    def motions(self) -> FloatArray:
-        """Return what was added, as combinations of the energy that the modes have in them."""
-        start, size = len(self.frame.mass), len(self.mass)
-        modes = [np.pad(x, ((0, size - start - len(x)), (0, 0))) for x in self._modes]
-        turn, strength, _ = la.svd(np.hstack(modes), full_matrices=False)
-        lost = np.cumsum(np.square(strength)[::-1])[::-1]
-        strong = lost > 0.1 * _SHARE * self.tolerance
-        turn = self._turn[:, start:] @ (turn * strength)[:, strong]
-        return np.asarray(self.frame.base @ turn[:start] + self.answers @ turn[start:])
-
-    def _solve(self, factor: float) -> tuple[FloatArray, FloatArray]:
-        """Return the first elastic eigenvalues with a factor on the group, and coordinates."""
-        change = (factor - 1.0) * (self.inside.T @ self.moved)
-        mass, shift = self.mass, self.frame.shift
-        shifted = self.shifted + (shift if self.part.is_mass else 1.0) * change
-        return _ritz(mass + change if self.part.is_mass else mass, shifted, shift, self.count)
-
-    def _respond(
-        self, factor: float, values: FloatArray, x: FloatArray, room: int
-    ) -> tuple[int, float]:
-        """Add the response to what modes with a factor on the group leave unbalanced there.
-
-        Elsewhere they leave no more than the inertia of these responses.
-
-        Returns:
-            How many vectors were added, and how far they would move a frequency, relative.
-        """
-        frame, part = self.frame, self.part
-        change = (factor - 1.0) * (self.moved @ x)
-        residual = self.forces @ x - (values + frame.shift) * (self.heavy @ x)
-        residual = (residual + (-values * change if part.is_mass else change)) / np.sqrt(values)
-        # Few directions of force make up most residuals: those of what connects two parts.
-        weighed = residual / self._size[:, None]
-        strength, turn = la.eigh(weighed.T @ weighed)
-        if not (strength > 0.0).any():
-            return 0, 0.0
-        residual = residual @ turn[:, strength > _FAINT * strength[-1]]
-        loads = np.zeros((frame.model.size, residual.shape[1]))
-        loads[part.rows] = residual
-        answer = frame.solver.solve(loads)
-        # What lies in the span is balanced by the inertia of the rest, which is left out here.
-        known = self.inside.T @ residual
-        own = answer[part.rows] - self.inside @ known
-        pull = residual.T @ own
-        # With energy H of the answers at this factor, G H^-1 G lowers the eigenvalues, relatively.
-        energy = pull.copy()
-        if not part.is_mass:
-            # What the span then adds to an answer makes it softer.
-            border = (factor - 1.0) * (self.moved.T @ own)
-            within = self.shifted + (factor - 1.0) * (self.inside.T @ self.moved)
-            energy += (factor - 1.0) * (own.T @ (part.matrix @ own))
-            energy -= border.T @ la.solve(within, border, assume_a="pos")
-        # The span leaves nothing of an answer that it has.
-        answered = np.einsum("ij,ij->j", residual, answer[part.rows])
-        lacking = np.flatnonzero(pull.diagonal() > _APART * answered)
-        if not len(lacking):
-            return 0, 0.0
-        pull, energy = (part[np.ix_(lacking, lacking)] for part in (pull, energy))
-        if not (energy.diagonal() > 0.0).all():
-            raise la.LinAlgError("a motion without energy")
-        scale = 1.0 / np.sqrt(energy.diagonal())
-        strength, turn = la.eigh(scale[:, None] * energy * scale)
-        sound = strength > 1e-12 * strength[-1]
-        ways = scale[:, None] * turn[:, sound] / np.sqrt(strength[sound])
-        left, gain, _ = la.svd(ways.T @ pull)
-        most = min(_A_ROUND, room - self.answers.shape[1])
-        kept = np.flatnonzero(np.square(gain) > 2.0 * _SHARE * self.tolerance)[: max(most, 0)]
-        if len(kept):
-            self._add(answer[:, lacking] @ (ways @ left[:, kept]))
-        return len(kept), 0.5 * float(np.square(gain).max(initial=0.0))
-
-    def _add(self, answer: FloatArray) -> None:
-        """Add answers to forces on the rows of the group."""
-        frame, rows, before = self.frame, self.part.rows, self._turn.shape[1]
-
-        def by(forces: FloatArray) -> FloatArray:
-            return np.vstack([frame.base.T @ forces, self.answers.T @ forces])
-
-        pushed, weighted = frame.energy(answer), frame.model.mass_times(answer)
-        side, corner = by(pushed), answer.T @ pushed
-        known = self._turn.T @ side
-        gram = corner - known.T @ known
-        values, turn = la.eigh(0.5 * (gram + gram.T))
-        strong = values > _APART * values[-1]
-        turn = turn[:, strong] / np.sqrt(values[strong])
-        # An answer less what the span has of it, in coordinates of the base and all answers.
-        border, padded = by(weighted), np.zeros((answer.shape[1], before))
-        self._weight = np.block([[self._weight, border], [border.T, answer.T @ weighted]])
-        self._gram = np.block([[self._gram, side], [side.T, 0.5 * (corner + corner.T)]])
-        self._turn = np.block([[self._turn, -self._turn @ known @ turn], [padded, turn]])
-        self.mass = self._turn.T @ self._weight @ self._turn
-        self.shifted = self._turn.T @ self._gram @ self._turn
-        self.answers = np.hstack([self.answers, answer])
-        news = {"inside": answer, "forces": pushed, "heavy": weighted}
-        for name, new in news.items():
-            old = getattr(self, name)
-            setattr(self, name, np.hstack([old, (new[rows] - old @ known) @ turn]))
-        self.moved = np.hstack([self.moved, self.part.matrix @ self.inside[:, before:]])
 
 
 def _hold_rigid(kept: IntArray, rigid: FloatArray) -> IntArray:
