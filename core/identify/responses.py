@@ -48,7 +48,7 @@ def identify_responses(
     """
     data = measured if band is None else measured.within(*band)
     data = data.within(np.nextafter(0.0, 1.0), np.inf)
-    if len(data.references) > len(data.responses):
+    if len(data.references) > len(data.responses) and data.quantity != "free decay":
         data = data.transpose()
     if len(data.frequencies) < _FEWEST_LINES:
         what = f"{len(data.frequencies)} lines above 0 Hz in the band"
@@ -59,12 +59,26 @@ def identify_responses(
     values = np.where(seen, data.values, 0.0)
     poles = _all_poles(data.frequencies, values, seen, most_poles)
     omega, derivative = 2.0 * np.pi * data.frequencies, DERIVATIVES[data.quantity]
-    lines = Lines.of(omega, derivative, values, np.ones(len(omega)))
+    lines = Lines.of(omega, derivative, values, _course(data, seen))
     able = (poles.damping > 1e-6) & (poles.damping < _LARGEST_DAMPING)
     orders = len(np.unique(poles.orders))
     clusters = [c for c in clusters_of(poles.select(able), orders) if c.support >= _SUPPORT]
     fit, lines = _fitted(lines, clusters, seen)
     return _identification(data, fit, lines, clusters, poles)
+
+
+def _course(data: FrequencyResponses, seen: BoolArray) -> FloatArray:
+    """Return the noise of every line over the mean, as the deviations of the data have it, (n_f,).
+
+    A line without a deviation has that of the others.
+    """
+    if data.deviations is None:
+        return np.ones(len(data.frequencies))
+    known = np.square(data.deviations[:, seen])
+    known = known[:, np.isfinite(known).all(axis=0) & (known > 0.0).any(axis=0)]
+    if not known.size:
+        return np.ones(len(known))
+    return np.asarray(np.sqrt(np.maximum((known / known.mean(axis=0)).mean(axis=1), 1e-6)))
 
 
 def _all_poles(
@@ -142,38 +156,60 @@ def _identification(
     clusters: Sequence[Cluster],
     poles: Poles,
 ) -> Identification:
-    hz, ratio = np.abs(fit.poles) / (2.0 * np.pi), -fit.poles.real / np.abs(fit.poles)
+    s = fit.poles + data.decay
+    hz, ratio = np.abs(s) / (2.0 * np.pi), -s.real / np.abs(s)
     low, high = float(data.frequencies[0]), float(data.frequencies[-1])
     inside = (hz >= low) & (hz <= high) & (ratio < _LARGEST_DAMPING)
     order = np.flatnonzero(inside)[np.argsort(hz[inside])]
     if not len(order):
         raise InputError(_NO_MODE, expected="resonances in the band")
-    s, size = fit.poles, np.abs(fit.poles)
+    size = np.abs(s)
     to_hz = np.stack([s.real, s.imag], axis=1) / (2.0 * np.pi * size[:, None])
     to_ratio = np.stack([-np.square(s.imag), s.real * s.imag], axis=1) / (size**3)[:, None]
+    of_poles, of_shapes = _windowed(-fit.poles.real, data)
     stds = [
-        np.sqrt(np.einsum("na,nab,nb->n", way, fit.pole_covariance, way))
+        np.sqrt(of_poles * np.einsum("na,nab,nb->n", way, fit.pole_covariance, way))
         for way in (to_hz, to_ratio)
     ]
-    shapes, shape_std = _scaled_shapes(fit.shapes[:, order], fit.shape_covariance[order])
+    covariance = fit.shape_covariance[order] * of_shapes[order, None, None]
+    shapes, shape_std = _scaled_shapes(fit.shapes[:, order], covariance)
     support = [
         max((c.support for c in clusters if abs(c.pole - pole) < _SAME * abs(pole)), default=0.0)
-        for pole in s[order]
+        for pole in fit.poles[order]
     ]
     return Identification(
         sensors=data.responses,
         frequencies=hz[order],
         frequency_std=stds[0][order],
-        damping=ratio[order],
+        damping=np.maximum(ratio[order], 0.0),
         damping_std=stds[1][order],
         shapes=shapes,
         shape_std=shape_std,
         support=np.array(support),
-        poles=poles,
+        poles=replace(poles, values=poles.values + data.decay),
         band=(low, high),
         measured=data,
         synthesised=predict_responses(fit, lines) * lines.noise[:, None, None],
     )
+
+
+def _windowed(rates: FloatArray, data: FrequencyResponses) -> tuple[FloatArray, FloatArray]:
+    """Return by how much the variances of poles and of shapes grow under an exponential window.
+
+    It makes the noise of neighbouring lines alike, which the fit takes to be independent: over
+    time, noise of variance e^-2wt meets e^-at, or (t - 1 / 2a) e^-at, where a fit counts on its
+    mean.
+
+    Arguments:
+        rates: a, of the modes under the window, in 1/s, (n,).
+        data: whose window decays with w.
+    """
+    if not data.decay:
+        return np.ones(len(rates)), np.ones(len(rates))
+    ends = 2.0 * data.decay / float(np.diff(data.frequencies).mean())
+    share = rates / (rates + data.decay)
+    mean = ends / -np.expm1(-ends)
+    return mean * (2.0 * share**3 - 2.0 * share**2 + share), mean * share
 
 
 def _scaled_shapes(shapes: AnyArray, covariance: FloatArray) -> tuple[AnyArray, FloatArray]:
