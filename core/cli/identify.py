@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from femubench.core.cli import options
-from femubench.core.cli.progress import waiting
+from femubench.core.cli.progress import progress
 from femubench.core.cli.registry import plugins_for
 from femubench.core.files import check_new
 from femubench.core.library.cases import way_of
@@ -93,10 +93,9 @@ def identify(
     from femubench.core.library.identify import identification_of, write_identification
 
     source = ", ".join(file.name for file in files)
-    with waiting(f"looking for modes in {source}", quiet=quiet):
-        found = identification_of(
-            *(files, plugins_for(ctx), band, order, sensors, variables, excitation, estimator)
-        )
+    asked = (band, order, sensors, variables, excitation, estimator)
+    with progress(source, quiet=quiet) as on_advance:
+        found = identification_of(files, plugins_for(ctx), *asked, on_advance)
     if not quiet:
         click.echo(way_of("terminal", "render_modes")(found))
     if output is not None:

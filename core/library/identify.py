@@ -32,7 +32,7 @@ from femubench.core.identify.output_only import MOST_ORDER, identify_signals
 from femubench.core.identify.responses import MOST_POLES, identify_responses
 from femubench.core.library.cases import usable_plugins, way_of
 from femubench.core.modal.signals import TimeSignals, join_records
-from femubench.core.pace import OnAdvance
+from femubench.core.pace import Advance, OnAdvance
 from femubench.core.plugin.loader import Plugins
 
 _ORDERS = (4, 400)
@@ -109,6 +109,8 @@ def identification_of(
     if band is not None and not (0.0 <= band[0] < band[1] and np.isfinite(band).all()):
         raise InputError(f"band = {band!r}", expected="low, high in Hz, low < high")
     file, known = None, None
+    tell = on_advance or (lambda _: None)
+    tell(Advance(0, 3, "reading"))
     if sensors is not None:
         check_regular(Path(sensors), 2**26)
         known = read_places(Path(sensors))
@@ -129,8 +131,11 @@ def identification_of(
             if isinstance(measured, TimeSignals):
                 excitation = excitation or guess_excitation(measured)
                 if excitation == "ambient":
+                    tell(Advance(1, 2, "stochastic subspaces"))
                     return identify_signals(measured, band, order or MOST_ORDER)
+                tell(Advance(1, 3, "averaging"))
                 measured, said = average_records(measured, excitation, estimator)
+            tell(Advance(2, 3, "fitting modes"))
             found = identify_responses(measured, band, order or MOST_POLES)
             return replace(found, said=said)
     except InputError as fault:
