@@ -144,6 +144,16 @@ class TestEffort:
         assert effort.stops()
         assert effort.cut
 
+    def test_a_budget_keeps_what_the_proof_takes(self, clock: Clock) -> None:
+        effort = Effort(100.0, clock=clock)
+        self.work(effort, clock, "single", 3.0)
+        self.work(effort, clock, "unseen", 3.0)
+        self.work(effort, clock, "advice", 3.0)
+        clock.now += 60.0
+        assert not effort.stops()
+        clock.now += 30.0  # 99 s
+        assert effort.stops()
+
 
 def test_a_line_every_ten_seconds_where_there_is_no_terminal(clock: Clock) -> None:
     lines: list[str] = []

@@ -61,6 +61,8 @@ def screen_hypotheses(
     spaces = problem.common.first_response(problem.space, projections)
     tried = []
     for number, (own, projection) in enumerate(zip(spaces, projections, strict=True)):
+        if tried and effort.stops():
+            break
         effort.step(number, len(projections))
         tried.append(_tried(replace(problem, space=own), projection))
     return [item for item in tried if item is not None]
