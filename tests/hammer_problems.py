@@ -111,15 +111,21 @@ def hit(
 
 
 def write_mat(
-    file: Path, structure: Structure, points: Sequence[int], seed: int, **how: Any
+    file: Path,
+    structure: Structure,
+    points: Sequence[int],
+    seed: int,
+    *,
+    force: bool = True,
+    **how: Any,
 ) -> Path:
     """Write a record of every hit point, on all sensors."""
     import scipy.io
 
-    force, motion = zip(*(hit(structure, p, seed + p, **how) for p in points), strict=True)
+    forces, motion = zip(*(hit(structure, p, seed + p, **how) for p in points), strict=True)
     held = {
-        "t": np.arange(len(force[0])) / RATE,
-        "F": np.stack(force, axis=1),
+        "t": np.arange(len(forces[0])) / RATE,
+        **({"F": np.stack(forces, axis=1)} if force else {}),
         "acc": np.stack(motion, axis=2),
         "responses": np.array(structure.labels, dtype=object),
         "references": np.array([structure.labels[p] for p in points], dtype=object),

@@ -16,7 +16,7 @@ from femubench import Identification, Sensors, identify
 from femubench.core.cli.main import bench
 from femubench.core.identify.averaging import average_records, guess_excitation
 from femubench.modal import TimeSignals, join_records, mac
-from tests.hammer_problems import RATE, Structure, frame, hit, write_mat
+from tests.hammer_problems import RATE, Structure, cantilever, frame, hit, write_mat
 
 
 def record(structure: Structure, point: int, seed: int, some: Any = slice(None), **how: Any) -> Any:
@@ -188,6 +188,8 @@ def test_files_hold_the_same(tmp_path: Path, name: str, write: Any) -> None:
         ({"t": np.arange(9.0), "acc": np.ones((9, 2))}, "", "or --sensors, row by row"),
         ({"t": np.arange(9.0), "zz": np.ones((9, 2))}, "--variables motion=z", "no variable 'z'"),
         ({"t": np.arange(9.0), "zz": np.ones((9, 2))}, "--variables mass=zz", "no key 'mass'"),
+        ({"t": np.arange(9.0), "F": np.arange(9.0), "acc": np.ones((9, 1)), "sensors": "1:z"}, "",
+         "128 samples or more"),
         ({"t": np.ones(9), "acc": np.ones((9, 2))}, "", "even steps in s"),
     ],
 )  # fmt: skip
@@ -218,18 +220,17 @@ STATES: dict[str, tuple[Any, str]] = {
 
 
 @pytest.mark.nightly
+@pytest.mark.parametrize("force", [True, False], ids=["hits", "decays"])
 @pytest.mark.parametrize("state", STATES)
 def test_from_hammer_records_to_the_cause_in_four_commands(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: str, force: bool
 ) -> None:
     monkeypatch.chdir(tmp_path)
     change, cause = STATES[state]
-    write_mat(Path("before.mat"), frame(), (0, 2), 10)
-    write_mat(Path("after.mat"), frame(**change), (0, 2), 20)
+    write_mat(Path("before.mat"), frame(), (0, 2), 10, force=force)
+    write_mat(Path("after.mat"), frame(**change), (0, 2), 20, force=force)
     whole = 1.04 * frame().stiffness
-    parts = {
-        f"storey{k + 1}": 1.04 * frame(np.eye(3)[k]).stiffness * -1.0 + whole for k in range(3)
-    }
+    parts = {f"storey{k + 1}": whole - 1.04 * frame(np.eye(3)[k]).stiffness for k in range(3)}
     write_model(Path("model.npz"), replace(frame(), stiffness=whole), **parts)
     rows = "".join(f"{k + 1}:x,0,0,{0.3 * k},x\n" for k in range(4))
     Path("places.csv").write_text(f"label,x,y,z,direction\n{rows}")
@@ -243,3 +244,13 @@ def test_from_hammer_records_to_the_cause_in_four_commands(
     said = femubench.diagnose("case")
     assert said.verdict == "named"
     assert f"{said.causes[0].effect} at {said.causes[0].place}" == cause
+
+
+@pytest.mark.nightly
+def test_a_hammer_that_roves_along_a_cantilever_gives_its_modes_and_no_others() -> None:
+    for structure in (cantilever(), cantilever(softer=0.44), cantilever(added=1.2)):
+        records = [record(structure, p, p, [2], hits=2, gap=5.0) for p in range(8)]
+        found = identify(join_records(records))
+        hertz, shapes = (part[..., :4] for part in structure.modes())
+        assert found.frequencies == pytest.approx(hertz, rel=3e-4)
+        assert np.diag(mac(shapes, found.shapes.real)).min() > 0.99

@@ -14,6 +14,7 @@ import numpy as np
 from femubench.core.case.files import LARGEST_FILE
 from femubench.core.case.matrices import reading_with
 from femubench.core.case.tables import SUFFIXES, Complex, read_table
+from femubench.core.display import count_noun
 from femubench.core.errors import InputError
 from femubench.core.fem.sensors import DIRECTIONS, Sensors
 from femubench.core.files import check_regular, open_regular
@@ -209,10 +210,10 @@ def _parse_channel(name: str) -> tuple[str, float, str]:
 def _both_sides(
     file: Path, sides: tuple[Sensors, Sensors], known: Sensors | None
 ) -> tuple[Sensors, Sensors]:
-    """Return motions and forces; one without a label may stand alone against two or more."""
+    """Return motions and forces; a force may do without a label, an accelerometer of several."""
     first, second = (
         Sensors((name,), side.xyz, ("x",))
-        if len(side) == 1 < len(other) and side.labels[0].startswith("?")
+        if len(side) == 1 and side.labels[0].startswith("?") and (name == "force" or len(other) > 1)
         else side
         if not len(side) and len(other)
         else _sensors(file, side, known)
@@ -230,7 +231,8 @@ def _sensors(file: Path, side: Sensors, known: Sensors | None) -> Sensors:
         raise InputError(what, file=file, expected="every label once")
     if labels[0].startswith("?"):
         if known is None or len(known) != count:
-            raise InputError(f"{count} channels without labels", file=file, expected=_NO_LABELS)
+            what = f"{count_noun(count, 'channel')} without labels"
+            raise InputError(what, file=file, expected=_NO_LABELS)
         labels, side = known.labels, known
     rows = {} if known is None else {label: i for i, label in enumerate(known.labels)}
     xyz, directions = side.xyz.copy(), list(side.directions)

@@ -25,6 +25,7 @@ _END = 0.003  # of the motion at its beginning, that the window leaves at its en
 _POWER = 1e-3  # of the largest of a force, that a line needs
 _HIGHEST, _LOUD = 0.45, 10.0  # of the rate; of the power of the noise
 _BLOCKS, _JUMP, _STARTS, _DECAYED = 400, 3.0, 0.2, 0.3  # of envelopes of free decays
+_FEWEST = 128  # samples of a segment
 _MOST_DECAYS = 6  # that are fitted apart, as combinations of all
 
 
@@ -77,6 +78,9 @@ def average_records(
     half = np.median([event.last - event.first for event in every]) / 2
     events = [event for event in every if event.last - event.first >= half]
     length = min(event.last - event.first for event in events)
+    if length < _FEWEST:
+        expected = f"{_FEWEST} samples or more; {_KINDS}"
+        raise InputError(f"{count_noun(length, 'sample')} a {nouns[excitation]}", expected=expected)
     decay, moving = 0.0, 0
     window = np.hanning(length + 1)[:-1]
     if excitation != "random":
@@ -151,7 +155,7 @@ def _find_decays(measured: TimeSignals) -> list[_Event]:
         high = (level > _STARTS * level.max(initial=0.0)) & (level > _JUMP * before)
         jumps = [int(k) for k in np.flatnonzero(high) if not high[max(k - 3, 0) : k].any()]
         ends: list[int] = [*jumps[1:], len(level)]
-        for k, end in zip(jumps, ends, strict=True):
+        for k, end in zip(jumps, ends, strict=False):
             # The force has gone by once the motion is largest.
             first = k + int(level[k : k + 3].argmax()) + 1
             own, tenth = level[first : end - 1], max(1, (end - 1 - first) // 10)

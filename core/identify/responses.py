@@ -10,6 +10,7 @@ import numpy as np
 from femubench.core.errors import InputError
 from femubench.core.identify.basis import Lines
 from femubench.core.identify.clusters import Cluster, clusters_of
+from femubench.core.identify.complexity import phase_collinearity
 from femubench.core.identify.hidden import find_hidden_poles
 from femubench.core.identify.identification import Identification
 from femubench.core.identify.lscf import Poles, lscf_poles
@@ -35,6 +36,7 @@ def identify_responses(
     measured: FrequencyResponses,
     band: tuple[float, float] | None = None,
     most_poles: int = MOST_POLES,
+    least_collinear: float = 0.0,
 ) -> Identification:
     """Return the modes in a band of frequency responses.
 
@@ -42,6 +44,7 @@ def identify_responses(
         measured: the responses; the more numerous of its two sides carries the shapes.
         band: lowest and highest frequency in Hz; None for all lines.
         most_poles: of the largest model of the stabilisation diagram.
+        least_collinear: modal phase collinearity below which a shape is no mode's.
 
     Raises:
         InputError: when there are too few lines, or no mode stands out of the noise.
@@ -64,7 +67,8 @@ def identify_responses(
     orders = len(np.unique(poles.orders))
     clusters = [c for c in clusters_of(poles.select(able), orders) if c.support >= _SUPPORT]
     fit, lines = _fitted(lines, clusters, seen)
-    return _identification(data, fit, lines, clusters, poles)
+    keep = phase_collinearity(fit.shapes) >= least_collinear
+    return _identification(data, fit, lines, clusters, poles, keep)
 
 
 def _course(data: FrequencyResponses, seen: BoolArray) -> FloatArray:
@@ -155,11 +159,13 @@ def _identification(
     lines: Lines,
     clusters: Sequence[Cluster],
     poles: Poles,
+    keep: BoolArray,
 ) -> Identification:
     s = fit.poles + data.decay
     hz, ratio = np.abs(s) / (2.0 * np.pi), -s.real / np.abs(s)
     low, high = float(data.frequencies[0]), float(data.frequencies[-1])
-    inside = (hz >= low) & (hz <= high) & (ratio < _LARGEST_DAMPING)
+    # Without its window a pole may grow: that is no mode.
+    inside = keep & (hz >= low) & (hz <= high) & (ratio > 0.0) & (ratio < _LARGEST_DAMPING)
     order = np.flatnonzero(inside)[np.argsort(hz[inside])]
     if not len(order):
         raise InputError(_NO_MODE, expected="resonances in the band")
@@ -181,7 +187,7 @@ def _identification(
         sensors=data.responses,
         frequencies=hz[order],
         frequency_std=stds[0][order],
-        damping=np.maximum(ratio[order], 0.0),
+        damping=ratio[order],
         damping_std=stds[1][order],
         shapes=shapes,
         shape_std=shape_std,

@@ -59,7 +59,7 @@ def screen_hypotheses(
     if not isinstance(problem, LargeProblem) or not projections:
         return screen(problem, base, projections)
     spaces = problem.common.first_response(problem.space, projections)
-    tried = []
+    tried: list[Screened | None] = []
     for number, (own, projection) in enumerate(zip(spaces, projections, strict=True)):
         if tried and effort.stops():
             break

@@ -27,6 +27,7 @@ from femubench.core.identify.averaging import (
     average_records,
     guess_excitation,
 )
+from femubench.core.identify.complexity import LEAST_COLLINEAR
 from femubench.core.identify.identification import Identification
 from femubench.core.identify.output_only import MOST_ORDER, identify_signals
 from femubench.core.identify.responses import MOST_POLES, identify_responses
@@ -136,7 +137,8 @@ def identification_of(
                 tell(Advance(1, 3, "averaging"))
                 measured, said = average_records(measured, excitation, estimator)
             tell(Advance(2, 3, "fitting modes"))
-            found = identify_responses(measured, band, order or MOST_POLES)
+            least = LEAST_COLLINEAR if said else 0.0
+            found = identify_responses(measured, band, order or MOST_POLES, least)
             return replace(found, said=said)
     except InputError as fault:
         if file is None or fault.file is not None:
