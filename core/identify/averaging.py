@@ -156,8 +156,8 @@ def _find_decays(measured: TimeSignals) -> list[_Event]:
         jumps = [int(k) for k in np.flatnonzero(high) if not high[max(k - 3, 0) : k].any()]
         ends: list[int] = [*jumps[1:], len(level)]
         for k, end in zip(jumps, ends, strict=False):
-            # The force has gone by once the motion is largest.
-            first = k + int(level[k : k + 3].argmax()) + 1
+            # The force has gone by a block after that in which the motion is largest.
+            first = k + int(level[k : k + 3].argmax()) + 2
             own, tenth = level[first : end - 1], max(1, (end - 1 - first) // 10)
             if len(own) > 10 and own[-tenth:].mean() < _DECAYED * own[:tenth].mean():
                 begin, stop = (record.start + int(n) * block for n in (first, end - 1))

@@ -6,7 +6,7 @@ import numpy as np
 
 from femubench.core.typing import AnyArray, FloatArray
 
-LEAST_COLLINEAR = 0.5  # of a mode from records over time, whose errors are no white noise
+LEAST_COLLINEAR = 0.8  # of a mode from records over time, whose errors are no white noise
 
 
 def phase_collinearity(shapes: AnyArray) -> FloatArray:

@@ -12,7 +12,7 @@ import numpy as np
 
 from femubench.core.errors import InputError, require
 from femubench.core.identify.clusters import Cluster, clusters_of
-from femubench.core.identify.complexity import LEAST_COLLINEAR, phase_collinearity
+from femubench.core.identify.complexity import phase_collinearity
 from femubench.core.identify.identification import Identification
 from femubench.core.identify.lscf import Poles
 from femubench.core.modal.complex_modes import mean_phase
@@ -23,6 +23,7 @@ MOST_ORDER = 60
 _BLOCKS = 50  # of the record, whose scatter gives the standard deviations
 _SUPPORT = 0.4  # of the orders, that a mode appears in
 _LARGEST_DAMPING = 0.1
+_LEAST_COLLINEAR = 0.5
 _LARGEST_SPREAD = 0.02  # standard deviation of a mode's frequency over itself
 _FEWEST = 2048  # samples
 
@@ -61,7 +62,7 @@ def identify_signals(
     values = 2.0 * np.pi * hz * (-ratio + 1j * np.sqrt(1.0 - np.square(ratio)))
     poles = Poles(values, orders, shapes / np.linalg.norm(shapes, axis=1, keepdims=True))
     able = (ratio > 0.0) & (ratio < _LARGEST_DAMPING) & (hz >= low) & (hz <= high)
-    able &= phase_collinearity(shapes.T) > LEAST_COLLINEAR
+    able &= phase_collinearity(shapes.T) > _LEAST_COLLINEAR
     able &= np.asarray(found.Fn_poles_std)[rows, orders] < _LARGEST_SPREAD * hz
     at = np.flatnonzero(able)
     tried = len(np.unique(orders))

@@ -105,7 +105,7 @@ def _by_lines(found: Mapping[str, Any], key: str, lines: int, path: Path) -> Any
 
 def _side(found: Mapping[str, Any], key: str, count: int, path: Path) -> Sensors:
     """Return the labels of a side; places and directions are for others to know."""
-    labels = words_of(found[key]) if key in found else [f"?{k}" for k in range(count)]
+    labels = words_of(found[key]) if key in found and count else [f"?{k}" for k in range(count)]
     if len(labels) != count:
         what = f"{len(labels)} labels of {count} channels"
         raise InputError(what, file=path, key=key, expected=f"--variables {key}=NAME of as many")
