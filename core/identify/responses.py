@@ -44,7 +44,8 @@ def identify_responses(
         measured: the responses; the more numerous of its two sides carries the shapes.
         band: lowest and highest frequency in Hz; None for all lines.
         most_poles: of the largest model of the stabilisation diagram.
-        least_collinear: modal phase collinearity below which a shape is no mode's.
+        least_collinear: modal phase collinearity below which a shape is no mode's; above 0, what
+            no pole of the models stands for is none either.
 
     Raises:
         InputError: when there are too few lines, or no mode stands out of the noise.
@@ -68,6 +69,10 @@ def identify_responses(
     clusters = [c for c in clusters_of(poles.select(able), orders) if c.support >= _SUPPORT]
     fit, lines = _fitted(lines, clusters, seen)
     keep = phase_collinearity(fit.shapes) >= least_collinear
+    if least_collinear > 0.0:
+        seeds = np.array([cluster.pole for cluster in clusters], dtype=complex)
+        near = np.abs(seeds - fit.poles[:, None]) < _SAME * np.abs(fit.poles[:, None])
+        keep &= near.any(axis=1)
     return _identification(data, fit, lines, clusters, poles, keep)
 
 
