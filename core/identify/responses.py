@@ -179,7 +179,9 @@ def _identification(
     to_ratio = np.stack([-np.square(s.imag), s.real * s.imag], axis=1) / (size**3)[:, None]
     of_poles, of_shapes = _windowed(-fit.poles.real, data)
     stds = [
-        np.sqrt(of_poles * np.einsum("na,nab,nb->n", way, fit.pole_covariance, way))
+        np.sqrt(
+            of_poles * np.maximum(np.einsum("na,nab,nb->n", way, fit.pole_covariance, way), 0.0)
+        )
         for way in (to_hz, to_ratio)
     ]
     covariance = fit.shape_covariance[order] * of_shapes[order, None, None]
