@@ -154,6 +154,7 @@ def _twice(fit: ModalModel) -> BoolArray:
     strength = strength / -fit.poles.real
     apart = np.abs(fit.poles[:, None] - fit.poles)
     near = apart < _WIDTHS * np.maximum(-fit.poles.real[:, None], -fit.poles.real)
+    near &= -fit.poles.real < _LARGEST_DAMPING * np.abs(fit.poles)  # what hardly swings is no mode
     alike = mac(fit.shapes, fit.shapes) > _ALIKE
     return np.asarray((near & alike & (strength[:, None] < strength)).any(axis=1))
 
@@ -174,17 +175,16 @@ def _identification(
     order = np.flatnonzero(inside)[np.argsort(hz[inside])]
     if not len(order):
         raise InputError(_NO_MODE, expected="resonances in the band")
+    # Of modes alone: rounding makes the variance of a pole that does not swing negative.
+    s, hz, ratio, own = s[order], hz[order], ratio[order], fit.pole_covariance[order]
     size = np.abs(s)
     to_hz = np.stack([s.real, s.imag], axis=1) / (2.0 * np.pi * size[:, None])
     to_ratio = np.stack([-np.square(s.imag), s.real * s.imag], axis=1) / (size**3)[:, None]
-    of_poles, of_shapes = _windowed(-fit.poles.real, data)
+    of_poles, of_shapes = _windowed(-fit.poles[order].real, data)
     stds = [
-        np.sqrt(
-            of_poles * np.maximum(np.einsum("na,nab,nb->n", way, fit.pole_covariance, way), 0.0)
-        )
-        for way in (to_hz, to_ratio)
+        np.sqrt(of_poles * np.einsum("na,nab,nb->n", way, own, way)) for way in (to_hz, to_ratio)
     ]
-    covariance = fit.shape_covariance[order] * of_shapes[order, None, None]
+    covariance = fit.shape_covariance[order] * of_shapes[:, None, None]
     shapes, shape_std = _scaled_shapes(fit.shapes[:, order], covariance)
     support = [
         max((c.support for c in clusters if abs(c.pole - pole) < _SAME * abs(pole)), default=0.0)
@@ -192,10 +192,10 @@ def _identification(
     ]
     return Identification(
         sensors=data.responses,
-        frequencies=hz[order],
-        frequency_std=stds[0][order],
-        damping=ratio[order],
-        damping_std=stds[1][order],
+        frequencies=hz,
+        frequency_std=stds[0],
+        damping=ratio,
+        damping_std=stds[1],
         shapes=shapes,
         shape_std=shape_std,
         support=np.array(support),
