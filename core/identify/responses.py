@@ -15,7 +15,7 @@ from femubench.core.identify.hidden import find_hidden_poles
 from femubench.core.identify.identification import Identification
 from femubench.core.identify.lscf import Poles, lscf_poles
 from femubench.core.identify.modal_fit import ModalModel, fit_modes, predict_responses
-from femubench.core.identify.noise import first_weights, noise_left, unevenness
+from femubench.core.identify.noise import first_weights, noise_kept, noise_left, unevenness
 from femubench.core.identify.selection import find_needed, select
 from femubench.core.modal.complex_modes import mean_phase
 from femubench.core.modal.correlation import mac
@@ -180,7 +180,7 @@ def _identification(
     size = np.abs(s)
     to_hz = np.stack([s.real, s.imag], axis=1) / (2.0 * np.pi * size[:, None])
     to_ratio = np.stack([-np.square(s.imag), s.real * s.imag], axis=1) / (size**3)[:, None]
-    of_poles, of_shapes = _windowed(-fit.poles[order].real, data)
+    of_poles, of_shapes = _windowed(fit, lines, data)[:, order]
     stds = [
         np.sqrt(of_poles * np.einsum("na,nab,nb->n", way, own, way)) for way in (to_hz, to_ratio)
     ]
@@ -206,23 +206,25 @@ def _identification(
     )
 
 
-def _windowed(rates: FloatArray, data: FrequencyResponses) -> tuple[FloatArray, FloatArray]:
-    """Return by how much the variances of poles and of shapes grow under an exponential window.
+def _windowed(fit: ModalModel, lines: Lines, data: FrequencyResponses) -> FloatArray:
+    """Return by how much variances of poles and of shapes grow under an exponential window, (2, n).
 
     It makes the noise of neighbouring lines alike, which the fit takes to be independent: over
     time, noise of variance e^-2wt meets e^-at, or (t - 1 / 2a) e^-at, where a fit counts on its
-    mean.
+    mean, of which it sees what it leaves.
 
     Arguments:
-        rates: a, of the modes under the window, in 1/s, (n,).
+        fit: whose modes decay with a under the window.
+        lines: that it fits.
         data: whose window decays with w.
     """
     if not data.decay:
-        return np.ones(len(rates)), np.ones(len(rates))
+        return np.ones((2, len(fit.poles)))
     ends = 2.0 * data.decay / float(np.diff(data.frequencies).mean())
-    share = rates / (rates + data.decay)
+    share = fit.poles.real / (fit.poles.real - data.decay)
+    grown = np.stack([2.0 * share**3 - 2.0 * share**2 + share, share])
     mean = ends / -np.expm1(-ends)
-    return mean * (2.0 * share**3 - 2.0 * share**2 + share), mean * share
+    return np.asarray(mean * grown / noise_kept(fit, lines, data.decay).T)
 
 
 def _scaled_shapes(shapes: AnyArray, covariance: FloatArray) -> tuple[AnyArray, FloatArray]:
