@@ -252,7 +252,8 @@ class Reader(Protocol):
       write an updated model in the format of the original file or files, and keep of these what
       an update does not change.
     - ``read_responses(path) -> FrequencyResponses | TimeSignals``: what `bench identify` starts
-      from and `frfs` of a case names; both classes are in `femubench.modal`.
+      from and `frfs` of a case names; both classes are in `femubench.modal`; with names of
+      variables ``read_named_responses(path, names)``.
 
     Attributes:
         name: for messages, e.g. ``"universal file"``.

@@ -14,6 +14,7 @@ from femubench.core.modal.expansion import (
 )
 from femubench.core.modal.frf import (
     FrequencyResponses as FrequencyResponses,
+    Quantity as Quantity,
     receptance as receptance,
 )
 from femubench.core.modal.generalised_mass import mass_normalised as mass_normalised
@@ -37,6 +38,9 @@ from femubench.core.modal.sensitivity import (
     frequency_sensitivities as frequency_sensitivities,
     shape_sensitivities as shape_sensitivities,
 )
-from femubench.core.modal.signals import TimeSignals as TimeSignals
+from femubench.core.modal.signals import (
+    TimeSignals as TimeSignals,
+    join_records as join_records,
+)
 
 __all__ = [name for name in dir() if not name.startswith("_")]

@@ -24,7 +24,7 @@ _OVERVIEW, _SMALL = (8.6, 4.2), (4.0, 2.8)  # inch
 
 def identification_text(found: Identification) -> str:
     """Return the modes as plain text of 80 columns at most."""
-    return to_terminal([Passage("", [_heading(found), _modes(found)])])
+    return to_terminal([Passage("", [_heading(found), *filter(None, [found.said]), _modes(found)])])
 
 
 def identification_html(found: Identification, source: str = "") -> str:
@@ -96,6 +96,8 @@ def _sections(found: Identification) -> Iterator[Passage]:
 def _facts(found: Identification) -> Iterator[tuple[str, str]]:
     """Yield what was measured and what was asked for."""
     yield "band", f"{figure(found.band[0], 6)} to {figure(found.band[1], 6)} Hz"
+    if found.said:
+        yield "records", found.said
     method = "stochastic subspaces, by pyOMA-2"
     if data := found.measured:
         lines, responses, forces = data.values.shape

@@ -169,7 +169,6 @@ def test_a_mistake_names_its_remedy_and_leaves_nothing(tmp_path: Path, mistake: 
         ("diagnose .", "which `bench init` writes"),
         ("update portal -s baruch -o new", "`elements` with a node at every sensor"),
         ("identify one.csv", "two or more in one file"),
-        ("identify twice.uff", "the sensor 1:z is there twice"),
     ],
 )
 def test_other_mistakes_name_their_remedy(
@@ -181,8 +180,6 @@ def test_other_mistakes_name_their_remedy(
     signal = np.random.default_rng(0).standard_normal(2100)
     rows = "".join(f"{0.01 * i:.2f};{v}\n".replace(".", ",") for i, v in enumerate(signal))
     Path("one.csv").write_text(f"time;1:z\n{rows}")
-    if "twice" in words:  # two forces, as if they were time
-        write_universal(Path("twice.uff"), responses(tmp_path), func_type=1)
     done = CliRunner().invoke(bench, words.split())
     assert done.exit_code == 2, done.output
     assert advice in done.output

@@ -5,12 +5,13 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from threading import Event
 
 import pytest
 from rich.console import Console
 from rich.progress import Progress
 
-from femubench.core.cli.progress import show_progress
+from femubench.core.cli.progress import say_progress, show_progress
 from femubench.core.inference.effort import Effort, Kind
 from femubench.core.pace import Advance
 from femubench.core.run.jobs_left import JobsLeft
@@ -142,6 +143,34 @@ class TestEffort:
         clock.now += 1.0
         assert effort.stops()
         assert effort.cut
+
+    def test_a_budget_keeps_what_the_proof_takes(self, clock: Clock) -> None:
+        effort = Effort(100.0, clock=clock)
+        self.work(effort, clock, "single", 3.0)
+        self.work(effort, clock, "unseen", 3.0)
+        self.work(effort, clock, "advice", 3.0)
+        clock.now += 60.0
+        assert not effort.stops()
+        clock.now += 30.0  # 99 s
+        assert effort.stops()
+
+
+def test_a_line_every_ten_seconds_where_there_is_no_terminal(clock: Clock) -> None:
+    lines: list[str] = []
+    written = Event()
+
+    def write(line: str) -> None:
+        lines.append(line)
+        written.set()
+
+    with say_progress("case", write, clock, every=0.01) as stated:
+        stated(Advance(3, 12, "single causes", 130.0, 5.0))
+        clock.now += 65.0
+        assert written.wait(60.0)  # the thread's first line may be older than the clock's move
+        lines.clear()
+        written.clear()
+        assert written.wait(60.0)
+    assert lines[-1] == "case: single causes, 3/12, 0:01:05 gone, 0:02:05 left"
 
 
 def shown(file: io.StringIO) -> str:

@@ -1,42 +1,58 @@
-"""Read frequency responses and signals: of reader plugins, tables and NumPy files."""
+"""Read frequency responses and signals: of reader plugins and tables."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from femubench.core.case.files import LARGEST_FILE
 from femubench.core.case.matrices import reading_with
 from femubench.core.case.tables import SUFFIXES, Complex, read_table
+from femubench.core.display import count_noun
 from femubench.core.errors import InputError
 from femubench.core.fem.sensors import DIRECTIONS, Sensors
 from femubench.core.files import check_regular, open_regular
 from femubench.core.modal.frf import FrequencyResponses, Quantity
 from femubench.core.modal.signals import TimeSignals
 from femubench.core.roles import Reader
-from femubench.core.typing import AnyArray
 
-_ARRAYS = ".npz"
 _QUANTITY: Quantity = "accelerance"  # where a file does not say: what an accelerometer measures
 _LABELS = "labels such as 12:z, a name and a direction"
+_NO_LABELS = f"{_LABELS}: --variables responses=NAME,references=NAME, or --sensors, row by row"
+_ANYWHERE = ("accelerometer", "force")  # alone, they need no place: shapes are at the others
+_AXIS = re.compile(r"(frequency|freq|time|t)(?:\s*[\[(].*|_?(?:hz|s))?", re.IGNORECASE)
+_FORCE = re.compile(r"(?:force|hammer)(?:[ :_]+|$)", re.IGNORECASE)
+_UNIT = re.compile(r"(.*?)\s*[\[(]([^\])]*)[\])]")
+_UNITS: dict[str, tuple[str, float]] = {
+    "n": ("force", 1.0), "kn": ("force", 1e3), "lbf": ("force", 4.4482216),
+    "g": ("accelerance", 9.80665), "m/s2": ("accelerance", 1.0), "m/s²": ("accelerance", 1.0),
+    "m/s": ("mobility", 1.0), "mm/s": ("mobility", 1e-3), "m": ("receptance", 1.0),
+    "mm": ("receptance", 1e-3),
+}  # fmt: skip
 
 Responses = FrequencyResponses | TimeSignals
 
 
 def read_responses(
-    file: Path, readers: Sequence[Reader] = (), known: Sensors | None = None
+    file: Path,
+    readers: Sequence[Reader] = (),
+    known: Sensors | None = None,
+    names: Mapping[str, str] | None = None,
 ) -> Responses:
     """Return the frequency responses of a file, or its signals over time.
 
     Arguments:
-        file: of a format that a reader plugin knows, ``.csv`` or ``.npz``.
+        file: of a format that a reader plugin knows, or a table.
         readers: reader plugins that may offer ``read_responses``.
-        known: sensors whose labels need not say a direction.
+        known: sensors whose labels need not say a direction, or that have the order of a file
+            without labels.
+        names: of variables, where these are not the common ones.
 
     Raises:
         InputError: when the file holds neither, or numbers that cannot be.
@@ -45,26 +61,32 @@ def read_responses(
     name = file.name.lower()
     able = [reader for reader in readers if hasattr(reader, "read_responses")]
     reader: Any = next((r for r in able if any(name.endswith(s) for s in r.suffixes)), None)
+    if names and not hasattr(reader, "read_named_responses"):
+        what = "has no variables by name"
+        raise InputError(what, file=file, expected=".mat, .npz or .h5 with --variables")
     if reader is not None:
         with reading_with(reader, file):
-            found = reader.read_responses(file)
+            named = (file, names) if names else (file,)
+            found = (reader.read_named_responses if names else reader.read_responses)(*named)
         if not isinstance(found, Responses):
             what = f"{reader.name} gave {type(found).__name__}"
             raise InputError(what, file=file, expected="FrequencyResponses or TimeSignals")
     elif name.endswith(SUFFIXES):
-        found = _of_table(file, known)
-    elif name.endswith(_ARRAYS):
-        found = _of_arrays(file, _arrays(file), known)
+        found = _of_table(file)
+    elif name.endswith(".npz"):
+        found = _of_arrays(file)
     else:
-        suffixes = ", ".join([*(s for r in able for s in r.suffixes), ".csv", _ARRAYS])
+        suffixes = ", ".join([*(s for r in able for s in r.suffixes), *SUFFIXES])
         raise InputError("unknown kind of file", file=file, expected=suffixes)
-    return _checked(file, found)
+    return _checked(file, _labelled(file, found, known))
 
 
 def _checked(file: Path, found: Responses) -> Responses:
     """Return what was read, whose numbers are finite and whose lines rise."""
     if isinstance(found, TimeSignals):
-        if not np.isfinite(found.values).all():
+        holes = (~np.isfinite(found.values[record]) for record in found.records)
+        partly = any((some.any(axis=0) & ~some.all(axis=0)).any() for some in holes)
+        if partly or not np.isfinite(found.force_values).all():
             raise InputError("a sample is not finite", file=file, expected="numbers")
         return found
     rising = np.isfinite(found.frequencies).all() and (np.diff(found.frequencies) > 0.0).all()
@@ -82,11 +104,17 @@ def _checked(file: Path, found: Responses) -> Responses:
     return found
 
 
-def _of_table(file: Path, known: Sensors | None) -> Responses:
+def holds_responses(columns: Sequence[str]) -> bool:
+    """Tell whether a table with these columns is one of frequency responses or of time."""
+    return _AXIS.fullmatch(columns[0]) is not None and not {"mode"} & set(columns)
+
+
+def _of_table(file: Path) -> Responses:
     """Return the channels of a table: ``frequency`` or ``time``, and a column a channel."""
     table = read_table(file)
     first, *columns = table.columns
-    if first not in ("frequency", "time") or not columns:
+    axis = _AXIS.fullmatch(first)
+    if axis is None or not columns:
         expected = "frequency or time, then a column a channel"
         raise InputError("unknown columns", file=file, line=1, key=first[:60], expected=expected)
     rows = []
@@ -96,12 +124,13 @@ def _of_table(file: Path, known: Sensors | None) -> Responses:
             raise row.error(first, "not a number", "a number")
         rows.append([_number(cell) for cell in cells])
     numbers = np.array(rows, dtype=complex).reshape(-1, len(table.columns))
-    if first == "time":
+    nowhere = np.full((len(columns), 3), np.nan)
+    if axis[1].lower().startswith("t"):
         step = np.diff(numbers[:, 0].real)
         if not len(step) or step.min() <= 0.0 or np.ptp(step) > 0.01 * step.mean():
             expected = "even steps in s, two rows or more"
             raise InputError("uneven steps", file=file, key="time", expected=expected)
-        sensors = _sensors(file, columns, known)
+        sensors = Sensors(tuple(columns), nowhere, ("",) * len(columns))
         return TimeSignals(sensors, float(1.0 / step.mean()), np.asarray(numbers[:, 1:].real))
     pairs = [column.partition("/") for column in columns]
     for column, (response, slash, reference) in zip(columns, pairs, strict=True):
@@ -113,7 +142,9 @@ def _of_table(file: Path, known: Sensors | None) -> Responses:
     channels = np.full((len(numbers), len(outputs), len(inputs)), np.nan, dtype=complex)
     for k, (response, _, reference) in enumerate(pairs):
         channels[:, outputs.index(response), inputs.index(reference)] = numbers[:, 1 + k]
-    sensors, forces = _sensors(file, outputs, known), _sensors(file, inputs, known)
+    sensors, forces = (
+        Sensors(tuple(side), nowhere[: len(side)], ("",) * len(side)) for side in (outputs, inputs)
+    )
     return FrequencyResponses(sensors, forces, np.asarray(numbers[:, 0].real), channels, _QUANTITY)
 
 
@@ -124,80 +155,100 @@ def _number(cell: float | Complex | None) -> complex:
     return complex(np.nan if cell is None else cell)
 
 
-def _arrays(file: Path) -> Mapping[str, Any]:
-    """Return the variables of a file of arrays."""
+def _of_arrays(file: Path) -> FrequencyResponses:
+    """Return what `responses_npz` wrote: a case of ours is read without plugins."""
     try:
-        with (
-            open_regular(file, LARGEST_FILE) as stream,
-            np.load(stream, allow_pickle=False) as held,
-        ):
-            return {name: held[name] for name in held.files}
-    except Exception as error:  # whatever a broken file makes of these readers
+        with open_regular(file, LARGEST_FILE) as stream, np.load(stream) as held:
+            names = [tuple(held[side].tolist()) for side in ("responses", "references")]
+            first, second = (
+                Sensors(n, np.full((len(n), 3), np.nan), ("",) * len(n)) for n in names
+            )
+            hz, values, quantity = (held[key] for key in ("frequencies", "values", "quantity"))
+            return FrequencyResponses(first, second, hz, values, str(quantity[0]))  # type: ignore[arg-type]
+    except Exception as error:  # whatever a broken file makes of this reader
         what = f"cannot be read: {' '.join(str(error).split())[:200]}"
-        raise InputError(what, file=file, expected="arrays by name") from None
+        raise InputError(what, file=file, expected="responses in arrays by name") from None
 
 
-def _of_arrays(file: Path, held: Mapping[str, Any], known: Sensors | None) -> Responses:
-    """Return what arrays of these names say.
+def _labelled(file: Path, found: Responses, known: Sensors | None) -> Responses:
+    """Return what was read with forces apart from motions, and with a direction to every label."""
+    if isinstance(found, FrequencyResponses):
+        sides = (found.responses, found.references)
+        responses, references = _both_sides(file, sides, known)
+        return replace(found, responses=responses, references=references)
+    named = [_parse_channel(label) for label in found.sensors.labels]
+    acting = np.array([kind == "force" for kind, _, _ in named], dtype=bool)
+    quantities = {kind for kind, _, _ in named if kind != "force"} - {""} or {found.quantity}
+    if len(quantities) > 1 or acting.all():
+        what = "no motion" if acting.all() else f"{' and '.join(sorted(quantities))} in one file"
+        raise InputError(what, file=file, expected="motions of one kind, in m/s2, m/s or m")
+    values = found.values * [factor for _, factor, _ in named]
+    labels = [label or f"?{k}" for k, (_, _, label) in enumerate(named)]
+    motions, forces = ([labels[k] for k in np.flatnonzero(some)] for some in (~acting, acting))
+    nowhere = np.full((len(labels), 3), np.nan)
+    ways = tuple(np.array(found.sensors.directions)[~acting].tolist())
+    sensors, own = Sensors(tuple(motions), found.sensors.xyz[~acting], ways), found.forces
+    if acting.any():
+        own = Sensors(tuple(forces), nowhere[acting], ("",) * len(forces))
+        found = replace(found, force_values=values[:, acting])
+    sensors, own = _both_sides(file, (sensors, own), known)
+    quantity: Any = quantities.pop()
+    return replace(found, sensors=sensors, values=values[:, ~acting], forces=own, quantity=quantity)
 
-    ``frequencies`` (n_f), ``responses`` and ``references`` (labels), ``values`` (n_f, n_responses,
-    n_references), ``quantity``; or ``rate`` in Hz, ``sensors`` (labels), ``signals`` (n_samples,
-    n_sensors).
-    """
 
-    def array(name: str, kinds: str) -> AnyArray:
-        if name not in held:
-            there = ", ".join(key for key in held if not key.startswith("__"))[:200]
-            raise InputError("missing array", file=file, key=name, expected=f"it among {there}")
-        value = np.asarray(held[name])
-        if value.dtype.kind not in kinds:
-            raise InputError(f"is of type {value.dtype}", file=file, key=name, expected="numbers")
-        return value
+def _parse_channel(name: str) -> tuple[str, float, str]:
+    """Return kind, factor to SI units and label of a channel, such as ``force 3:z [N]``."""
+    text, unit = name.strip(), ""
+    if (match := _UNIT.fullmatch(text)) is not None:
+        text, unit = match[1].strip(), match[2].strip().lower().replace("^", "")
+    kind, factor = _UNITS.get(unit, ("", 1.0))
+    if (match := _FORCE.match(text)) is not None:
+        kind, text = "force", text[match.end() :]
+    return kind, factor, text
 
-    def labels(name: str) -> list[str]:
-        if name not in held:
-            array(name, "U")
-        flat = np.asarray(held[name]).ravel()
-        return [str(item).strip() for item in flat]
 
-    if "signals" in held:
-        values, names = array("signals", "fiu").astype(float), labels("sensors")
-        rate = float(array("rate", "fiu").mean()) if np.size(held.get("rate", ())) else 0.0
-        if values.ndim != 2 or values.shape[1] != len(names) or not 0.0 < rate < np.inf:
-            expected = f"(n_samples, {len(names)}) and a rate > 0 in Hz"
-            raise InputError("wrong shape", file=file, key="signals", expected=expected)
-        return TimeSignals(_sensors(file, names, known), rate, values)
-    hz = array("frequencies", "fiu").astype(float).ravel()
-    outputs, inputs = labels("responses"), labels("references")
-    values = array("values", "fiuc").astype(complex)
-    if values.shape != (len(hz), len(outputs), len(inputs)):
-        expected = f"({len(hz)}, {len(outputs)}, {len(inputs)})"
-        raise InputError(f"is {values.shape}", file=file, key="values", expected=expected)
-    quantity: Any = ", ".join(labels("quantity")) if "quantity" in held else _QUANTITY
-    if quantity not in get_args(Quantity):
-        expected = ", ".join(get_args(Quantity))
-        raise InputError(f"{quantity!r}", file=file, key="quantity", expected=expected)
-    return FrequencyResponses(
-        _sensors(file, outputs, known), _sensors(file, inputs, known), hz, values, quantity
+def _both_sides(
+    file: Path, sides: tuple[Sensors, Sensors], known: Sensors | None
+) -> tuple[Sensors, Sensors]:
+    """Return motions and forces; a force may do without a label, an accelerometer of several."""
+    first, second = (
+        Sensors((name,), side.xyz, ("x",))
+        if len(side) == 1 and side.labels[0].startswith("?") and (name == "force" or len(other) > 1)
+        else side
+        if not len(side) and len(other)
+        else _sensors(file, side, known)
+        for side, other, name in zip(sides, sides[::-1], _ANYWHERE, strict=True)
     )
+    return first, second
 
 
-def _sensors(file: Path, labels: Sequence[str], known: Sensors | None) -> Sensors:
+def _sensors(file: Path, side: Sensors, known: Sensors | None) -> Sensors:
     """Return sensors: known ones, or at unknown places along what their labels say."""
+    labels, count = side.labels, len(side)
     twice = [label for k, label in enumerate(labels) if label in labels[:k]]
     if not labels or twice:
         what = f"the label {twice[0][:40]!r} is listed twice" if labels else "no labels"
         raise InputError(what, file=file, expected="every label once")
+    if labels[0].startswith("?"):
+        if known is None or len(known) != count:
+            what = f"{count_noun(count, 'channel')} without labels"
+            raise InputError(what, file=file, expected=_NO_LABELS)
+        labels, side = known.labels, known
     rows = {} if known is None else {label: i for i, label in enumerate(known.labels)}
-    xyz, directions = np.full((len(labels), 3), np.nan), []
+    xyz, directions = side.xyz.copy(), list(side.directions)
     for k, label in enumerate(labels):
-        direction = label.rpartition(":")[2]
-        if known is not None and label in rows:
-            xyz[k], direction = known.xyz[rows[label]], known.directions[rows[label]]
-        elif direction.lstrip("-") not in DIRECTIONS or not label.isprintable():
+        node, _, own = label.rpartition(":")
+        if directions[k]:
+            continue
+        row = rows.get(label, rows.get(node))
+        if row is not None:
+            xyz[k] = known.xyz[row] if known is not None else xyz[k]
+            directions[k] = known.directions[row] if known is not None else ""
+        directions[k] = directions[k] or own
+        known_way = directions[k] != own or own.lstrip("-") in DIRECTIONS
+        if not known_way or not label.isprintable():
             raise InputError(f"{label[:40]!r} says no direction", file=file, expected=_LABELS)
-        directions.append(direction)
-    return Sensors(tuple(labels), xyz, tuple(directions))
+    return Sensors(labels, xyz, tuple(directions))
 
 
 def responses_npz(measured: FrequencyResponses) -> bytes:
@@ -214,32 +265,42 @@ def responses_npz(measured: FrequencyResponses) -> bytes:
     return held.getvalue()
 
 
-def locate_sensors(measured: Responses, file: Path) -> Responses:
+def read_places(file: Path) -> Sensors:
+    """Return the sensors of a table label,x,y,z,direction; a direction may be that of the label."""
+    table = read_table(file)
+    table.check_columns(("label", "x", "y", "z"), ("direction",))
+    stated = "direction" in table.columns
+    return Sensors(
+        tuple(row.text("label") for row in table.rows),
+        np.array([row.vector() for row in table.rows], dtype=float).reshape(-1, 3),
+        tuple(row.direction() if stated and row.cells["direction"] else "" for row in table.rows),
+    )
+
+
+def locate_sensors(measured: Responses, known: Sensors, file: Path) -> Responses:
     """Return responses whose sensors lie where a table says.
 
     Arguments:
         measured: what was read.
-        file: a table label,x,y,z,direction; a label without a direction of its own may be the
-            part before the colon.
+        known: a label without a direction of its own may be the part before the colon.
+        file: that they come from, for messages.
 
     Raises:
         InputError: when a sensor of the responses is not in the table.
     """
-    table = read_table(file)
-    table.check_columns(("label", "x", "y", "z"), ("direction",))
-    places = {row.text("label"): row.vector() for row in table.rows}
+    places = dict(zip(known.labels, known.xyz, strict=True))
 
     def moved(sensors: Sensors) -> Sensors:
         xyz = []
         for label in sensors.labels:
             place = places.get(label, places.get(label.rpartition(":")[0]))
-            if place is None:
+            if place is None and label not in _ANYWHERE:
                 expected = f"a row for {label!r}"
                 raise InputError("a sensor has no place", file=file, key="label", expected=expected)
-            xyz.append(place)
-        return replace(sensors, xyz=np.array(xyz, dtype=float))
+            xyz.append([np.nan] * 3 if place is None else place)
+        return replace(sensors, xyz=np.array(xyz, dtype=float).reshape(-1, 3))
 
     if isinstance(measured, TimeSignals):
-        return replace(measured, sensors=moved(measured.sensors))
+        return replace(measured, sensors=moved(measured.sensors), forces=moved(measured.forces))
     forces = moved(measured.references)
     return replace(measured, responses=moved(measured.responses), references=forces)

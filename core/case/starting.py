@@ -21,7 +21,7 @@ from femubench.core.case.model_files import ModelFiles, further_files, read_mode
 from femubench.core.case.modes import FIT_STD
 from femubench.core.case.reader import read_case
 from femubench.core.case.records import COVARIANCE, MODES, REFERENCES, SENSORS
-from femubench.core.case.response_files import read_responses
+from femubench.core.case.response_files import holds_responses, read_responses
 from femubench.core.case.schema import LengthUnit
 from femubench.core.case.table_text import csv_bytes
 from femubench.core.case.tables import SUFFIXES, read_table
@@ -35,6 +35,7 @@ from femubench.core.roles import Reader
 # Mass over the cube of the diagonal, kg/m3: a mast of 1 km to a block of steel.
 _DENSITIES = (1e-4, 2e4)
 MATCHES, PICTURE = "matches.csv", "matches.png"
+REFERENCE, REFERENCE_SENSORS = "reference.csv", "reference_sensors.csv"
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,7 @@ class Beginning:
         sensors: a file with the places of sensors, where `modes` has none.
         model_unit: of the lengths of the model; None where it was not stated.
         unit, frame, tolerance, origin, without: of the test, as the keys of ``[measurement]``.
+        reference: the modes or responses of the structure as it was, like `modes`.
         tables: what was identified, by name: the file that it comes from, and the table.
         stated: what to say of it.
     """
@@ -64,6 +66,7 @@ class Beginning:
     tolerance: float | None = None
     origin: str | None = None
     without: str | None = None
+    reference: Path | None = None
     tables: Mapping[str, tuple[Path, bytes]] = field(default_factory=dict)
     stated: tuple[str, ...] = ()
 
@@ -78,15 +81,16 @@ class Beginning:
 
     def files(self) -> tuple[Path, ...]:
         """Return the files that are at hand."""
-        modes = () if self.tables else self.modes
+        modes = () if MODES in self.tables else self.modes
         sensors = None if SENSORS in self.tables else self.sensors
-        every = (self.model, self.mass, self.dofs, *modes, sensors)
+        reference = None if REFERENCE in self.tables else self.reference
+        every = (self.model, self.mass, self.dofs, *modes, sensors, reference)
         return tuple(path for path in every if path is not None)
 
     def command(self, folder: Path, remedy: Remedy) -> str:
         """Return the command that begins the case with other keys."""
         words = ["bench", "init", str(folder)]
-        files = ("model", "mass", "dofs", "modes", "sensors")
+        files = ("model", "mass", "dofs", "modes", "reference", "sensors")
         axes = ("model-unit", "unit", "frame", "origin", "tolerance", "without")
         for key in (*files, *axes):
             value = remedy.keys.get(key, getattr(self, key.replace("-", "_")))
@@ -122,9 +126,13 @@ def start_case(
         copies = _copied(given, fresh, readers)
         for name, (_, content) in given.tables.items():
             (fresh / name).write_bytes(content)
-        modes = fresh / MODES if given.tables else given.modes[0]
+        modes = fresh / MODES if MODES in given.tables else given.modes[0]
         used, held_out = _shared_out(mode_numbers(modes, readers), given.modes[0])
-        keys = _Keys(folder.resolve().name, given, copies, used, held_out, guessed)
+        before: list[int] = []
+        if (path := given.reference) is not None:
+            modes = fresh / REFERENCE if REFERENCE in given.tables else path
+            before = _shared_out(mode_numbers(modes, readers), path)[0]
+        keys = _Keys(folder.resolve().name, given, copies, used, held_out, guessed, before)
         (fresh / CASE_FILE).write_text(keys.text(readers), encoding="utf-8")
         try:
             case = read_case(fresh, readers=readers)
@@ -189,7 +197,7 @@ def mode_numbers(file: Path, readers: Sequence[Reader]) -> list[int]:
     """
     if file.suffix.lower() in SUFFIXES:
         table = read_table(file)
-        if table.columns[0] in ("frequency", "time"):
+        if holds_responses(table.columns):
             return []
         table.check_columns(("mode", "frequency"), table.columns)
         found = [(row.number("frequency") or 0.0, row.whole("mode")) for row in table.rows]
@@ -229,11 +237,12 @@ class _Keys:
     used: Sequence[int]
     held_out: Sequence[int]
     guessed: bool
+    before: Sequence[int]
 
     def text(self, readers: Sequence[Reader], case: Case | None = None) -> str:
         """Return it; with a case that was read from a first one, also what that found."""
         given = self.given
-        every = (*given.files(), *(given.modes if given.tables else ()))
+        every = dict.fromkeys((*given.files(), *given.modes, *filter(None, [given.reference])))
         source = " and ".join(path.name for path in every)
         lines = [
             f"# Written by `bench init` from {source}.",
@@ -248,6 +257,7 @@ class _Keys:
             "",
             *self._measurement(case),
             "",
+            *self._reference(),
             "# A known change of the structure that was measured as well is the test that counts:",
             "# [[modification]]",
             '# name = "1 kg at a node"',
@@ -296,7 +306,8 @@ class _Keys:
             yield f'sensors = "{SENSORS}"'
         elif given.sensors is not None:
             yield f"sensors = {_quoted(self.copies[given.sensors])}"
-        yield f"modes = {_quoted(MODES if given.tables else self.copies[given.modes[0]])}"
+        modes = MODES if MODES in given.tables else self.copies[given.modes[0]]
+        yield f"modes = {_quoted(modes)}"
         if COVARIANCE in given.tables:
             yield f'covariance = "{COVARIANCE}"'
         if REFERENCES in given.tables:
@@ -325,6 +336,17 @@ class _Keys:
         yield f"held_out = {list(self.held_out)}   # {share}"
         yield "# band = [LOW, HIGH]   # in Hz, if every mode in between was found"
         yield "# mass = {value = KG, std = KG}   # if the structure was weighed"
+
+    def _reference(self) -> Iterator[str]:
+        given = self.given
+        if given.reference is None:
+            return
+        yield "[reference]   # the structure as it was: what differs from it is sought"
+        yield f"modes = {_quoted(self.copies.get(given.reference, REFERENCE))}"
+        if REFERENCE_SENSORS in given.tables:
+            yield f'sensors = "{REFERENCE_SENSORS}"'
+        yield f"used = {list(self.before)}"
+        yield ""
 
 
 def sizes_of(model: Model) -> str:

@@ -185,8 +185,8 @@ def read_table(file: Path) -> CsvTable:
     text = read_text(file, LARGEST_TEXT)
     first = next((line for line in text.splitlines() if line.strip()), "")
     # Spreadsheets of half of the world: semicolons between cells, commas in numbers.
-    foreign = ";" in first and "," not in first
-    separator = ";" if foreign else ","
+    separator = next((mark for mark in ";\t" if mark in first and "," not in first), ",")
+    foreign = separator != ","
     reader = csv.reader(StringIO(text), delimiter=separator, skipinitialspace=True)
     lines: list[int] = []
     rows: list[list[str]] = []

@@ -50,7 +50,7 @@ def _check_seconds(value: float) -> float:
 @click.option("--no-faults", is_flag=True, help="Take data and input as they are.")
 @click.option(
     "--budget", type=float, callback=options.read_with(_check_seconds), metavar="SECONDS",
-    help="End the search for several causes after so long; a note says so. Default: no end.",
+    help="End after so long with what was found until then; a note says so. Default: no end.",
 )  # fmt: skip
 @click.option(
     "--effects", metavar="A,B,...", help="Try these effects only. Default: all that come along."

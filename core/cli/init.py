@@ -43,6 +43,10 @@ def _parse_origin(text: str) -> str:
     "`bench identify` wrote. Several are repeats of one test.",
 )  # fmt: skip
 @click.option(
+    "--reference", type=options.PATH, metavar="FILE",
+    help="The structure as it was, like --modes: `bench diagnose` then seeks what differs.",
+)  # fmt: skip
+@click.option(
     "--sensors", type=options.PATH, metavar="FILE",
     help="Where the sensors are, if the file of modes does not say.",
 )  # fmt: skip
@@ -69,6 +73,7 @@ def init(
     mass: Path | None,
     dofs: Path | None,
     modes: tuple[Path, ...],
+    reference: Path | None,
     sensors: Path | None,
     unit: LengthUnit | None,
     model_unit: LengthUnit | None,
@@ -82,7 +87,7 @@ def init(
     With the files of a model and of a test, these are copied, the sensors matched with the model,
     and a case is written that runs; without any, a commented example.
     """
-    others = (mass, dofs, sensors, model_unit, unit, frame, tolerance, origin, without)
+    others = (mass, dofs, sensors, model_unit, unit, frame, tolerance, origin, without, reference)
     if model is None and not modes and all(other is None for other in others):
         from femubench.core.library.plugins import init_case
 

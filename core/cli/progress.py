@@ -1,4 +1,4 @@
-"""Progress on stderr, only where someone watches."""
+"""Progress on stderr: a line that changes where someone watches, else one every ten seconds."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
+from threading import Event, Thread
 from typing import TYPE_CHECKING
+
+import click
 
 from femubench.core.pace import Advance, OnAdvance
 
@@ -18,22 +22,61 @@ _WIDE, _BAR = 32, 14  # characters
 
 @contextmanager
 def progress(what: str = "", *, quiet: bool = False) -> Iterator[OnAdvance | None]:
-    """Give the function that takes how far something is; None where stderr is no terminal.
+    """Give the function that takes how far something is; None where nothing is to be shown.
 
-    A line with a bar, pieces done of how many, the time gone by and the time left, which takes
-    itself away. No time is shown as left while none is known.
+    On a terminal a line with a bar, pieces done of how many, the time gone by and the time left,
+    which takes itself away; elsewhere a line of it every ten seconds. No time is shown as left
+    while none is known.
 
     Arguments:
         what: the piece is of, such as a case.
         quiet: show nothing.
     """
-    if quiet or not sys.stderr.isatty():
+    if quiet:
         yield None
+        return
+    if not sys.stderr.isatty():
+        with say_progress(what, partial(click.echo, err=True), time.monotonic) as on_advance:
+            yield on_advance
         return
     from rich.console import Console
 
     with show_progress(what, Console(stderr=True), time.monotonic) as on_advance:
         yield on_advance
+
+
+@contextmanager
+def say_progress(
+    what: str, write: Callable[[str], None], clock: Callable[[], float], every: float = 10.0
+) -> Iterator[OnAdvance]:
+    """Give the function that takes what a line says, of which one is written every ten seconds.
+
+    Arguments:
+        write: takes a line.
+        clock: seconds from any time on.
+        every: so many seconds, in a thread: one piece may be long.
+    """
+    begin = last = clock()
+    latest, ended = Advance(0, 0), Event()
+
+    def tell(advance: Advance) -> None:
+        nonlocal latest, last
+        latest, last = advance, clock()
+
+    def say() -> None:
+        while not ended.wait(every):
+            now, share = clock(), f"{latest.done}/{latest.total}, " if latest.total else ""
+            gone = format_time_left(Advance(0, 0, left=now - begin), 0.0)
+            stage = ": ".join(filter(None, [what, latest.what or "at work"]))
+            write(f"{stage}, {share}{gone} gone, {format_time_left(latest, now - last)} left")
+
+    thread = Thread(target=say, daemon=True)
+    thread.start()
+    try:
+        yield tell
+    finally:
+        ended.set()
+        thread.join()
 
 
 @contextmanager
@@ -94,27 +137,3 @@ def format_time_left(advance: Advance, since: float) -> str:
         return "-:--:--"
     seconds = round(max(advance.left - min(since, advance.current), 0.0))
     return f"{seconds // 3600}:{seconds // 60 % 60:02}:{seconds % 60:02}"
-
-
-@contextmanager
-def waiting(what: str, *, quiet: bool = False) -> Iterator[None]:
-    """Show what is being done and for how long, where stderr is a terminal.
-
-    Arguments:
-        what: a clause such as ``looking for causes``.
-        quiet: show nothing.
-    """
-    if quiet or not sys.stderr.isatty():
-        yield
-        return
-    from rich.console import Console
-    from rich.progress import Progress as Bar, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    columns = (
-        SpinnerColumn(),
-        TextColumn("{task.description}", markup=False),
-        TimeElapsedColumn(),
-    )
-    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
-        bar.add_task(what, total=None)
-        yield

@@ -265,8 +265,8 @@ def _conditions(effort: Effort) -> tuple[str, ...]:
     notes = []
     if effort.cut:
         notes.append(
-            f"The search for several causes was ended after its budget of {effort.budget:g} s: "
-            "causes that explain the data together may have been overlooked."
+            f"The search was ended after its budget of {effort.budget:g} s: causes, alone or "
+            "together, may have been overlooked; a longer --budget looks for them."
         )
     if changed := list_changed():
         words = ", ".join(f"{name} = {format_value(value)}" for name, value in changed.items())

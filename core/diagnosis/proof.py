@@ -471,6 +471,8 @@ def find_held(
     effort.expect("unseen", len(others) + len(places))
     rivals = []
     for key in others:
+        if effort.stops():
+            break
         with effort.piece("unseen"):
             is_held, log_bayes = _judged(case, examination, posterior.best(key))
         gain = log_bayes - first[1] + log(posterior.names[key] / posterior.names[name])
@@ -481,6 +483,8 @@ def find_held(
     if first[0]:
         return best
     for found in places:
+        if effort.stops():
+            break
         with effort.piece("unseen"):
             is_held, _ = _judged(case, examination, found)
         if is_held:

@@ -6,6 +6,8 @@ import numpy as np
 
 from femubench.core.typing import AnyArray, FloatArray
 
+LEAST_COLLINEAR = 0.8  # of a mode from records over time, whose errors are no white noise
+
 
 def phase_collinearity(shapes: AnyArray) -> FloatArray:
     """Return the modal phase collinearity of every mode: 1 on a line, 0 on a circle, (m,).

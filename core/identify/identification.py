@@ -34,6 +34,7 @@ class Identification(Shown):
         synthesised: the same channels from the fit, in the quantity of `measured`.
         spectrum: largest singular value of the spectra in dB by frequency in Hz, where no force
             was measured, (n_f, 2).
+        said: how the responses came from records over time; empty where they did not.
     """
 
     sensors: Sensors
@@ -49,6 +50,7 @@ class Identification(Shown):
     measured: FrequencyResponses | None = None
     synthesised: AnyArray | None = None
     spectrum: FloatArray | None = None
+    said: str = ""
 
     def __len__(self) -> int:
         return len(self.frequencies)
@@ -57,6 +59,7 @@ class Identification(Shown):
         """Return frequency, damping and collinearity of every mode."""
         low, high = self.band
         found = [("", f"{count_noun(len(self), 'mode')} from {low:.6g} to {high:.6g} Hz")]
+        found += [("records", self.said)] if self.said else []
         for k in range(len(self)):
             text = f"{self.frequencies[k]:.6g} Hz, std {self.frequency_std[k]:.2g} Hz"
             text += f", damping {self.damping[k]:.3g}, MPC {self.collinearity[k]:.3f}"

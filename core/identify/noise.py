@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.linalg
 
 from femubench.core.identify.basis import RESIDUALS, Lines
 from femubench.core.identify.modal_fit import ModalModel, predict_responses
@@ -10,6 +11,7 @@ from femubench.core.typing import AnyArray, BoolArray, FloatArray
 
 # Lines over which the level is averaged: these, and as many as give so many values of all channels.
 _SHORTEST, _ENOUGH = 9, 300
+_LEAST_LEFT = 0.1  # of the noise around a resonance, that a fit may be thought to leave
 _BEST = 1e-4  # noise of a channel over its rms: less is no measurement
 
 
@@ -78,8 +80,7 @@ def unevenness(fit: ModalModel, lines: Lines) -> FloatArray:
     as poles depend on them, the second as shapes do.
     """
     error = np.square(np.abs((lines.responses - predict_responses(fit, lines)) * fit.weights))
-    resonance = np.abs((1j * lines.omega[:, None]) ** lines.derivative / lines.noise[:, None])
-    resonance = resonance / np.square(np.abs(1j * lines.omega[:, None] - fit.poles))
+    resonance = _resonance(fit, lines)
     seen = (
         np.abs(fit.shapes)[:, None, :] * np.abs(fit.participation)[None] * fit.weights[:, :, None]
     )
@@ -89,3 +90,43 @@ def unevenness(fit: ModalModel, lines: Lines) -> FloatArray:
         whole = there[0].sum(axis=0) * there[1].sum(axis=(0, 1))
         found.append(np.einsum("fn,oin,foi->n", *there, error, optimize=True) / (2.0 * whole))
     return np.stack(found, axis=1)
+
+
+def noise_kept(fit: ModalModel, lines: Lines, decay: float) -> FloatArray:
+    """Return the share of the noise around each resonance that a fit leaves, (n, 2).
+
+    Columns are those of `unevenness`. The rest is taken for the mode: of few lines, alike under an
+    exponential window, it is most. Functions that channels share count by the unknowns that one
+    channel has of them.
+
+    Arguments:
+        fit: of the lines.
+        lines: the data.
+        decay: of the window, in 1/s.
+    """
+    half, n = len(lines.omega), len(fit.poles)
+    base, rest = lines.modes(fit.poles), lines.residuals()
+    parts = [rest, *(base[:, :, at].reshape(2 * half, -1) for at in ([0, 1], [2, 3]))]
+    functions = np.concatenate(parts, axis=1)
+    own = np.linalg.qr(functions / np.linalg.norm(functions, axis=0))[0]
+    count = max(1, int(np.count_nonzero(fit.weights)))
+    ranks = min(1.0, (sum(fit.weights.shape) - 1) / count)
+    share = np.repeat([1.0, ranks, 1.0 / count], [rest.shape[1], 2 * n, 2 * n])
+    # White noise under e^-wt: how lines that are k apart go together.
+    seconds = 2.0 * np.pi / float(np.diff(lines.omega).mean())
+    column = 1.0 / (1.0 + 1j * np.pi * np.arange(half) / (decay * seconds))
+    spread = scipy.linalg.matmul_toeplitz((column, column.conj()), own[:half] + 1j * own[half:])
+    noisy = np.concatenate([spread.real, spread.imag])
+    root = np.sqrt(share)
+    left = 1.0 - 2.0 * (own * noisy) @ share
+    left += np.einsum("fa,ab,fb->f", own * root, own.T @ noisy, own * root, optimize=True)
+    squares = [np.square(_resonance(fit, lines)), _resonance(fit, lines)]
+    level = 0.5 * (left[:half] + left[half:])
+    found = [np.maximum(level @ lens / lens.sum(axis=0), _LEAST_LEFT) for lens in squares]
+    return np.stack(found, axis=1)
+
+
+def _resonance(fit: ModalModel, lines: Lines) -> FloatArray:
+    """Return how much a change of each pole changes every line, whitened, (n_f, n)."""
+    found = np.abs((1j * lines.omega[:, None]) ** lines.derivative / lines.noise[:, None])
+    return np.asarray(found / np.square(np.abs(1j * lines.omega[:, None] - fit.poles)))

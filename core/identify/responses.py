@@ -10,11 +10,12 @@ import numpy as np
 from femubench.core.errors import InputError
 from femubench.core.identify.basis import Lines
 from femubench.core.identify.clusters import Cluster, clusters_of
+from femubench.core.identify.complexity import phase_collinearity
 from femubench.core.identify.hidden import find_hidden_poles
 from femubench.core.identify.identification import Identification
 from femubench.core.identify.lscf import Poles, lscf_poles
 from femubench.core.identify.modal_fit import ModalModel, fit_modes, predict_responses
-from femubench.core.identify.noise import first_weights, noise_left, unevenness
+from femubench.core.identify.noise import first_weights, noise_kept, noise_left, unevenness
 from femubench.core.identify.selection import find_needed, select
 from femubench.core.modal.complex_modes import mean_phase
 from femubench.core.modal.correlation import mac
@@ -35,6 +36,7 @@ def identify_responses(
     measured: FrequencyResponses,
     band: tuple[float, float] | None = None,
     most_poles: int = MOST_POLES,
+    least_collinear: float = 0.0,
 ) -> Identification:
     """Return the modes in a band of frequency responses.
 
@@ -42,13 +44,15 @@ def identify_responses(
         measured: the responses; the more numerous of its two sides carries the shapes.
         band: lowest and highest frequency in Hz; None for all lines.
         most_poles: of the largest model of the stabilisation diagram.
+        least_collinear: modal phase collinearity below which a shape is no mode's; above 0, what
+            no pole of the models stands for is none either.
 
     Raises:
         InputError: when there are too few lines, or no mode stands out of the noise.
     """
     data = measured if band is None else measured.within(*band)
     data = data.within(np.nextafter(0.0, 1.0), np.inf)
-    if len(data.references) > len(data.responses):
+    if len(data.references) > len(data.responses) and data.quantity != "free decay":
         data = data.transpose()
     if len(data.frequencies) < _FEWEST_LINES:
         what = f"{len(data.frequencies)} lines above 0 Hz in the band"
@@ -59,12 +63,31 @@ def identify_responses(
     values = np.where(seen, data.values, 0.0)
     poles = _all_poles(data.frequencies, values, seen, most_poles)
     omega, derivative = 2.0 * np.pi * data.frequencies, DERIVATIVES[data.quantity]
-    lines = Lines.of(omega, derivative, values, np.ones(len(omega)))
+    lines = Lines.of(omega, derivative, values, _course(data, seen))
     able = (poles.damping > 1e-6) & (poles.damping < _LARGEST_DAMPING)
     orders = len(np.unique(poles.orders))
     clusters = [c for c in clusters_of(poles.select(able), orders) if c.support >= _SUPPORT]
     fit, lines = _fitted(lines, clusters, seen)
-    return _identification(data, fit, lines, clusters, poles)
+    keep = phase_collinearity(fit.shapes) >= least_collinear
+    if least_collinear > 0.0:
+        seeds = np.array([cluster.pole for cluster in clusters], dtype=complex)
+        near = np.abs(seeds - fit.poles[:, None]) < _SAME * np.abs(fit.poles[:, None])
+        keep &= near.any(axis=1)
+    return _identification(data, fit, lines, clusters, poles, keep)
+
+
+def _course(data: FrequencyResponses, seen: BoolArray) -> FloatArray:
+    """Return the noise of every line over the mean, as the deviations of the data have it, (n_f,).
+
+    A line without a deviation has that of the others.
+    """
+    if data.deviations is None:
+        return np.ones(len(data.frequencies))
+    known = np.square(data.deviations[:, seen])
+    known = known[:, np.isfinite(known).all(axis=0) & (known > 0.0).any(axis=0)]
+    if not known.size:
+        return np.ones(len(known))
+    return np.asarray(np.sqrt(np.maximum((known / known.mean(axis=0)).mean(axis=1), 1e-6)))
 
 
 def _all_poles(
@@ -131,6 +154,7 @@ def _twice(fit: ModalModel) -> BoolArray:
     strength = strength / -fit.poles.real
     apart = np.abs(fit.poles[:, None] - fit.poles)
     near = apart < _WIDTHS * np.maximum(-fit.poles.real[:, None], -fit.poles.real)
+    near &= -fit.poles.real < _LARGEST_DAMPING * np.abs(fit.poles)  # what hardly swings is no mode
     alike = mac(fit.shapes, fit.shapes) > _ALIKE
     return np.asarray((near & alike & (strength[:, None] < strength)).any(axis=1))
 
@@ -141,39 +165,66 @@ def _identification(
     lines: Lines,
     clusters: Sequence[Cluster],
     poles: Poles,
+    keep: BoolArray,
 ) -> Identification:
-    hz, ratio = np.abs(fit.poles) / (2.0 * np.pi), -fit.poles.real / np.abs(fit.poles)
+    s = fit.poles + data.decay
+    hz, ratio = np.abs(s) / (2.0 * np.pi), -s.real / np.abs(s)
     low, high = float(data.frequencies[0]), float(data.frequencies[-1])
-    inside = (hz >= low) & (hz <= high) & (ratio < _LARGEST_DAMPING)
+    # Without its window a pole may grow: that is no mode.
+    inside = keep & (hz >= low) & (hz <= high) & (ratio > 0.0) & (ratio < _LARGEST_DAMPING)
     order = np.flatnonzero(inside)[np.argsort(hz[inside])]
     if not len(order):
         raise InputError(_NO_MODE, expected="resonances in the band")
-    s, size = fit.poles, np.abs(fit.poles)
+    # Of modes alone: rounding makes the variance of a pole that does not swing negative.
+    s, hz, ratio, own = s[order], hz[order], ratio[order], fit.pole_covariance[order]
+    size = np.abs(s)
     to_hz = np.stack([s.real, s.imag], axis=1) / (2.0 * np.pi * size[:, None])
     to_ratio = np.stack([-np.square(s.imag), s.real * s.imag], axis=1) / (size**3)[:, None]
+    of_poles, of_shapes = _windowed(fit, lines, data)[:, order]
     stds = [
-        np.sqrt(np.einsum("na,nab,nb->n", way, fit.pole_covariance, way))
-        for way in (to_hz, to_ratio)
+        np.sqrt(of_poles * np.einsum("na,nab,nb->n", way, own, way)) for way in (to_hz, to_ratio)
     ]
-    shapes, shape_std = _scaled_shapes(fit.shapes[:, order], fit.shape_covariance[order])
+    covariance = fit.shape_covariance[order] * of_shapes[:, None, None]
+    shapes, shape_std = _scaled_shapes(fit.shapes[:, order], covariance)
     support = [
         max((c.support for c in clusters if abs(c.pole - pole) < _SAME * abs(pole)), default=0.0)
-        for pole in s[order]
+        for pole in fit.poles[order]
     ]
     return Identification(
         sensors=data.responses,
-        frequencies=hz[order],
-        frequency_std=stds[0][order],
-        damping=ratio[order],
-        damping_std=stds[1][order],
+        frequencies=hz,
+        frequency_std=stds[0],
+        damping=ratio,
+        damping_std=stds[1],
         shapes=shapes,
         shape_std=shape_std,
         support=np.array(support),
-        poles=poles,
+        poles=replace(poles, values=poles.values + data.decay),
         band=(low, high),
         measured=data,
         synthesised=predict_responses(fit, lines) * lines.noise[:, None, None],
     )
+
+
+def _windowed(fit: ModalModel, lines: Lines, data: FrequencyResponses) -> FloatArray:
+    """Return by how much variances of poles and of shapes grow under an exponential window, (2, n).
+
+    It makes the noise of neighbouring lines alike, which the fit takes to be independent: over
+    time, noise of variance e^-2wt meets e^-at, or (t - 1 / 2a) e^-at, where a fit counts on its
+    mean, of which it sees what it leaves.
+
+    Arguments:
+        fit: whose modes decay with a under the window.
+        lines: that it fits.
+        data: whose window decays with w.
+    """
+    if not data.decay:
+        return np.ones((2, len(fit.poles)))
+    ends = 2.0 * data.decay / float(np.diff(data.frequencies).mean())
+    share = fit.poles.real / (fit.poles.real - data.decay)
+    grown = np.stack([2.0 * share**3 - 2.0 * share**2 + share, share])
+    mean = ends / -np.expm1(-ends)
+    return np.asarray(mean * grown / noise_kept(fit, lines, data.decay).T)
 
 
 def _scaled_shapes(shapes: AnyArray, covariance: FloatArray) -> tuple[AnyArray, FloatArray]:

@@ -48,7 +48,7 @@ class Effort:
     """Pieces of work that are done, those that are known to come, and the time they may take.
 
     Arguments:
-        budget: seconds from now on for the search for several causes; None for no end.
+        budget: seconds from now on, after which what is not needed is left; None for no end.
         on_advance: called when a piece begins or ends.
         clock: seconds from any time on.
     """
@@ -130,8 +130,12 @@ class Effort:
         return number
 
     def stops(self) -> bool:
-        """Tell whether the time is spent; anyone who asks leaves the rest, which is remembered."""
-        spent = self.budget is not None and self._clock() - self._begin >= self.budget
+        """Tell whether the time is spent but for what the proof and the advice take at least.
+
+        Anyone who asks leaves the rest, which is remembered.
+        """
+        kept = self._pace.of("unseen") + self._pace.of("advice")
+        spent = self.budget is not None and self._clock() - self._begin >= self.budget - kept
         self.cut = self.cut or spent
         return spent
 

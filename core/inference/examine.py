@@ -333,6 +333,8 @@ def search_explanations(
         single = by_weight(e for e in sought(earlier, False) if e.parts)[: settings.partners]
         explanations += [with_scales(error, e, scales, nothing) for e in single]
     for left in reversed(range(settings.scale_rounds)):
+        if left < settings.scale_rounds - 1 and effort.stops():
+            break
         effort.expect_alike(left, pairs)
         explanations += sought(scales, pairs)
         best = by_weight(explanations)[0].fit.state

@@ -111,7 +111,7 @@ def inquire(
     other = _reweighed(now, reweighing, seen, terms)
     if other is None:
         return Inquiry(seen, tuple(repaired))
-    if other.charge.loosens < 1.0:
+    if other.charge.loosens < 1.0 and not effort.stops():
         return Inquiry(terms.examine(*other.charge.repaired), (*repaired, other))
     surely = replace(other.charge, x=other.charge.x - 2.0 * other.charge.std)
     clearly = surely.loosens > settings.wrong_factor
@@ -428,6 +428,8 @@ def _weighed(now: _Drawn, faults: Sequence[Fault], effort: Effort) -> Weighed:
         effort.expect("typed", len(typed))
         promises: Weighed = []
         for charge in typed:
+            if effort.stops():
+                break
             with effort.piece("typed"):
                 promises += now.weigh_input(charge)
         with effort.piece("faults"):

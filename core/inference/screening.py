@@ -59,8 +59,10 @@ def screen_hypotheses(
     if not isinstance(problem, LargeProblem) or not projections:
         return screen(problem, base, projections)
     spaces = problem.common.first_response(problem.space, projections)
-    tried = []
+    tried: list[Screened | None] = []
     for number, (own, projection) in enumerate(zip(spaces, projections, strict=True)):
+        if tried and effort.stops():
+            break
         effort.step(number, len(projections))
         tried.append(_tried(replace(problem, space=own), projection))
     return [item for item in tried if item is not None]

@@ -90,7 +90,7 @@ class Search:
         effects: what may be missing.
         pairs: whether more than one cause is sought.
         floor: of ln weight; where no single cause comes near it, no pairs are sought.
-        effort: counts the pieces; the search for several causes ends with its time.
+        effort: counts the pieces; what is not needed ends with its time.
     """
 
     def __init__(
@@ -123,6 +123,8 @@ class Search:
         promising = self.promising(bare, found[0])
         self.effort.expect("single", len(promising))
         for base in promising:
+            if self.effort.stops():
+                break
             found.append(self.on(base))
             self.effort.note_adequacy(self.enough(found) or any(map(self.adequate, bare)))
         explanations = [e for item in found for e in item.explanations]
@@ -135,6 +137,8 @@ class Search:
             self.effort.expect("together", 0)
             self.effort.expect("more", 0)
             for best in by_weight(explanations)[: settings.candidates]:
+                if self.effort.stops():
+                    break
                 with self.effort.piece("values"):
                     explanations += self.split(best)
         if isinstance(self.problem, LargeProblem):
@@ -222,7 +226,8 @@ class Search:
             refined = {getattr(effect, "refines", None) for effect in self.effects}
             own = [e for e in ranked[settings.finer_singles :] if refined.intersection(e.searched)]
             most = settings.finer_singles
-            explanations += [e for one in (*ranked[:most], *own[:most]) for e in self.split(one)]
+            for one in (*ranked[:most], *own[:most]):
+                explanations += [] if self.effort.stops() else self.split(one)
             return Found(base, problem, tuple(explanations), tuple(atlas))
 
     def ground(self, base: Base) -> Problem:
@@ -255,6 +260,8 @@ class Search:
         fits: list[Fit] = []
         best = start.state.cost
         for number, item in enumerate((*near, *chances)):
+            if fits and self.effort.stops():
+                break
             self.effort.step(number, len(near) + len(chances))
             own, parts = enrich_problem(problem, (item.projection,))
             give_up = best + settings.given_up if id(item) in known else np.inf

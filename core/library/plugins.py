@@ -31,8 +31,9 @@ def init_case(
         folder: new or empty.
         model, modes: files with the model and with the measured modes or responses, or the folder
             of an identification; several are repeats. Without both a commented example is written.
-        stated: ``mass``, ``dofs`` and ``sensors``, further files; ``model_unit``, ``unit``,
-            ``tolerance``, ``origin``, ``without`` and ``frame`` for the axes, as `bench init` has.
+        stated: ``mass``, ``dofs``, ``sensors`` and ``reference``, further files; ``model_unit``,
+            ``unit``, ``tolerance``, ``origin``, ``without`` and ``frame`` for the axes, as
+            `bench init` has.
 
     Raises:
         InputError: when the folder holds anything or cannot be written, or for what is wrong in
@@ -44,7 +45,8 @@ def init_case(
     """
     if model is None and modes is None and not stated:
         return write_example(Path(folder))
-    paths = {key: Path(stated[key]) for key in ("mass", "dofs", "sensors") if stated.get(key)}
+    files = ("mass", "dofs", "sensors", "reference")
+    paths = {key: Path(stated[key]) for key in files if stated.get(key)}
     every = [modes] if isinstance(modes, str | PathLike) else modes or ()
     given = Beginning.of(model, every, **{**stated, **paths})
     begin_case(Path(folder), given, usable_plugins())

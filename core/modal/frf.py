@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -13,9 +14,9 @@ from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import Modes
 from femubench.core.typing import AnyArray, FloatArray, SparseArray
 
-Quantity: TypeAlias = Literal["receptance", "mobility", "accelerance"]
+Quantity: TypeAlias = Literal["receptance", "mobility", "accelerance", "free decay"]
 # How often displacement was derived with respect to time.
-DERIVATIVES: dict[str, int] = {"receptance": 0, "mobility": 1, "accelerance": 2}
+DERIVATIVES: dict[str, int] = {"receptance": 0, "mobility": 1, "accelerance": 2, "free decay": 0}
 
 
 @dataclass(frozen=True, repr=False)
@@ -28,7 +29,11 @@ class FrequencyResponses(Shown):
         frequencies: in Hz, rising, (n_f,).
         values: motion over force in m, m/s or m/s2 over N, complex, (n_f, n_responses,
             n_references); nan in the whole of a channel that was not measured.
-        quantity: what the motion is.
+        quantity: what the motion is; of a free decay, whatever it is, its spectrum: every decay
+            is a reference then.
+        deviations: standard deviations of real and imaginary parts, from the coherence, like
+            `values`; None where they are not known.
+        decay: of the exponential window that was laid over what they come from, in 1/s.
 
     Examples:
         >>> print(modal.FrequencyResponses(sensors, force, lines, curves))
@@ -41,6 +46,8 @@ class FrequencyResponses(Shown):
     frequencies: FloatArray
     values: AnyArray
     quantity: Quantity = "receptance"
+    deviations: FloatArray | None = None
+    decay: float = 0.0
 
     def rows(self) -> list[tuple[str, str]]:
         """Return what was measured, where, and the band."""
@@ -67,16 +74,16 @@ class FrequencyResponses(Shown):
     def within(self, low: float, high: float) -> FrequencyResponses:
         """Return the lines between two frequencies in Hz."""
         keep = (self.frequencies >= low) & (self.frequencies <= high)
-        return replace(self, frequencies=self.frequencies[keep], values=self.values[keep])
+        return self._with_values(lambda values: values[keep], frequencies=self.frequencies[keep])
 
     def transpose(self) -> FrequencyResponses:
         """Return the responses with forces and motions exchanged, as reciprocity allows."""
-        return replace(
-            self,
-            responses=self.references,
-            references=self.responses,
-            values=self.values.transpose(0, 2, 1),
-        )
+        sides = {"responses": self.references, "references": self.responses}
+        return self._with_values(lambda values: values.transpose(0, 2, 1), **sides)
+
+    def _with_values(self, of: Callable[[AnyArray], AnyArray], **more: Any) -> FrequencyResponses:  # noqa: ANN401
+        deviations = None if self.deviations is None else of(self.deviations)
+        return replace(self, values=of(self.values), deviations=deviations, **more)
 
 
 def receptance(

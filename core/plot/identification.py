@@ -23,7 +23,12 @@ from femubench.core.typing import FloatArray
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_UNITS = {"receptance": "m/N", "mobility": "m/(s N)", "accelerance": "m/(s² N)"}
+_UNITS = {
+    "receptance": "m/N",
+    "mobility": "m/(s N)",
+    "accelerance": "m/(s² N)",
+    "free decay": "one",
+}
 _CURVES: tuple[tuple[str, str, float, Any], ...] = (
     ("measured", INK, 2.2, "-"),
     ("synthesised", BEFORE, 1.6, (0, (5, 2))),

@@ -30,6 +30,7 @@ _WAYS = {
     "readers": (
         *("read_model", "read_pair", "read_remarks", "model_files", "read_nodes"),
         *("read_named_modes", "read_outline", "write_model", "write_pair", "read_responses"),
+        "read_named_responses",
     ),
     "reporters": ("render_with", "render_bytes"),
 }

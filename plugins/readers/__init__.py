@@ -13,6 +13,7 @@ def femubench_readers() -> dict[str, str]:
         "npz": f"{__name__}.npz:NpzReader",
         "HDF5": f"{__name__}.hdf5:Hdf5Reader",
         "MATLAB": f"{__name__}.matlab:MatlabReader",
+        "LabVIEW": f"{__name__}.labview:LabViewReader",
         "Nastran OP4": f"{__name__}.op4:Op4Reader",
         "Nastran DMIG": f"{__name__}.dmig:DmigReader",
         "Nastran bulk data": f"{__name__}.bulk_data:BulkDataReader",

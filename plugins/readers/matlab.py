@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -47,12 +48,23 @@ def is_hdf5(path: Path) -> bool:
 
 def list_variables(path: Path) -> dict[str, Any]:
     """Return the variables by name; a crash is for the caller to stand."""
-    found = _loaded(path)
+    found = dict(_parts(_loaded(path)))
     for name, value in found.items():
         if getattr(value, "dtype", np.dtype(float)).kind == "O":
             cells = (np.asarray(cell).reshape(-1)[:1] for cell in value.flat)
             found[name] = np.array([str(cell[0]) if np.size(cell) else "" for cell in cells])
     return found
+
+
+def _parts(found: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield variables by name, the fields of a structure of one behind its name and a slash."""
+    for name, value in found.items():
+        fields = getattr(getattr(value, "dtype", None), "names", None)
+        if fields and value.size == 1:
+            inner = value.reshape(-1)[0]
+            yield from _parts({field: inner[field] for field in fields}, f"{above}{name}/")
+        elif not fields:
+            yield f"{above}{name}", value
 
 
 def _loaded(path: Path) -> dict[str, Any]:

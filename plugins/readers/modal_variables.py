@@ -51,16 +51,7 @@ def read_modal(variables: Mapping[str, Any], path: Path, names: Mapping[str, str
     Raises:
         InputError: where frequencies are missing, or sizes do not fit.
     """
-    plain = {name.lower().replace("_", ""): name for name in variables}
-    found: dict[str, Any] = {}
-    for key, known in NAMES.items():
-        wanted = names.get(key)
-        if wanted is not None and wanted not in variables:
-            there = ", ".join(list(variables)[:12])
-            raise InputError(f"there is no variable {wanted!r}", file=path, expected=there)
-        name = wanted or next((plain[word] for word in known if word in plain), None)
-        if name is not None:
-            found[key] = variables[name]
+    found = named_variables(variables, NAMES, names, path)
     hertz = _column(found, "frequencies", None, path)
     squared = _column(found, "eigenvalues", None, path)
     if hertz is None:
@@ -93,6 +84,41 @@ def read_modal(variables: Mapping[str, Any], path: Path, names: Mapping[str, str
         shapes=np.zeros((0, m)) if shapes is None else real_modes(shapes, align_phase=True),
         shape_std=np.full((n, m), np.nan) if std is None else np.abs(std),
     )
+
+
+def named_variables(
+    variables: Mapping[str, Any],
+    known: Mapping[str, tuple[str, ...]],
+    names: Mapping[str, str],
+    path: Path,
+) -> dict[str, Any]:
+    """Return variables by key, and under KEY `is called` what each is called, none of them twice.
+
+    Arguments:
+        variables: by their name; that of a part of a structure counts without the structure.
+        known: what those of a key may be called.
+        names: from a key to the name of a variable.
+        path: for messages.
+
+    Raises:
+        InputError: for a name or a key that is not there.
+    """
+    plain = {name.rpartition("/")[2].lower().replace("_", ""): name for name in variables}
+    found: dict[str, Any] = {}
+    if strange := set(names) - set(known):
+        raise InputError(f"no key {min(strange)!r}", file=path, expected=", ".join(known))
+    taken = set(names.values())
+    for key, words in known.items():
+        wanted = names.get(key)
+        if wanted is not None and wanted not in variables:
+            there = ", ".join(list(variables)[:12])
+            raise InputError(f"there is no variable {wanted!r}", file=path, expected=there)
+        able = (plain[word] for word in words if word in plain and plain[word] not in taken)
+        name = wanted or next(able, None)
+        if name is not None:
+            taken.add(name)
+            found |= {key: variables[name], f"{key} is called": name.rpartition("/")[2].lower()}
+    return found
 
 
 def _numbers(found: Mapping[str, Any], key: str, path: Path) -> NDArray[Any] | None:

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from femubench import InputError, Sensors
-from femubench.modal import FrequencyResponses, TimeSignals
+from femubench.modal import FrequencyResponses, TimeSignals, join_records
 from femubench.plugins.readers.reading import DIRECTIONS
 from femubench.plugins.readers.universal_datasets import Dataset, read_datasets
 
 _TIME, _RESPONSE = 1, 4  # types of a function
 _QUANTITIES = {8: "receptance", 11: "mobility", 12: "accelerance"}
 _FORCES = (0, 9, 13)  # unknown, reaction, excitation
+_FORCE = "force"
 _MOST_NUMBERS = 50_000_000  # lines times channels
 _SAME_AXIS = 1e-6  # of the step
 _KEY = "dataset 58"
@@ -74,7 +75,9 @@ def _function(path: Path, dataset: Dataset, length: float, force: float) -> _Fun
     kind = dataset["func_type"]
     response, sign = _place(path, dataset, "rsp")
     reference = None
-    quantity = _QUANTITIES.get(dataset["ordinate_spec_data_type"], "accelerance")
+    ordinate = dataset["ordinate_spec_data_type"]
+    acts = kind == _TIME and ordinate in _FORCES[1:]
+    quantity = _FORCE if acts else _QUANTITIES.get(ordinate, "accelerance")
     x = np.asarray(dataset["x"], dtype=float)
     values = np.asarray(dataset["data"], dtype=complex)
     where = f"{response[0]}:{response[1]}"
@@ -165,15 +168,32 @@ def _responses(
 
 
 def _signals(path: Path, functions: Sequence[_Function], known: Mapping[str, Any]) -> TimeSignals:
+    """Return motions and forces over time; a channel that comes again begins a record."""
     x = _shared_axis(path, functions)
-    places = [function.response for function in functions]
-    for k, (node, direction) in enumerate(places):
-        if (node, direction) in places[:k]:
-            what = f"the sensor {node}:{direction} is there twice"
-            expected = "every one once: records of one state are files of their own"
-            raise InputError(what, file=path, key=_KEY, expected=expected)
     step = (x[-1] - x[0]) / (len(x) - 1)
     if np.abs(np.diff(x) - step).max() > 0.01 * step:
         raise InputError("uneven steps of time", file=path, key=_KEY, expected="even steps")
-    values = np.stack([function.values.real for function in functions], axis=1)
-    return TimeSignals(_sensors(places, known), 1.0 / step, values)
+    quantities = {function.quantity for function in functions} - {_FORCE}
+    if len(quantities) != 1:
+        what = f"motions over time of {' and '.join(sorted(quantities)) or 'none'}"
+        raise InputError(what, file=path, key=_KEY, expected="one quantity")
+    records: list[dict[bool, dict[Place, Any]]] = []
+    after_motion = True
+    for function in functions:
+        acting = function.quantity == _FORCE
+        full = acting and after_motion and bool(records) and bool(records[-1][True])
+        if not records or full or function.response in records[-1][acting]:
+            records.append({False: {}, True: {}})
+        records[-1][acting][function.response] = function.values.real
+        after_motion = not acting
+    quantity: Any = quantities.pop()
+    parts = []
+    for record in records:
+        sides = (_sensors(list(record[acting]), known) for acting in (False, True))
+        columns = (
+            np.array(list(record[acting].values())).reshape(-1, len(x)).T
+            for acting in (False, True)
+        )
+        (motions, forces), (values, force_values) = sides, columns
+        parts.append(TimeSignals(motions, 1.0 / step, values, forces, force_values, quantity))
+    return join_records(parts)

@@ -16,6 +16,7 @@ from femubench.plugins.readers.reading import DIRECTIONS, directions, open_broke
 if TYPE_CHECKING:
     from femubench import Measurement, Model
     from femubench.fem import SparseArray
+    from femubench.modal import FrequencyResponses, TimeSignals
 
 Variables: TypeAlias = Mapping[str, Any]  # arrays, sparse matrices, arrays of words
 STIFFNESS = ("stiffness", "k", "kaa", "kgg", "kaax", "kjj", "kll", "k_whole", "k0")
@@ -167,10 +168,28 @@ class VariablesReader(ABC):
     def read_named_modes(self, path: Path, names: Mapping[str, str]) -> Measurement:
         """Return the modes by names that a case gives; raises InputError."""
         from femubench.plugins.readers.modal_variables import read_modal
+        from femubench.plugins.readers.response_variables import holds_responses
 
         found = self.variables(path)
         with open_broken(path, "frequencies and mode shapes by name"):
-            return read_modal(found, path, names)
+            read = read_modal(found, path, names)
+        if not len(read.sensors) and holds_responses(found):
+            raise InputError("responses, and no modes", file=path, expected="`bench identify`")
+        return read
+
+    def read_responses(self, path: Path) -> FrequencyResponses | TimeSignals:
+        """Return frequency responses or signals by their common names; raises InputError."""
+        return self.read_named_responses(path, {})
+
+    def read_named_responses(
+        self, path: Path, names: Mapping[str, str]
+    ) -> FrequencyResponses | TimeSignals:
+        """Return frequency responses or signals by names that are given; raises InputError."""
+        from femubench.plugins.readers.response_variables import read_response_variables
+
+        found = self.variables(path)
+        with open_broken(path, "responses by name"):
+            return read_response_variables(found, path, names)
 
     def write_model(self, model: Model, path: Path, original: Path) -> None:
         """Write an updated model, and all else that is in the original; raises InputError."""
