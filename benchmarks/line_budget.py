@@ -32,7 +32,7 @@ BUDGETS = {
     "core/fem": 5_120,
     "core/fit": 2_230,
     "core/identify": 1_690,
-    "core/inference": 3_700,
+    "core/inference": 3_705,
     "core/library": 2_745,
     "core/look": 1_190,
     "core/modal": 3_625,
