@@ -158,7 +158,10 @@ def _number(cell: float | Complex | None) -> complex:
 def _of_arrays(file: Path) -> FrequencyResponses:
     """Return what `responses_npz` wrote: a case of ours is read without plugins."""
     try:
-        with open_regular(file, LARGEST_FILE) as stream, np.load(stream) as held:
+        with (
+            open_regular(file, LARGEST_FILE) as stream,
+            np.load(stream, allow_pickle=False) as held,
+        ):
             names = [tuple(held[side].tolist()) for side in ("responses", "references")]
             first, second = (
                 Sensors(n, np.full((len(n), 3), np.nan), ("",) * len(n)) for n in names
