@@ -466,8 +466,8 @@ def find_held(
     others = inseparable(posterior)[0][1:] if name else ()
     with effort.piece("unseen"):
         first = _judged(case, examination, best)
-    places = [*fitted_otherwise(posterior, best), *elsewhere(posterior, best)]
-    places = places[: settings.largest_group] if name and not first[0] else []
+    kinds = (fitted_otherwise, elsewhere) if name and not first[0] else ()
+    places = [e for of in kinds for e in of(posterior, best)][: settings.largest_group]
     effort.expect("unseen", len(others) + len(places))
     rivals = []
     for key in others:
