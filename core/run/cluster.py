@@ -7,6 +7,7 @@ import pickle
 import re
 import secrets
 import shutil
+import signal
 import sys
 import threading
 import time
@@ -356,6 +357,9 @@ def _local(count: int) -> Cluster:
         """Starts its worker, also in place of one that died, without the user's script."""
 
         async def instantiate(self) -> Any:  # noqa: ANN401 - a distributed.Status
+            # An interrupt is for the process that has the cluster: one that meets a worker while
+            # it imports would print its traceback. The thread of the loop handles no signal.
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             with _no_script():
                 return await super().instantiate()
 
