@@ -12,6 +12,11 @@ from femubench.reports.templating import templates
 
 TITLE = "femubench leaderboard"
 _ABOUT = ("kind", "strategy", "version", "femubench", "when")
+_PROOF = {
+    "recomputed": "Errors recomputed from its updated models.",
+    "stated": "Errors as its contributor states them.",
+    "unverified": "Unverified.",
+}
 _SAYS = {"strategy": "New: {}", "version": "New version of {}", "leader": "{} leads"}
 
 
@@ -56,7 +61,7 @@ def _news_text(item: Mapping[str, Any]) -> str:
     """Return version and gain of who is in the news."""
     stated = f"Version {plain(item['version'])}, femubench {plain(item['femubench'])}: "
     if item["gain"] is None:
-        return f"{stated}no result on today's files of the cases."
+        return f"{stated}no result on today's files of the cases. {_PROOF[item['proof']]}"
     sure = "" if item["low"] is None else f" (95 %: {interval(item['low'], item['high'])})"
     off = ""
     if item["error_percent"] is not None:
@@ -64,7 +69,10 @@ def _news_text(item: Mapping[str, Any]) -> str:
             f", {item['error_percent']:.1f} % off out of the given band, "
             f"handbooks {item['textbook_percent']:.1f} %,"
         )
-    return f"{stated}gain {format_fixed(item['gain'], 3, 7)}{sure}{off} on today's cases."
+    return (
+        f"{stated}gain {format_fixed(item['gain'], 3, 7)}{sure}{off} on today's cases. "
+        + (_PROOF[item["proof"]])
+    )
 
 
 def _name(*parts: str) -> str:

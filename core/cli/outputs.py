@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from femubench.core.roles import Reporter
     from femubench.core.run.runner import Plan
     from femubench.core.run.store import Store
-    from femubench.core.schema.results import Run
+    from femubench.core.schema.results import JobName, Run
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,7 @@ class RunOutput:
         """
         from femubench.core.library.report import reporter
         from femubench.core.run.executor import open_executor
+        from femubench.core.run.handed_in import count_unanswered, name_answers, write_answers
         from femubench.core.run.runner import Receivers
 
         quiet = self.ctx.params["quiet"]
@@ -89,8 +90,18 @@ class RunOutput:
                 if found.sandbox == "none" and executor.sandbox != "off":
                     click.echo(f"strategies run without a sandbox: {found.reason}", err=True)
                 click.echo(wrap_text(header(executor.spoken), hanging=2))
+            # What goes to a leaderboard has twins, and is judged again there from its models.
+            file = self.ctx.params["json_file"]
+            answers: dict[JobName, bytes] = {}
+            keep = answers.__setitem__ if file and plan.starts.companions.twins else None
             with progress(quiet=quiet) as advance:
-                run = plan.run(executor, Receivers(self.store, advance=advance))
+                run = plan.run(executor, Receivers(self.store, advance=advance, keep_answer=keep))
+        if keep and (missing := count_unanswered(run, answers)):
+            name_answers(file).unlink(missing_ok=True)  # of an earlier run
+            what = f"{missing} results come from the store, without their models"
+            click.echo(f"bench: no {name_answers(file)}: {what}", err=True)
+        elif keep:
+            write_answers(name_answers(file), run, answers)
         return run, self._report(run, screen, exhibits)
 
     def _report(self, run: Run, screen: Reporter | None, exhibits: object) -> int:

@@ -61,4 +61,5 @@ def _entry(
     kind: str, strategy: str, version: Mapping[str, Any], run: Mapping[str, Any]
 ) -> dict[str, Any]:
     stated = {name: version[name] for name in (*_STATED, "version", "femubench", "low", "high")}
-    return {"kind": kind, "when": run["started"], "strategy": strategy, **stated}
+    proof = version["marks"][0]
+    return {"kind": kind, "when": run["started"], "strategy": strategy, "proof": proof, **stated}
