@@ -125,6 +125,22 @@ def test_where_there_is_none_a_run_says_so_once(
     kept = json.loads(Path("run.json").read_text())
     assert kept["meta"]["sandbox"] == "none"
     assert kept["meta"]["sandbox_reason"] == "this machine has none"
+    # The mark stands at the rank, and the reason in what is kept.
+    assert "^" in done.stdout.partition("unchanged")[0]
+    (report,) = Path("femubench-results").glob("*.md")
+    assert "ran without a sandbox (this machine has none)" in report.read_text()
+    assert "| =^ | unchanged |" in report.read_text().replace("\\", "")
+
+
+def test_a_quiet_run_says_what_its_ranks_lack(nowhere: None, tmp_path: Path) -> None:
+    words = ["run", "frame", "-s", "unchanged", "-q", "-j1", "--store", str(tmp_path / "s")]
+    done = CliRunner().invoke(bench, words)
+    assert done.stdout == ""
+    assert done.stderr.splitlines() == [
+        "bench: no twins ran, so that memory of the cases is not excluded",
+        "bench: strategies ran without a sandbox (this machine has none) and could read what they "
+        "were not given",
+    ]
 
 
 def test_one_that_is_required_and_missing_is_wrong_input(

@@ -114,6 +114,7 @@ class RunOutput:
             OutputError: for the last such file, when all else is done.
             PluginError: for the last reporter that failed.
         """
+        from femubench.core.library.cases import way_of
         from femubench.core.library.report import render_report, reporter, run_name, text_of
         from femubench.core.schema.results import DONE
 
@@ -130,6 +131,8 @@ class RunOutput:
                 if broken is not None:
                     click.echo(f"bench: {broken}", err=True)
                 broken = fault
+        for line in way_of("terminal", "shortfalls")(run) if screen is None else ():
+            click.echo(f"bench: {line}", err=True)
         if screen is not None:
             click.echo("\n".join(["", text_of(screen, render_report(screen, run)), *written]))
         if broken is not None:

@@ -8,7 +8,10 @@ from typing import Any
 from femubench.core.score.ranking import rank_items
 
 _MOST = 100  # entries that are kept, the latest
-_STATED = ("gain", "error_percent", "textbook_percent")
+_SHOWN = (
+    *("gain", "error_percent", "textbook_percent", "version", "femubench", "low", "high"),
+    *("marks", "failures"),
+)
 
 
 def news_of(
@@ -60,6 +63,5 @@ def _leaders(present: Mapping[str, Mapping[str, Any]]) -> list[str]:
 def _entry(
     kind: str, strategy: str, version: Mapping[str, Any], run: Mapping[str, Any]
 ) -> dict[str, Any]:
-    stated = {name: version[name] for name in (*_STATED, "version", "femubench", "low", "high")}
-    proof = version["marks"][0]
-    return {"kind": kind, "when": run["started"], "strategy": strategy, "proof": proof, **stated}
+    stated = {name: version[name] for name in _SHOWN}
+    return {"kind": kind, "when": run["started"], "strategy": strategy, **stated}

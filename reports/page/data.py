@@ -23,6 +23,7 @@ from femubench.reports.summary import (
     notes_of,
     seeds_of,
     strategies_of,
+    unconfined,
 )
 from femubench.reports.twins import suspicions, twins_by_strategy
 from femubench.results import (
@@ -158,6 +159,7 @@ def _strategies(run: Run) -> list[dict[str, Any]]:
             "yardstick": (run.meta.get("yardsticks") or {}).get(name, ""),
             "twins": twins.get(name),
             "unsteady": name in differing,
+            "unconfined": name in unconfined(run),
         }
         for name in strategies_of(run)
     ]
