@@ -12,11 +12,6 @@ from femubench.reports.templating import templates
 
 TITLE = "femubench leaderboard"
 _ABOUT = ("kind", "strategy", "version", "femubench", "when")
-_PROOF = {
-    "recomputed": "errors recomputed from its updated models",
-    "stated": "errors as its contributor states them",
-    "unverified": "unverified, perhaps without twins or sandbox",
-}
 _SAYS = {"strategy": "New: {}", "version": "New version of {}", "leader": "{} leads"}
 
 
@@ -61,7 +56,7 @@ def _news_text(item: Mapping[str, Any]) -> str:
     """Return version and gain of who is in the news."""
     stated = f"Version {plain(item['version'])}, femubench {plain(item['femubench'])}: "
     failed = [f"{item['failures']} jobs failed"] if item["failures"] else []
-    known = "; ".join([*(_PROOF.get(mark, mark) for mark in item["marks"]), *failed])
+    known = "; ".join([f"errors {item['marks'][0]}", *item["marks"][1:], *failed])
     if item["gain"] is None:
         return f"{stated}no result on today's files of the cases; {known}."
     sure = "" if item["low"] is None else f" (95 %: {interval(item['low'], item['high'])})"

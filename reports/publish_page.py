@@ -228,13 +228,11 @@ def _markdown(boards: Iterable[Data], marks: Mapping[str, Sequence[str]]) -> str
     sections = []
     for board in boards:
         rows = [
-            [
-                str(row["rank"] or "=" * bool(row["yardstick"])),
-                *(row["strategy"], "" if row["gain"] is None else _gain_words(row)),
-                "; ".join(_flags({**row, "marks": marks[row["strategy"]]})),
-            ]
+            [str(row["rank"] or "=" * bool(row["yardstick"])), row["strategy"],
+             "" if row["gain"] is None else _gain_words(row),
+             "; ".join(_flags({**row, "marks": marks[row["strategy"]]}))]
             for row in board["rows"]
-        ]
+        ]  # fmt: skip
         sections.append(Passage(board["class"] or "all cases", [Table(heads, rows)]))
     return to_markdown(sections, "Leaderboard of updating strategies") + "\n"
 

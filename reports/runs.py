@@ -178,10 +178,10 @@ def board_text(run: Run) -> str:
     return to_terminal(_board(run))
 
 
-def _marks(row: Mapping[Any, Any], run: Run) -> str:
+def _marks(row: Mapping[Any, Any], bare: frozenset[str]) -> str:
     """Return what must not be overlooked: yardsticks, lost physics, no model, no sandbox."""
     marks = {"=": row["yardstick"], "!": row["unphysical"], "*": row["ok"] < row["total"]}
-    marks["^"] = row["strategy"] in unconfined(run)
+    marks["^"] = row["strategy"] in bare
     return "".join(mark for mark, is_so in marks.items() if is_so)
 
 
@@ -200,11 +200,11 @@ def _cells(row: Mapping[Any, Any]) -> dict[str, Cell]:
 def _board(run: Run, title: str = "") -> Iterator[Passage]:
     """Yield the leaderboard, what its columns mean, and what the run shows."""
     standings = Standings.of(run)
-    rows = list_rows(run, standings)
+    rows, bare = list_rows(run, standings), unconfined(run)
     tested = any(row["better_than"] for row in rows)
     heads = {"#": Column("#", 6), "strategy": Column("strategy", 16, left=True), **_FIGURES}
     listed = [
-        {"#": _marks(row, run) + whole(row["rank"]) * (row["rank"] is not None),
+        {"#": _marks(row, bare) + whole(row["rank"]) * (row["rank"] is not None),
          "strategy": row["strategy"], **_cells(row)}
         for row in rows
     ]  # fmt: skip
@@ -223,7 +223,7 @@ def _board(run: Run, title: str = "") -> Iterator[Passage]:
     )
     yield Passage(title, [table])
     titles = " ".join([c.title.replace("\n", " ") for c in table.columns])
-    titles += "".join(_marks(row, run) for row in rows)
+    titles += "".join(_marks(row, bare) for row in rows)
     legend = [entry for entry in _LEGEND.items() if entry[0].partition(",")[0] in titles]
     if title or not tested:
         legend.append(("tested", standings.apart.note))

@@ -154,12 +154,10 @@ def unconfined(run: Run) -> frozenset[str]:
 def _doubts(run: Run) -> Iterator[str]:
     if find_basis(run) == "unseen" and not (run.meta.get("twins") or {}).get("of"):
         yield "no twins ran, so that memory of the cases is not excluded"
-    if names := unconfined(run):
-        all_of_it = run.meta.get("sandbox") == "none"
-        who = "strategies" if all_of_it else first_of(sorted(map(plain, names)), 5)
+    if unconfined(run):
         reason = plain(run.meta.get("sandbox_reason") or "")
-        why = f" ({reason})" * bool(all_of_it and reason)
-        yield f"{who} ran without a sandbox{why} and could read what they were not given"
+        why = f" ({reason})" * bool(reason)
+        yield f"strategies ran without a sandbox{why} and could read what they were not given"
 
 
 def shortfalls(run: Run) -> list[str]:

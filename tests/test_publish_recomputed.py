@@ -98,7 +98,7 @@ def test_with_its_answers_a_run_is_recomputed_and_says_so(handed: Handed, tmp_pa
     assert shown(tmp_path / "two") == (["stated"], {"stated"})
     assert "stated</span>" in (tmp_path / "two" / "site" / "index.html").read_text()
     assert "| stated |" in (tmp_path / "two" / "site" / "leaderboard.md").read_text()
-    assert "contributor states them" in (tmp_path / "two" / "site" / "feed.xml").read_text()
+    assert "errors stated" in (tmp_path / "two" / "site" / "feed.xml").read_text()
     assert publish(tmp_path / "two", *handed)[0] == 0
     assert shown(tmp_path / "two") == (["recomputed"], {"recomputed"})
 

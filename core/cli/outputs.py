@@ -98,8 +98,8 @@ class RunOutput:
                 run = plan.run(executor, Receivers(self.store, advance=advance, keep_answer=keep))
         if keep and (missing := count_unanswered(run, answers)):
             name_answers(file).unlink(missing_ok=True)  # of an earlier run
-            what = f"{missing} results come from the store, without their models"
-            click.echo(f"bench: no {name_answers(file)}: {what}", err=True)
+            what = f"no {name_answers(file)}: {missing} results come from the store"
+            click.echo(f"bench: {what}, without their models", err=True)
         elif keep:
             write_answers(name_answers(file), run, answers)
         return run, self._report(run, screen, exhibits)

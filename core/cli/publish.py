@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -29,14 +30,7 @@ from femubench.core.display import count_noun
     "the strategy is installed in the same version.",
 )  # fmt: skip
 @options.quiet
-def publish(
-    folder: Path,
-    files: tuple[Path, ...],
-    unverified: bool,
-    address: str | None,
-    rerun: int,
-    quiet: bool,
-) -> None:
+def publish(folder: Path, files: tuple[Path, ...], quiet: bool, **given: Any) -> None:  # noqa: ANN401
     """Merge result files into a static site in DIR.
 
     A FILE is written by submit or run --json, here or on another machine, with its updated models
@@ -46,11 +40,9 @@ def publish(
     """
     from femubench.core.library.publish import publish as merge
 
-    done = merge(folder, files, unverified=unverified, address=address, rerun=rerun)
+    done = merge(folder, files, **given, tell=(lambda line: None) if quiet else click.echo)
     if quiet:
         return
-    for line in done.rerun:
-        click.echo(line)
     runs, index = len(done.index["runs"]), folder / "index.html"
     click.echo(
         f"{count_noun(len(done.added), 'new run')}, {count_noun(runs, 'run')} and "

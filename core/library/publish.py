@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
@@ -20,7 +19,7 @@ from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.variants import strategy_of
 from femubench.core.publish.publishing import Published, publish as merge
 from femubench.core.publish.rerun import Sample
-from femubench.core.publish.submissions import Verify, read_submission
+from femubench.core.publish.submissions import read_submission
 from femubench.core.publish.verification import verify
 from femubench.core.roles import Strategy
 from femubench.core.schema.records import run_to_json
@@ -35,6 +34,7 @@ def publish(
     unverified: bool = False,
     address: str | None = None,
     rerun: int = 3,
+    tell: Callable[[str], None] = lambda line: None,
 ) -> Published:
     """Merge runs into a static site, all of them or none.
 
@@ -48,6 +48,7 @@ def publish(
             what it was given before.
         rerun: jobs of each run whose errors were computed again that are run again, drawn by
             chance, where the strategy is installed in the same version.
+        tell: is given a line on these.
 
     Raises:
         InputError: for a file that is not sound, or cannot be verified, a folder with something
@@ -60,7 +61,8 @@ def publish(
     """
     check_can_make(resolve_path(Path(folder)).parent)
     installed = InstalledCases(usable_plugins())
-    sample = Sample(rerun, installed.strategy) if rerun else None
+    sample = Sample(rerun, installed.strategy, tell) if rerun else None
+    check = partial(verify, installed=installed, sample=sample)
     with TemporaryDirectory() as scratch:
         files = []
         for number, run in enumerate(as_list(runs)):
@@ -68,30 +70,21 @@ def publish(
             if isinstance(run, Run):
                 file.write_text(json.dumps(run_to_json(run), allow_nan=False), encoding="utf-8")
             files.append(file)
-        done = merge(
-            *(Path(folder), files, way_of("html", "render_site"), _check(installed, sample)),
+        return merge(
+            *(Path(folder), files, way_of("html", "render_site"), check),
             unverified=unverified,
             address=address,
         )
-    return done if sample is None else replace(done, rerun=tuple(sample.said))
 
 
 def refusal_of(file: Path) -> str:
     """Return why a site would take a result file as unverified alone; nothing where not."""
     try:
-        read_submission(file, _check(InstalledCases(usable_plugins())))
+        installed = InstalledCases(usable_plugins())
+        read_submission(file, partial(verify, installed=installed, sample=None))
     except InputError as fault:
         return str(fault)
     return ""
-
-
-def _check(installed: InstalledCases, sample: Sample | None = None) -> Verify:
-    """Return what checks a run against the cases that are installed here."""
-
-    def check(run: Run, data: Mapping[str, Any], file: Path) -> bool:
-        return verify(run, data, installed, file, sample)
-
-    return check
 
 
 class InstalledCases:

@@ -8,10 +8,7 @@ from typing import Any
 from femubench.core.score.ranking import rank_items
 
 _MOST = 100  # entries that are kept, the latest
-_SHOWN = (
-    *("gain", "error_percent", "textbook_percent", "version", "femubench", "low", "high"),
-    *("marks", "failures"),
-)
+_STATED = ("gain", "error_percent", "textbook_percent", "marks", "failures")
 
 
 def news_of(
@@ -63,5 +60,5 @@ def _leaders(present: Mapping[str, Mapping[str, Any]]) -> list[str]:
 def _entry(
     kind: str, strategy: str, version: Mapping[str, Any], run: Mapping[str, Any]
 ) -> dict[str, Any]:
-    stated = {name: version[name] for name in _SHOWN}
+    stated = {name: version[name] for name in (*_STATED, "version", "femubench", "low", "high")}
     return {"kind": kind, "when": run["started"], "strategy": strategy, **stated}

@@ -38,12 +38,10 @@ class Published:
     Arguments:
         added: names of the data files that are new.
         index: what ``index.json`` holds.
-        rerun: a line each run of which jobs were run again.
     """
 
     added: tuple[str, ...]
     index: Mapping[str, Any]
-    rerun: tuple[str, ...] = ()
 
 
 def publish(

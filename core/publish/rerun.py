@@ -5,7 +5,6 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -31,22 +30,19 @@ class Sample:
     Arguments:
         number: of jobs of a run.
         strategy: returns one that is installed by its name; None where there is none.
+        tell: is given a line a run.
         seed: of the draw, unknown to contributors.
-        said: a line a run.
     """
 
     number: int
     strategy: Callable[[str], Strategy | None]
+    tell: Callable[[str], None]
     seed: int = field(default_factory=lambda: secrets.randbelow(2**31))
-    said: list[str] = field(default_factory=list)
 
     def check(
         self, run: Run, cases: Mapping[str, Case], textbooks: Mapping[str, Case], file: Path
     ) -> None:
-        """Run the sample of a run again, in the sandbox where there is one.
-
-        Only jobs of strategies that are installed in the same version, of the same femubench, can
-        be; a job that ran out of time or crashed says something of a machine.
+        """Run jobs of strategies again that are installed in the same version, of this femubench.
 
         Arguments:
             cases, textbooks: of all jobs, by name.
@@ -56,29 +52,26 @@ class Sample:
             InputError: for a job that does not give what the run says of it.
         """
         known = {name: one for name in run.meta["strategies"] if (one := self.strategy(name))}
-        here = {(name, strategy_version(one), __version__) for name, one in known.items()}
-        listed = [*chain(run.results, run.companions)]
+        here = {name: [strategy_version(one), __version__] for name, one in known.items()}
+        listed = [*run.results, *run.companions]
         jobs = [
             one
             for one in listed
-            if one.status not in NO_RESULT
-            and (one.strategy, *map(one.provenance.get, ("strategy", "femubench"))) in here
+            if one.status not in NO_RESULT  # which say something of a machine
+            and here.get(one.strategy) == [one.provenance[n] for n in ("strategy", "femubench")]
         ]
         order = np.random.default_rng(self.seed).permutation(len(jobs))
         done = 0
         for one in (jobs[place] for place in order[: self.number]):
-            options = RunOptions(seeds=(one.seed,), nominal=one.nominal)
-            starts = Starts(textbooks, one.nominal)
+            options, starts = RunOptions((one.seed,)), Starts(textbooks, one.nominal)
             plan = Plan([cases[one.case]], [known[one.strategy]], options, starts)
             (found,) = plan.run(LocalProcesses(1)).results
-            if found.status in NO_RESULT:
-                continue
-            done += 1
-            if not agree(one, found):
+            if found.status not in NO_RESULT and not agree(one, found):
                 errors = ", ".join(f"{b} {f.rms_percent:.6g} %" for b, f in found.blocks.items())
                 what = f"{one.strategy} on {one.case}, seed {one.seed}, gives another model here"
                 expected = f"{errors or found.status}, as run again (draw {self.seed})"
                 raise InputError(what, file=file, key="results", expected=expected)
+            done += found.status not in NO_RESULT
+        why = "" if jobs else ": no strategy of it is installed here in its version"
         what = f"{done} of {count_noun(len(listed), 'job')} run again, drawn from seed {self.seed}"
-        why = "" if jobs else ": no strategy of these is installed here in its version"
-        self.said.append(f"{file}: {what}{why}")
+        self.tell(f"{file}: {what}{why}")

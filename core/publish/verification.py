@@ -78,7 +78,7 @@ class _Known:
 
 
 def verify(
-    run: Run, data: Mapping[str, Any], installed: Installed, file: Path, sample: Sample | None
+    run: Run, data: Mapping[str, Any], file: Path, *, installed: Installed, sample: Sample | None
 ) -> bool:
     """Check everything that a run says; tell whether its errors were computed again.
 
@@ -88,8 +88,8 @@ def verify(
     Arguments:
         run: as its file says it.
         data: the content of that file.
-        installed: what the cases are.
         file: for messages.
+        installed: what the cases are.
         sample: runs some jobs again of a run whose errors were computed again.
 
     Raises:
@@ -139,7 +139,7 @@ def verify(
     repeated = [again(cases[name]) for name in origins.values()]
     listed = {case.name: case for case in (*cases.values(), *twins.values(), *repeated)}
     textbooks = {
-        name: own for name, case in listed.items() if (own := installed.yardstick(case)) is not case
+        name: new for name, case in listed.items() if (new := installed.yardstick(case)) is not case
     }
     _recompute(run, list(listed.values()), textbooks, file)
     if sample is not None:
@@ -154,23 +154,21 @@ def _recompute(run: Run, listed: Sequence[Case], textbooks: Mapping[str, Case], 
     for key, results in (("results", run.results), ("companions", run.companions)):
         for number, one in enumerate(results):
             own = found.get((one.case, one.strategy, one.seed, one.nominal))
-            has_model = own is None or "ok" in (one.status, own.status)
-            if has_model and not (own and _are_alike(one, own)):
+            if own is None or ("ok" in (one.status, own.status) and not _are_alike(one, own)):
                 what = "not the errors of its answer"
                 _refuse(file, what, f"{key}[{number}]", f"those that {name_answers(file)} gives")
 
 
 def _are_alike(one: JobResult, other: JobResult) -> bool:
     stated, found = _judged_figures(one), _judged_figures(other)
-    return (
-        one.status == other.status and len(stated) == len(found) and all(map(_near, stated, found))
-    )
+    return len(stated) == len(found) and all(map(_near, stated, found))
 
 
 def _judged_figures(result: JobResult) -> list[float]:
     """Return all that a judge finds of an answer and that counts."""
     modes = [mode for name in BLOCKS if name in result.blocks for mode in result.blocks[name].modes]
-    found: list[float | None] = [result.rigid_modes_lost, result.negative_eigenvalues]
+    found: list[float | None] = [result.status == "ok", result.rigid_modes_lost]
+    found.append(result.negative_eigenvalues)
     for mode in modes:
         found += [mode.predicted_hz, mode.mac, mode.predicted_std_hz, len(mode.candidates)]
         found += [x for one in mode.candidates for x in (one.hz, one.weight, one.mac)]
@@ -304,7 +302,7 @@ def _check_board(run: Run, board: object, file: Path) -> None:
         own = own_rows.get(str(stated.get("strategy")), {})
         for name in ("gain", "rank"):
             said, right = stated.get(name), own.get(name, "nothing")
-            numbers = isinstance(said, (int, float)) and isinstance(right, (int, float))
-            if not (_near(said, right) if numbers else said is right is None):
+            numbers = [x for x in (said, right) if isinstance(x, (int, float))]
+            if not (_near(*numbers) if len(numbers) > 1 else said is right is None):
                 what = f"{name} {said!r}, the results give {right!r}"[:200]
                 _refuse(file, what, f"leaderboard[{number}].{name}", "what its results give")
