@@ -229,7 +229,7 @@ def _markdown(boards: Iterable[Data], marks: Mapping[str, Sequence[str]]) -> str
     for board in boards:
         rows = [
             [str(row["rank"] or "=" * bool(row["yardstick"])), row["strategy"],
-             "" if row["gain"] is None else _gain_words(row),
+             "" if row["gain"] is None else _gain_words(row).removeprefix("gain "),
              "; ".join(_flags({**row, "marks": marks[row["strategy"]]}))]
             for row in board["rows"]
         ]  # fmt: skip
