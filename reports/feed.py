@@ -55,8 +55,10 @@ def feeds_of(index: Mapping[str, Any]) -> dict[str, str]:
 def _news_text(item: Mapping[str, Any]) -> str:
     """Return version and gain of who is in the news."""
     stated = f"Version {plain(item['version'])}, femubench {plain(item['femubench'])}: "
+    failed = [f"{item['failures']} jobs failed"] if item["failures"] else []
+    known = "; ".join([f"errors {item['marks'][0]}", *item["marks"][1:], *failed])
     if item["gain"] is None:
-        return f"{stated}no result on today's files of the cases."
+        return f"{stated}no result on today's files of the cases; {known}."
     sure = "" if item["low"] is None else f" (95 %: {interval(item['low'], item['high'])})"
     off = ""
     if item["error_percent"] is not None:
@@ -64,7 +66,8 @@ def _news_text(item: Mapping[str, Any]) -> str:
             f", {item['error_percent']:.1f} % off out of the given band, "
             f"handbooks {item['textbook_percent']:.1f} %,"
         )
-    return f"{stated}gain {format_fixed(item['gain'], 3, 7)}{sure}{off} on today's cases."
+    gain = format_fixed(item["gain"], 3, 7)
+    return f"{stated}gain {gain}{sure}{off} on today's cases; {known}."
 
 
 def _name(*parts: str) -> str:

@@ -8,8 +8,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from femubench.plot import Axis, Chart, Mark, Series
+from femubench.reports.blocks import Column, Passage, Table
 from femubench.reports.cells import format_fixed, interval, plain, shorten_text
 from femubench.reports.feed import feeds_of, headline_of
+from femubench.reports.markdown import to_markdown
 from femubench.reports.summary import headline
 from femubench.reports.svg import drawing
 from femubench.reports.templating import asset, templates
@@ -29,17 +31,19 @@ def pages_of(index: Data) -> dict[str, str]:
         index: the content of ``index.json``.
     """
     pages = {board["page"]: _board_page(index, board) for board in index["boards"]}
+    marks = {item["name"]: item["versions"][0]["marks"] for item in index["strategies"]}
     releases = {item["name"]: _release(item["versions"][0]) for item in index["strategies"]}
     pages["leaderboard.csv"] = _csv(
         {
             "class": kind,
             **{k: " ".join(v) if isinstance(v, list) else v for k, v in row.items()},
             **releases[row["strategy"]],
-            "marks": "; ".join(_flags(row)),
+            "marks": "; ".join(_flags({**row, "marks": marks[row["strategy"]]})),
         }
         for kind, rows in ((board["class"], board["rows"]) for board in index["boards"])
         for row in rows
     )
+    pages["leaderboard.md"] = _markdown(index["boards"], marks)
     for item in index["strategies"]:
         stem = item["page"].removesuffix(".html")
         pages[item["page"]] = _strategy_page(item, index)
@@ -216,6 +220,21 @@ def _lines(item: Data) -> Iterator[dict[str, Any]]:
     for version in item["versions"]:
         for row in version["cases"]:
             yield {**_release(version), **row, "seeds": " ".join(map(str, row["seeds"]))}
+
+
+def _markdown(boards: Iterable[Data], marks: Mapping[str, Sequence[str]]) -> str:
+    """Return all boards as tables, which say of every row what was computed again."""
+    heads = [Column(title, 0, left=True) for title in ("#", "strategy", "gain", "marks")]
+    sections = []
+    for board in boards:
+        rows = [
+            [str(row["rank"] or "=" * bool(row["yardstick"])), row["strategy"],
+             "" if row["gain"] is None else _gain_words(row).removeprefix("gain "),
+             "; ".join(_flags({**row, "marks": marks[row["strategy"]]}))]
+            for row in board["rows"]
+        ]  # fmt: skip
+        sections.append(Passage(board["class"] or "all cases", [Table(heads, rows)]))
+    return to_markdown(sections, "Leaderboard of updating strategies") + "\n"
 
 
 def _csv(rows: Iterable[Data]) -> str:

@@ -23,8 +23,10 @@ from femubench.reports.summary import (
     header,
     lead,
     notes_of,
+    shortfalls,
     strategies_of,
     troubles,
+    unconfined,
 )
 from femubench.reports.terminal import to_terminal
 from femubench.reports.twins import MEANING, describe_twins, suspicions
@@ -77,6 +79,7 @@ _LEGEND = {
     "=": "yardstick that knows nothing of the structure; without rank",
     "!": "some models lost rigid-body modes or have negative eigenvalues",
     "*": "some jobs gave no model",
+    "^": "ran without a sandbox, and could read what it was not given",
 }
 
 
@@ -97,6 +100,10 @@ class TerminalReporter:
     def notes(self, run: Run) -> list[str]:
         """Return what a reader has to know of a run, where a format has no room for it."""
         return notes_of(run)
+
+    def shortfalls(self, run: Run) -> list[str]:
+        """Return why the ranks of a run may not hold, where its report is not shown."""
+        return shortfalls(run)
 
     def render_diagnosis(self, data: Mapping[str, Any]) -> str:
         """Return a diagnosis in 80 columns."""
@@ -171,9 +178,10 @@ def board_text(run: Run) -> str:
     return to_terminal(_board(run))
 
 
-def _marks(row: Mapping[Any, Any]) -> str:
-    """Return what must not be overlooked: yardsticks, lost physics, and jobs without a model."""
+def _marks(row: Mapping[Any, Any], bare: frozenset[str]) -> str:
+    """Return what must not be overlooked: yardsticks, lost physics, no model, no sandbox."""
     marks = {"=": row["yardstick"], "!": row["unphysical"], "*": row["ok"] < row["total"]}
+    marks["^"] = row["strategy"] in bare
     return "".join(mark for mark, is_so in marks.items() if is_so)
 
 
@@ -192,11 +200,11 @@ def _cells(row: Mapping[Any, Any]) -> dict[str, Cell]:
 def _board(run: Run, title: str = "") -> Iterator[Passage]:
     """Yield the leaderboard, what its columns mean, and what the run shows."""
     standings = Standings.of(run)
-    rows = list_rows(run, standings)
+    rows, bare = list_rows(run, standings), unconfined(run)
     tested = any(row["better_than"] for row in rows)
     heads = {"#": Column("#", 6), "strategy": Column("strategy", 16, left=True), **_FIGURES}
     listed = [
-        {"#": _marks(row) + whole(row["rank"]) * (row["rank"] is not None),
+        {"#": _marks(row, bare) + whole(row["rank"]) * (row["rank"] is not None),
          "strategy": row["strategy"], **_cells(row)}
         for row in rows
     ]  # fmt: skip
@@ -214,7 +222,8 @@ def _board(run: Run, title: str = "") -> Iterator[Passage]:
         [heads[key] for key in known], [[line[key] for key in known] for line in listed], names=1
     )
     yield Passage(title, [table])
-    titles = " ".join([*(c.title.replace("\n", " ") for c in table.columns), *map(_marks, rows)])
+    titles = " ".join([c.title.replace("\n", " ") for c in table.columns])
+    titles += "".join(_marks(row, bare) for row in rows)
     legend = [entry for entry in _LEGEND.items() if entry[0].partition(",")[0] in titles]
     if title or not tested:
         legend.append(("tested", standings.apart.note))

@@ -140,12 +140,34 @@ def lead(run: Run) -> str:
             "No case holds data back: the gain is that on the modes that were given, and nothing "
             "here shows what was learnt."
         )
-    elif not (run.meta.get("twins") or {}).get("of"):
-        stated.append("No twins ran, so that memory of the cases is not excluded.")
-    if run.meta.get("sandbox") == "none":
-        stated.append("Strategies ran without a sandbox and could read what they were not given.")
+    stated += [f"{doubt[0].upper()}{doubt[1:]}." for doubt in _doubts(run)]
     rule = Rule.of(run.meta).to_json()["version"]
     return " ".join(stated) + f" Rule {rule}."
+
+
+def unconfined(run: Run) -> frozenset[str]:
+    """Return the strategies of which a job ran without a sandbox."""
+    usual, jobs = run.meta.get("sandbox"), (*run.results, *run.companions)
+    return frozenset(r.strategy for r in jobs if r.provenance.get("sandbox", usual) == "none")
+
+
+def _doubts(run: Run) -> Iterator[str]:
+    if find_basis(run) == "unseen" and not (run.meta.get("twins") or {}).get("of"):
+        yield "no twins ran, so that memory of the cases is not excluded"
+    if unconfined(run):
+        reason = plain(run.meta.get("sandbox_reason") or "")
+        why = f" ({reason})" * bool(reason)
+        yield f"strategies ran without a sandbox{why} and could read what they were not given"
+
+
+def shortfalls(run: Run) -> list[str]:
+    """Return why the ranks of a run may not hold: no twins, no sandbox, jobs that are not there."""
+    jobs = (*run.results, *run.companions)
+    ended = [f"{t.strategy} on {t.case} ({t.status})" for t in troubles(jobs)]
+    count = sum(result.status not in FINE for result in jobs)
+    failed = [f"{count} of {len(jobs)} jobs failed: {first_of(ended, 3)}"] if ended else []
+    missing = note_missing_jobs(run.meta, jobs)
+    return [*_doubts(run), *([plain(missing)] if missing else []), *map(plain, failed)]
 
 
 def finding(run: Run, board: Sequence[Mapping[Any, Any]]) -> list[str]:

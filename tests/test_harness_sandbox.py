@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import re
@@ -10,13 +11,14 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import harness_toys as toys
+import hoards
 import psutil
 import pytest
 import scanner
@@ -28,7 +30,7 @@ from femubench.core.child import guarded_child, sandbox, server, syscall_filter
 from femubench.core.child.guarded_child import Ending
 from femubench.core.child.limits import MIB, Limits
 from femubench.core.child.sandbox import Enclosure, Sandbox, enclosure, walls_around
-from femubench.core.child.workers import Workers
+from femubench.core.child.workers import Workers, run_apart
 from femubench.core.cli.main import bench
 from femubench.core.errors import InputError
 from femubench.core.run import cluster_worker
@@ -125,6 +127,22 @@ def test_where_there_is_none_a_run_says_so_once(
     kept = json.loads(Path("run.json").read_text())
     assert kept["meta"]["sandbox"] == "none"
     assert kept["meta"]["sandbox_reason"] == "this machine has none"
+    # The mark stands at the rank, and the reason in what is kept.
+    assert "^" in done.stdout.partition("unchanged")[0]
+    (report,) = Path("femubench-results").glob("*.md")
+    assert "ran without a sandbox (this machine has none)" in report.read_text()
+    assert "| =^ | unchanged |" in report.read_text().replace("\\", "")
+
+
+def test_a_quiet_run_says_what_its_ranks_lack(nowhere: None, tmp_path: Path) -> None:
+    words = ["run", "frame", "-s", "unchanged", "-q", "-j1", "--store", str(tmp_path / "s")]
+    done = CliRunner().invoke(bench, words)
+    assert done.stdout == ""
+    assert done.stderr.splitlines() == [
+        "bench: no twins ran, so that memory of the cases is not excluded",
+        "bench: strategies ran without a sandbox (this machine has none) and could read what they "
+        "were not given",
+    ]
 
 
 def test_one_that_is_required_and_missing_is_wrong_input(
@@ -342,9 +360,41 @@ def test_the_numbers_of_refused_calls_are_those_of_the_kernel() -> None:
             pytest.skip(f"no header of Linux for {machine}")
         known = dict(re.findall(r"#define __NR(?:3264)?_(\w+)\s+(\d+)", found[0].read_text()))
         _, judged, own = syscall_filter._OWN[machine]
-        looked_at = dict(zip(("clone", "socket", "socketpair"), judged, strict=True))
+        looked_at = dict(zip(("clone", "prctl", "socket", "socketpair"), judged, strict=True))
         for name, number in {**own, **syscall_filter._COMMON, **looked_at}.items():
             assert int(known[name]) == number, (machine, name)
+
+
+@needed
+@pytest.mark.slow(10)
+@pytest.mark.parametrize(
+    ("hoard", "how"),
+    [(hoards.in_sockets, "memory"), (hoards.in_waiting_sockets, "memory"),
+     (hoards.in_none, "answer")],
+)  # fmt: skip
+def test_memory_of_sockets_counts(hoard: Callable[[float], bytes], how: str) -> None:
+    limits = Limits(120.0, 64 * MIB, sandbox="require")
+    ending = run_apart({0: (hoard, 1.5)}, limits, 1)[0]
+    assert ending.how == how, ending
+    assert ending.reason.startswith("used ") == (how == "memory")
+
+
+def test_memory_of_pipes_and_sockets_is_that_of_who_has_them_open() -> None:
+    here = [psutil.Process()]
+    before = guarded_child.memory_of(here, None)
+    reads, writes = os.pipe()
+    one, other = socket.socketpair()
+    try:
+        fcntl.fcntl(writes, fcntl.F_SETPIPE_SZ, MIB)
+        sent = one.send(bytes(2**16))
+        after = guarded_child.memory_of(here, None)
+        # Another thread may hold something now that it did not hold before.
+        assert after - before > MIB + sent - 2**15
+    finally:
+        os.close(reads)
+        os.close(writes)
+        one.close()
+        other.close()
 
 
 @needed

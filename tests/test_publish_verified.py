@@ -160,6 +160,12 @@ def _one_mode_of_a_twin(data: Data) -> None:
     result["higher"]["modes"][0]["measured_hz"] *= 1.01
 
 
+def _without_ranks(data: Data) -> None:
+    for result in data["results"]:
+        result["rank"] = None
+    data.pop("leaderboard", None)
+
+
 def _spared(data: Data) -> None:
     """Say that a strategy was not applicable to a drawn model."""
     result = next(
@@ -167,11 +173,13 @@ def _spared(data: Data) -> None:
     )
     result |= {"status": "not-applicable", "gain": None, "unphysical": False}
     result |= dict.fromkeys(("used", "higher", "modified"))
+    _without_ranks(data)
 
 
 def _new_plan(data: Data) -> None:
     """Leave a strategy out, and make the plan fit: what is left is a run of its own."""
     _without_strategy(data)
+    _without_ranks(data)
     keys = [r["key"] for r in (*data["results"], *data["companions"])]
     data["meta"]["plan"] = plan_digest(keys)
 
@@ -207,7 +215,7 @@ EDITS: dict[str, tuple[Edit, str]] = {
     "unknown case": (_unknown, "no case 'suite/racket' is installed here"),
     "one result": (lambda d: d["results"].pop(1), "results: 1 jobs are missing"),
     "all of a strategy": (_without_strategy, "meta.plan: the jobs are not those"),
-    "all of a case": (_without_case, "meta.twins.again: what ran twice is no case"),
+    "all of a case": (_without_case, "meta.twins.again: what ran twice is not"),
     "a mode": (_fewer_modes, "not the measured modes of its case"),
     "structure": (
         lambda d: d["meta"]["structures"].update({"suite/bracket": "frame"}),
@@ -238,9 +246,7 @@ def test_what_was_edited_is_refused_in_one_line(honest: Data, tmp_path: Path, na
 def test_who_was_not_applicable_is_taken_as_the_model_that_was_given(
     honest: Data, tmp_path: Path
 ) -> None:
-    made = edited(honest, _spared)
-    del made["leaderboard"]
-    answer = publish(tmp_path, made)
+    answer = publish(tmp_path, edited(honest, _spared))
     assert answer.exit_code == 0, answer.output
 
 

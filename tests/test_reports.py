@@ -21,7 +21,7 @@ from femubench.reports.csvs import CsvReporter
 from femubench.reports.jsons import JsonReporter
 from femubench.reports.markdown import escape
 from femubench.reports.runs import MarkdownReporter, TerminalReporter
-from femubench.reports.summary import finding
+from femubench.reports.summary import finding, shortfalls
 from femubench.results import (
     Block,
     JobResult,
@@ -207,6 +207,19 @@ class TestJson:
         text = JsonReporter().render(run_of(odd, timeout=math.inf))
         data = json.loads(text, parse_constant=refuse)
         assert data["results"][0]["diagnostics"] == {"residual": None, "bound": None}
+
+
+def test_what_ranks_lack_is_said_of_every_run() -> None:
+    here = result("here", provenance={"sandbox": "namespaces"})
+    run = run_of(here, FAILED, strategies=["here", FAILED.strategy, "lost"], sandbox="none")
+    assert shortfalls(run)[1:] == [
+        "strategies ran without a sandbox and could read what they were not given",
+        "1 of 3 jobs are missing and count as the model that was given: beam lost seed 0 drawn",
+        f"1 of 2 jobs failed: {FAILED.strategy} on beam ({FAILED.status})",
+    ]
+    text = TerminalReporter().render(run)
+    assert "^" not in next(line for line in text.splitlines() if " here " in line)
+    assert "^" in next(line for line in text.splitlines() if f" {FAILED.strategy} " in line)
 
 
 class TestFinding:

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import fcntl
 import math
 import os
 import select
 import signal
+import socket
+import stat
+import struct
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from typing import Any, Literal
 
 import psutil
 
 from femubench.core.child.confinement import LENGTH_BYTES, READY, Confinement, object_frames
 from femubench.core.child.limits import Limits, format_bytes
-from femubench.core.child.namespaces import FOLDER
+from femubench.core.child.namespaces import FOLDER, libc
 from femubench.core.child.server import LAST_BREATH, NUMBER, end_group, end_server, fork_server
 
 How = Literal[
@@ -28,6 +32,9 @@ _START = 120.0  # s that a process may take until it is ready
 _CHUNK = 2**20
 _CHUNKS = 16  # that are read before anybody looks at the clock again
 _TICK = 0.5  # s between two looks at a server that may have been stopped
+_PIDFD_GETFD = 438
+_SO_MEMINFO, _FIGURES = 55, 9  # of SK_MEMINFO
+_BUFFERS = "ipv4/tcp_rmem", "ipv4/tcp_wmem", "core/rmem_max", "core/wmem_max"
 _BASE = 256 * 2**20  # bytes of a fresh child, most of them shared with the server
 
 
@@ -331,21 +338,29 @@ def processes_of(leader: int, *, walled: bool) -> list[psutil.Process]:
 
 
 def memory_of(processes: Iterable[psutil.Process], root: str | None) -> int:
-    """Return the bytes that processes hold in memory, with files that exist there alone.
+    """Return the bytes that processes hold: theirs, and those of files, pipes and sockets.
 
     Arguments:
-        root: of their sandbox, whose temporary folder is in memory; None for none.
+        root: of their sandbox, whose temporary folder is in memory, and in whose network there is
+            no socket but theirs; None for none.
     """
-    total, seen = 0, set[int]()
+    total, sockets, before = 0, 0, 0
+    seen = set[tuple[int, int]]()
+    # As a worker starts its root is still that of this process.
+    if walled := root is not None and os.path.exists(root) and not os.path.samefile(root, "/"):
+        before = _count_sockets(str(root))
     for process in processes:
         with suppress(psutil.Error, OSError):
             total += _resident(process)
-            total += sum(_unmapped(f"/proc/{process.pid}/fd", seen))
-    with suppress(OSError):
-        # As a worker starts its root is still that of this process.
-        if root is not None and not os.path.samefile(root, "/"):
-            held = os.statvfs(root + FOLDER)
-            total += (held.f_blocks - held.f_bfree) * held.f_frsize
+            for is_socket, held in _held_open(process.pid, seen) if sys.platform == "linux" else ():
+                total, sockets = total + held, sockets + is_socket
+    if walled:
+        # Sockets that wait in others, or to be accepted, are in no list of open files.
+        waiting = min(before, _count_sockets(str(root))) - sockets
+        total += max(0, waiting) * _largest_socket()
+        with suppress(OSError):
+            folder = os.statvfs(f"{root}{FOLDER}")
+            total += (folder.f_blocks - folder.f_bfree) * folder.f_frsize
     return total
 
 
@@ -358,15 +373,55 @@ def _resident(process: psutil.Process) -> int:
     return sum(1024 * int(words[1]) for words in known)
 
 
-def _unmapped(folder: str, seen: set[int]) -> Iterator[int]:
-    """Yield the sizes of anonymous files that are open, which count in no process (memfd)."""
-    if sys.platform != "linux":
-        return
-    for name in os.listdir(folder):
-        path = f"{folder}/{name}"
-        with suppress(OSError):
-            if os.readlink(path).startswith(("/memfd:", "/dev/shm/")):
+def _held_open(process: int, seen: set[tuple[int, int]]) -> Iterator[tuple[bool, int]]:
+    """Yield of its open files that count in no process whether it is a socket, and the bytes held.
+
+    Arguments:
+        seen: files that were counted; takes those that are.
+    """
+    # A thread may have a table of open files of its own.
+    for task in sorted(map(int, os.listdir(f"/proc/{process}/task")), key=process.__ne__):
+        for name in os.listdir(f"/proc/{process}/task/{task}/fd"):
+            with suppress(OSError):
+                path = f"/proc/{process}/task/{task}/fd/{name}"
                 found = os.stat(path)
-                if found.st_ino not in seen:
-                    seen.add(found.st_ino)
-                    yield 512 * found.st_blocks
+                if (found.st_dev, found.st_ino) in seen:
+                    continue
+                seen.add((found.st_dev, found.st_ino))
+                if stat.S_ISSOCK(found.st_mode):
+                    yield True, _held_in_socket(task, int(name))
+                elif stat.S_ISFIFO(found.st_mode):
+                    with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb", 0) as pipe:
+                        yield False, fcntl.fcntl(pipe, fcntl.F_GETPIPE_SZ)
+                elif os.readlink(path).startswith(("/memfd:", "/dev/shm/")):
+                    yield False, 512 * found.st_blocks
+
+
+def _held_in_socket(task: int, number: int) -> int:
+    """Return the bytes of a socket of another process, the most where nobody may look."""
+    try:
+        with os.fdopen(os.pidfd_open(task), "rb", 0) as opened:
+            copy = libc().syscall(_PIDFD_GETFD, opened.fileno(), number, 0)
+        with socket.socket(fileno=copy) as known:
+            figures = known.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, 4 * _FIGURES)
+    except OSError:
+        return _largest_socket()
+    received, _, sent, _, _, queued, options, backlog, _ = struct.unpack(f"{_FIGURES}I", figures)
+    return int(received + sent + queued + options + backlog)
+
+
+@cache
+def _largest_socket() -> int:
+    """Return the bytes that a socket can hold at most: what TCP lets grow, or anybody may ask."""
+    sizes = [0, 0, 0, 0]
+    for place, name in enumerate(_BUFFERS):
+        with suppress(OSError), open(f"/proc/sys/net/{name}", "rb") as stream:
+            sizes[place] = int(stream.read().split()[-1])
+    return max(sum(sizes[:2]), 2 * sum(sizes[2:]))
+
+
+def _count_sockets(root: str) -> int:
+    """Return the number of sockets in the network of a sandbox; 0 where it has ended."""
+    with suppress(OSError), open(f"{os.path.dirname(root)}/net/sockstat", "rb") as lines:
+        return int(lines.readline().split()[-1])
+    return 0

@@ -37,7 +37,7 @@ _MODULES = (".py", ".pyc", ".so", ".pth", ".zip", ".egg")
 _ABOUT = (".dist-info", ".egg-info", ".egg-link", ".libs", ".data")
 _PATIENCE = 20.0  # s
 _PACKAGE = Path(__file__).absolute().parents[2]
-_MOST_FILES = 1024  # open at a time: what pipes and sockets hold is in no count of memory
+_MOST_FILES = 1024  # open at a time, for each of which is looked at what it holds
 
 
 @dataclass(frozen=True)

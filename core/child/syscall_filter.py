@@ -1,8 +1,9 @@
 """System calls that a strategy has no use for, refused by the kernel.
 
 They make namespaces and mounts, hold memory that no count of a process shows (memfd, System V
-shared memory, message queues, io_uring), reach into other processes or the kernel's key rings, or
-make sockets that know no namespace of networks (those between virtual machines, say).
+shared memory, message queues, io_uring, vmsplice), hide what a process has open, reach into other
+processes or the kernel's key rings, or make sockets that know no namespace of networks (those
+between virtual machines, say).
 
 Source: Linux, Documentation/userspace-api/seccomp_filter.rst; numbers from asm/unistd_64.h (x86-64)
 and asm-generic/unistd.h (AArch64).
@@ -20,16 +21,17 @@ _PR_SET_SECCOMP, _MODE_FILTER, _PR_SET_NO_NEW_PRIVS = 22, 2, 38
 _LOAD, _EQUAL, _AT_LEAST, _ANY_BIT, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
 _NUMBER_AT, _ARCH_AT, _FIRST_AT = 0, 4, 16  # in struct seccomp_data
 _ALLOW, _ERROR = 0x7FFF0000, 0x00050000
+_SET_DUMPABLE = 4  # of prctl: who is not dumpable shows nobody what it has open
 _X32 = 0x40000000  # numbers from here on are the calls of another interface
 _NEW_NAMESPACE = 0x7E020000  # every CLONE_NEW... flag of clone
 _FAMILIES = (1, 2, 10, 16)  # AF_UNIX, AF_INET, AF_INET6, AF_NETLINK
 _CLONE3 = 435  # its flags lie in memory, where a filter cannot look; glibc falls back to clone
 
-# Audit architecture, numbers of clone, socket and socketpair, and numbers of what is refused.
+# Audit architecture, numbers of clone, prctl, socket and socketpair, and of what is refused.
 _OWN = {
     "x86_64": (
         0xC000003E,
-        (56, 41, 53),
+        (56, 157, 41, 53),
         {
             **{"unshare": 272, "setns": 308, "mount": 165, "umount2": 166, "pivot_root": 155},
             **{"chroot": 161, "memfd_create": 319, "shmget": 29, "msgget": 68, "semget": 64},
@@ -37,11 +39,12 @@ _OWN = {
             **{"process_vm_readv": 310, "process_vm_writev": 311, "perf_event_open": 298},
             **{"bpf": 321, "userfaultfd": 323, "name_to_handle_at": 303, "kcmp": 312},
             **{"open_by_handle_at": 304, "fanotify_init": 300, "syslog": 103},
+            **{"vmsplice": 278},
         },
     ),
     "aarch64": (
         0xC00000B7,
-        (220, 198, 199),
+        (220, 167, 198, 199),
         {
             **{"unshare": 97, "setns": 268, "mount": 40, "umount2": 39, "pivot_root": 41},
             **{"chroot": 51, "memfd_create": 279, "shmget": 194, "msgget": 186, "semget": 190},
@@ -49,6 +52,7 @@ _OWN = {
             **{"process_vm_readv": 270, "process_vm_writev": 271, "perf_event_open": 241},
             **{"bpf": 280, "userfaultfd": 282, "name_to_handle_at": 264, "kcmp": 272},
             **{"open_by_handle_at": 265, "fanotify_init": 262, "syslog": 116},
+            **{"vmsplice": 75},
         },
     ),
 }
@@ -84,11 +88,12 @@ def refuse_system_calls() -> None:
 
 def _program() -> bytes:
     """Return the filter: refused calls fail with EPERM, and clone3 as if there were none."""
-    arch, (clone, *sockets), own = _OWN[platform.machine()]
+    arch, (clone, prctl, *sockets), own = _OWN[platform.machine()]
     numbers = sorted({**own, **_COMMON}.values())
     # The lines after the head and the numbers, to which is jumped.
-    flags = 6 + len(sockets) + len(numbers)
-    family = flags + 2
+    flags = 7 + len(sockets) + len(numbers)
+    hiding = flags + 2
+    family = hiding + 2
     allow = family + 1 + len(_FAMILIES)
     refuse, missing = allow + 1, allow + 2
     lines: list[tuple[int, int, int | None, int | None]] = [
@@ -98,6 +103,7 @@ def _program() -> bytes:
         (_AT_LEAST, _X32, refuse, None),
         (_EQUAL, _CLONE3, missing, None),
         (_EQUAL, clone, flags, None),
+        (_EQUAL, prctl, hiding, None),
         *((_EQUAL, number, family, None) for number in sockets),
         *((_EQUAL, number, refuse, None) for number in numbers),
     ]
@@ -105,6 +111,8 @@ def _program() -> bytes:
     lines += [
         (_LOAD, _FIRST_AT, None, None),
         (_ANY_BIT, _NEW_NAMESPACE, refuse, allow),
+        (_LOAD, _FIRST_AT, None, None),
+        (_EQUAL, _SET_DUMPABLE, refuse, allow),
         (_LOAD, _FIRST_AT, None, None),
         *((_EQUAL, known, allow, None) for known in _FAMILIES),
     ]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from femubench.core.roles import Reporter
     from femubench.core.run.runner import Plan
     from femubench.core.run.store import Store
-    from femubench.core.schema.results import Run
+    from femubench.core.schema.results import JobName, Run
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,7 @@ class RunOutput:
         """
         from femubench.core.library.report import reporter
         from femubench.core.run.executor import open_executor
+        from femubench.core.run.handed_in import count_unanswered, name_answers, write_answers
         from femubench.core.run.runner import Receivers
 
         quiet = self.ctx.params["quiet"]
@@ -89,8 +90,18 @@ class RunOutput:
                 if found.sandbox == "none" and executor.sandbox != "off":
                     click.echo(f"strategies run without a sandbox: {found.reason}", err=True)
                 click.echo(wrap_text(header(executor.spoken), hanging=2))
+            # What goes to a leaderboard has twins, and is judged again there from its models.
+            file = self.ctx.params["json_file"]
+            answers: dict[JobName, bytes] = {}
+            keep = answers.__setitem__ if file and plan.starts.companions.twins else None
             with progress(quiet=quiet) as advance:
-                run = plan.run(executor, Receivers(self.store, advance=advance))
+                run = plan.run(executor, Receivers(self.store, advance=advance, keep_answer=keep))
+        if keep and (missing := count_unanswered(run, answers)):
+            name_answers(file).unlink(missing_ok=True)  # of an earlier run
+            what = f"no {name_answers(file)}: {missing} results come from the store"
+            click.echo(f"bench: {what}, without their models", err=True)
+        elif keep:
+            write_answers(name_answers(file), run, answers)
         return run, self._report(run, screen, exhibits)
 
     def _report(self, run: Run, screen: Reporter | None, exhibits: object) -> int:
@@ -103,6 +114,7 @@ class RunOutput:
             OutputError: for the last such file, when all else is done.
             PluginError: for the last reporter that failed.
         """
+        from femubench.core.library.cases import way_of
         from femubench.core.library.report import render_report, reporter, run_name, text_of
         from femubench.core.schema.results import DONE
 
@@ -119,6 +131,8 @@ class RunOutput:
                 if broken is not None:
                     click.echo(f"bench: {broken}", err=True)
                 broken = fault
+        for line in way_of("terminal", "shortfalls")(run) if screen is None else ():
+            click.echo(f"bench: {line}", err=True)
         if screen is not None:
             click.echo("\n".join(["", text_of(screen, render_report(screen, run)), *written]))
         if broken is not None:

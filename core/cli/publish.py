@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -15,7 +16,7 @@ from femubench.core.display import count_noun
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=options.PATH)
 @click.option(
     "--unverified", is_flag=True,
-    help="Take also what cannot be verified, and say so on the site: runs without sandbox or "
+    help="Take also what cannot be checked, and say so on the site: runs without sandbox or "
     "twins, of cases that are not installed here, or whose figures do not agree.",
 )  # fmt: skip
 @click.option(
@@ -23,19 +24,23 @@ from femubench.core.display import count_noun
     help="Where the site will be found: its feeds then have whole links, and there is one in JSON. "
     "A later call need not tell it again.",
 )  # fmt: skip
+@click.option(
+    "--rerun", type=click.IntRange(0), metavar="N", default=3, show_default=True,
+    help="Run N jobs of each run that comes with its updated models again, drawn by chance, where "
+    "the strategy is installed in the same version.",
+)  # fmt: skip
 @options.quiet
-def publish(
-    folder: Path, files: tuple[Path, ...], unverified: bool, address: str | None, quiet: bool
-) -> None:
+def publish(folder: Path, files: tuple[Path, ...], quiet: bool, **given: Any) -> None:  # noqa: ANN401
     """Merge result files into a static site in DIR.
 
-    A FILE is written by run --json, here or on another machine. DIR is new, empty, or written by
-    an earlier publish, and then the files are added. If one file is invalid, or is no complete run
-    in a sandbox and with twins whose figures can all be computed again here, nothing is written.
+    A FILE is written by submit or run --json, here or on another machine, with its updated models
+    next to it in .answers. DIR is new, empty, or written by an earlier publish, and then the files
+    are added. If one file is invalid, or is no complete run in a sandbox and with twins whose
+    figures agree with the cases and with its models, nothing is written.
     """
     from femubench.core.library.publish import publish as merge
 
-    done = merge(folder, files, unverified=unverified, address=address)
+    done = merge(folder, files, **given, tell=(lambda line: None) if quiet else click.echo)
     if quiet:
         return
     runs, index = len(done.index["runs"]), folder / "index.html"

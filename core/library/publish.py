@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
@@ -15,9 +16,12 @@ from femubench.core.files import check_can_make, resolve_path
 from femubench.core.library.cases import as_list, read_cases, scenarios_of, usable_plugins, way_of
 from femubench.core.library.rank import classes_of, draw_twins_of, textbook_of
 from femubench.core.plugin.loader import Plugins
+from femubench.core.plugin.variants import strategy_of
 from femubench.core.publish.publishing import Published, publish as merge
-from femubench.core.publish.submissions import Verify, read_submission
+from femubench.core.publish.rerun import Sample
+from femubench.core.publish.submissions import read_submission
 from femubench.core.publish.verification import verify
+from femubench.core.roles import Strategy
 from femubench.core.schema.records import run_to_json
 from femubench.core.schema.results import Run
 from femubench.core.twin.twins import Twin
@@ -29,6 +33,8 @@ def publish(
     *,
     unverified: bool = False,
     address: str | None = None,
+    rerun: int = 3,
+    tell: Callable[[str], None] = lambda line: None,
 ) -> Published:
     """Merge runs into a static site, all of them or none.
 
@@ -40,6 +46,9 @@ def publish(
             or twins, of cases that are not installed here, or with figures that do not agree.
         address: where the site will be found, ``https://...``, for the links of its feeds; None for
             what it was given before.
+        rerun: jobs of each run whose errors were computed again that are run again, drawn by
+            chance, where the strategy is installed in the same version.
+        tell: is given a line on these.
 
     Raises:
         InputError: for a file that is not sound, or cannot be verified, a folder with something
@@ -51,6 +60,9 @@ def publish(
         1
     """
     check_can_make(resolve_path(Path(folder)).parent)
+    installed = InstalledCases(usable_plugins())
+    sample = Sample(rerun, installed.strategy, tell) if rerun else None
+    check = partial(verify, installed=installed, sample=sample)
     with TemporaryDirectory() as scratch:
         files = []
         for number, run in enumerate(as_list(runs)):
@@ -59,7 +71,7 @@ def publish(
                 file.write_text(json.dumps(run_to_json(run), allow_nan=False), encoding="utf-8")
             files.append(file)
         return merge(
-            *(Path(folder), files, way_of("html", "render_site"), _check()),
+            *(Path(folder), files, way_of("html", "render_site"), check),
             unverified=unverified,
             address=address,
         )
@@ -68,24 +80,15 @@ def publish(
 def refusal_of(file: Path) -> str:
     """Return why a site would take a result file as unverified alone; nothing where not."""
     try:
-        read_submission(file, _check())
+        installed = InstalledCases(usable_plugins())
+        read_submission(file, partial(verify, installed=installed, sample=None))
     except InputError as fault:
         return str(fault)
     return ""
 
 
-def _check() -> Verify:
-    """Return what checks a run against the cases that are installed here."""
-    installed = InstalledCases(usable_plugins())
-
-    def check(run: Run, data: Mapping[str, Any], file: Path) -> bool:
-        return verify(run, data, installed, file)
-
-    return check
-
-
 class InstalledCases:
-    """The cases of the scenarios that are installed, each read once.
+    """The cases of the scenarios that are installed, each read once, and the strategies.
 
     Arguments:
         plugins: where they come from.
@@ -102,6 +105,13 @@ class InstalledCases:
         if name in self._owners and name not in self._found:
             (self._found[name],) = read_cases([name], self._plugins)
         return self._found.get(name)
+
+    def strategy(self, name: str) -> Strategy | None:
+        """Return a strategy by its name with its options; None where there is none."""
+        known = self._plugins.strategies
+        with suppress(InputError):
+            return strategy_of(name, known) if name.partition(":")[0] in known else None
+        return None
 
     def classes(self, name: str) -> Sequence[str]:
         """Return the kinds of structure and of truth of a case."""

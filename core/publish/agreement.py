@@ -15,7 +15,7 @@ Scales = Mapping[tuple[str, str], Scale]
 _AGREES = 1e-3
 _OFFSET_PERCENT = 0.05  # added to both errors: one that is met is rounding
 # These say what a machine could bear, not what the job gives.
-_NO_RESULT = frozenset({"timeout", "crashed"})
+NO_RESULT = frozenset({"timeout", "crashed"})
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ def machine_of(item: Submission) -> tuple[str, str, str]:
 
 
 def _settle_outcomes(found: Sequence[Outcome], scales: Scales) -> Outcome:
-    sound = [item for item in found if item.result.status not in _NO_RESULT] or list(found)
-    if all(item.result.status in _NO_RESULT for item in found):
+    sound = [item for item in found if item.result.status not in NO_RESULT] or list(found)
+    if all(item.result.status in NO_RESULT for item in found):
         sound = [replace(found[0], runs=tuple(run for item in found for run in item.runs))]
 
     def order(item: Outcome) -> tuple[int, float, str]:

@@ -80,6 +80,7 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
             "results": len(item.run.results),
             "strategies": len({result.strategy for result in item.run.results}),
             "proof": item.proof,
+            "sandbox": item.run.meta.get("sandbox") or "",
         }
         for item in submissions
     ]
@@ -186,7 +187,7 @@ def _marks(strategy: str, findings: Iterable[Outcome]) -> list[str]:
     # The best that each result has, and the worst of these.
     best = (max((run.proof for run in item.runs), key=_PROOFS.index) for item in listed)
     proof = min(best, key=_PROOFS.index, default="recomputed")
-    marks: list[str] = [] if proof == "recomputed" else [proof]
+    marks: list[str] = [proof]
     twins = [twin_gains(run.run).get(strategy) for run in runs]
     if any(found is not None and found.suspicious for found in twins):
         marks.append("knows the cases?")

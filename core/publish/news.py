@@ -8,7 +8,7 @@ from typing import Any
 from femubench.core.score.ranking import rank_items
 
 _MOST = 100  # entries that are kept, the latest
-_STATED = ("gain", "error_percent", "textbook_percent")
+_STATED = ("gain", "error_percent", "textbook_percent", "marks", "failures")
 
 
 def news_of(

@@ -23,7 +23,7 @@ KIND = "femubench leaderboard"
 DATA = "data"
 MOST_RUNS, MOST_RESULTS = 1_000, 200_000
 # What publish makes; everything else in the folder, such as .git or CNAME, is somebody's and stays.
-_FILES = ("index.html", "index.json", "leaderboard.csv", "site.css", "site.js")
+_FILES = ("index.html", "index.json", "leaderboard.csv", "leaderboard.md", "site.css", "site.js")
 OWN = (MARKER, DATA, *_FILES, "feed.xml", "feed.json", "strategies", "cases", "classes")
 _ADDRESS = re.compile(r"(https?://[^\s\"'<>\\?#/][^\s\"'<>\\?#]*)?")
 # A folder with nothing but these counts as empty.

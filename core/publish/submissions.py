@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, NoReturn
+from typing import Annotated, Any, Literal, NoReturn, get_args
 
 from msgspec import Meta, Struct, field
 
@@ -167,11 +167,8 @@ def read_submission(
         _check(result, meta, file, f"results[{number}]")
         results[result.key] = result
     proof: Proof = "unverified"
-    if published and data.get("proof") == "recomputed":
-        proof = "recomputed"
-    # A site of an earlier version called verified what is stated.
-    elif published and (data.get("proof") == "stated" or data.get("verified") is True):
-        proof = "stated"
+    if published and data.get("proof") in get_args(Proof):
+        proof = data["proof"]
     if verify is not None:
         proof = "recomputed" if verify(run, data, file) else "stated"
     if proof == "unverified":

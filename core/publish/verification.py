@@ -1,8 +1,8 @@
 """What of a run can be checked here: cases, twins, measured figures, errors, scores, all jobs.
 
 Where the answers of the strategies come along, their errors are computed again too; else they are
-what the file states. That an answer came out of the strategy it is said to be of, nobody can tell
-without running it.
+what the file states. That an answer came out of the strategy it is said to be of, a sample that is
+run again shows.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any, NoReturn, Protocol
 
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
+from femubench.core.publish.rerun import Sample
 from femubench.core.run.executor import count_workers
 from femubench.core.run.handed_in import judge_answers, name_answers
 from femubench.core.run.provenance import plan_digest
@@ -23,9 +24,9 @@ from femubench.core.schema.records import Models
 from femubench.core.schema.results import BLOCKS, JobResult, Run
 from femubench.core.score.bounded_gain import Rule
 from femubench.core.score.leaderboard import list_rows
-from femubench.core.score.ranking import Scale
+from femubench.core.score.ranking import Scale, rank_results
 from femubench.core.score.scoring import reference_of
-from femubench.core.twin.twins import Twin, again
+from femubench.core.twin.twins import AGAIN, Twin, again
 
 SANDBOX = "namespaces"  # what a run calls the one that it can have
 _AGAIN = "run it again with this version of femubench"
@@ -76,16 +77,20 @@ class _Known:
         return cls(measured, found.rms_percent, Scale.of_models(models, Rule(), "textbook"))
 
 
-def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) -> bool:
+def verify(
+    run: Run, data: Mapping[str, Any], file: Path, *, installed: Installed, sample: Sample | None
+) -> bool:
     """Check everything that a run says; tell whether its errors were computed again.
 
-    They are where a file with its answers stands next to its own.
+    They are where a file with its answers stands next to its own. What it says of its sandbox is
+    its contributor's word.
 
     Arguments:
         run: as its file says it.
         data: the content of that file.
-        installed: what the cases are.
         file: for messages.
+        installed: what the cases are.
+        sample: runs some jobs again of a run whose errors were computed again.
 
     Raises:
         InputError: naming the first thing that is wrong or cannot be checked, and what to do.
@@ -123,26 +128,33 @@ def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) 
         for number, result in enumerate(results):
             own = known[origins.get(result.case, result.case)]
             _check_result(result, own, file, f"{key}[{number}]")
+    for number, one in enumerate(rank_results(run.results, run.meta)):
+        if run.results[number].rank not in (None, one.rank):
+            what = f"rank {run.results[number].rank}, the gains give {one.rank}"
+            _refuse(file, what, f"results[{number}].rank", _AGAIN)
     _check_board(run, data.get("leaderboard"), file)
     answers = name_answers(file)
     if not answers.exists():
         return False
-    _recompute(run, (cases | twins), installed, file)
+    repeated = [again(cases[name]) for name in origins.values()]
+    listed = {case.name: case for case in (*cases.values(), *twins.values(), *repeated)}
+    textbooks = {
+        name: new for name, case in listed.items() if (new := installed.yardstick(case)) is not case
+    }
+    _recompute(run, list(listed.values()), textbooks, file)
+    if sample is not None:
+        sample.check(run, listed, textbooks, file)
     return True
 
 
-def _recompute(run: Run, cases: Mapping[str, Case], installed: Installed, file: Path) -> None:
+def _recompute(run: Run, listed: Sequence[Case], textbooks: Mapping[str, Case], file: Path) -> None:
     """Judge the answers of a run anew, and compare what it says of them."""
-    repeated = [again(cases[name]) for name in run.meta["twins"]["again"].values()]
-    listed = [*cases.values(), *repeated]
-    drawn = {case.name: (case, installed.yardstick(case)) for case in listed}
-    textbooks = {name: own for name, (case, own) in drawn.items() if own is not case}
     judged = judge_answers(listed, [name_answers(file)], textbooks, count_workers(None), "both")
     found = {(r.case, r.strategy, r.seed, r.nominal): r for r in judged.results}
     for key, results in (("results", run.results), ("companions", run.companions)):
         for number, one in enumerate(results):
             own = found.get((one.case, one.strategy, one.seed, one.nominal))
-            if one.status == "ok" and (own is None or not _are_alike(one, own)):
+            if own is None or ("ok" in (one.status, own.status) and not _are_alike(one, own)):
                 what = "not the errors of its answer"
                 _refuse(file, what, f"{key}[{number}]", f"those that {name_answers(file)} gives")
 
@@ -155,7 +167,8 @@ def _are_alike(one: JobResult, other: JobResult) -> bool:
 def _judged_figures(result: JobResult) -> list[float]:
     """Return all that a judge finds of an answer and that counts."""
     modes = [mode for name in BLOCKS if name in result.blocks for mode in result.blocks[name].modes]
-    found: list[float | None] = [result.rigid_modes_lost, result.negative_eigenvalues]
+    found: list[float | None] = [result.status == "ok", result.rigid_modes_lost]
+    found.append(result.negative_eigenvalues)
     for mode in modes:
         found += [mode.predicted_hz, mode.mac, mode.predicted_std_hz, len(mode.candidates)]
         found += [x for one in mode.candidates for x in (one.hz, one.weight, one.mac)]
@@ -199,18 +212,24 @@ def _own_twins(
         what = f"it has no {_FEWEST_TWINS} twins, which would show who knows the cases"
         expected = f"a run with `--twins {_FEWEST_TWINS}` or more, or --unverified"
         _refuse(file, what, "meta.twins", expected)
+    smallest = min(case.model.size for case in cases)
+    repeated = [{f"{c.name}{AGAIN}": c.name} for c in cases if c.model.size == smallest]
+    if twins["again"] not in repeated:
+        _refuse(file, "what ran twice is not its smallest case", "meta.twins.again", _AGAIN)
     drawn = {t.name: t for t in installed.twins(cases, twins["number"], twins["seed"])}
-    stated = {name: twins["cases"].get(name, {}).get("digest") for name in twins["of"]}
-    if {name: twin.digest for name, twin in drawn.items()} != stated:
+    wanted = {name: twin.digest for name, twin in drawn.items()}
+    wanted |= {name: run.meta["cases"][of]["digest"] for name, of in twins["again"].items()}
+    stated = {name: entry.get("digest") for name, entry in twins["cases"].items()}
+    if lost := sorted(wanted.keys() - stated.keys()):
+        _refuse(file, f"there is no {lost[0]}", "meta.twins.cases", "all twins and what ran twice")
+    if wanted != stated or twins["of"].keys() != drawn.keys():
         what = f"these are not the twins that seed {twins['seed']} draws"
         _refuse(file, what, "meta.twins", _AGAIN)
     kinds = {name: list(twin.families) for name, twin in drawn.items()}
     if twins.get("kinds") != kinds:
         _refuse(file, "its twins are of other kinds", "meta.twins.kinds", _AGAIN)
-    if any(twins["of"][name] != name.rpartition("~")[0] for name in drawn) or not twins["again"]:
-        _refuse(file, "they are of other cases, or nothing ran twice", "meta.twins", _AGAIN)
-    if not set(twins["again"].values()) <= set(run.meta["cases"]):
-        _refuse(file, "what ran twice is no case of the run", "meta.twins.again", _AGAIN)
+    if any(twins["of"][name] != name.rpartition("~")[0] for name in drawn):
+        _refuse(file, "they are of other cases", "meta.twins", _AGAIN)
     return dict(drawn)
 
 
@@ -276,14 +295,14 @@ def _check_board(run: Run, board: object, file: Path) -> None:
     """Check the gains of the leaderboard that comes with a run, where one does."""
     if board is None:
         return
-    gains = {str(row["strategy"]): float(row["gain"]) for row in list_rows(run)}
+    own_rows = {str(row["strategy"]): row for row in list_rows(run)}
     rows: Iterable[object] = board if isinstance(board, list) else [board]
     for number, row in enumerate(rows):
-        name, gain = (row.get(key) if isinstance(row, dict) else None for key in _STATED)
-        own = gains.get(name) if isinstance(name, str) else None
-        if own is None or not isinstance(gain, (int, float)) or not _near(gain, own):
-            what = f"gain {gain!r}, the results give {own!r}"[:200]
-            _refuse(file, what, f"leaderboard[{number}].gain", "what its results give")
-
-
-_STATED = "strategy", "gain"
+        stated = row if isinstance(row, dict) else {}
+        own = own_rows.get(str(stated.get("strategy")), {})
+        for name in ("gain", "rank"):
+            said, right = stated.get(name), own.get(name, "nothing")
+            numbers = [x for x in (said, right) if isinstance(x, (int, float))]
+            if not (_near(*numbers) if len(numbers) > 1 else said is right is None):
+                what = f"{name} {said!r}, the results give {right!r}"[:200]
+                _refuse(file, what, f"leaderboard[{number}].{name}", "what its results give")

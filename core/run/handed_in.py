@@ -7,6 +7,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -60,6 +61,14 @@ def name_answers(file: Path) -> Path:
     return file.with_suffix(".answers")
 
 
+def count_unanswered(run: Run, answers: Answers) -> int:
+    """Return how many models of a run are not among some answers, as of results from a store."""
+    listed = chain(run.results, run.companions)
+    return sum(
+        (r.case, r.strategy, r.seed, r.nominal) not in answers for r in listed if r.status == "ok"
+    )
+
+
 def write_answers(file: Path, run: Run, answers: Answers) -> None:
     """Write the answers of a run."""
     about = [run.meta.get(key) or {} for key in ("citations", "yardsticks")]
@@ -83,7 +92,7 @@ def read_answers(file: Path) -> tuple[_Listed, Answers]:
         InputError: when it is no file of answers, or they are too large.
     """
     check_regular(file, _LARGEST)
-    expected = "the file .answers that `bench submit` writes"
+    expected = "the file .answers that `bench submit` and `bench run --json` write"
     try:
         with zipfile.ZipFile(file) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > _LARGEST:

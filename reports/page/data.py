@@ -23,6 +23,7 @@ from femubench.reports.summary import (
     notes_of,
     seeds_of,
     strategies_of,
+    unconfined,
 )
 from femubench.reports.twins import suspicions, twins_by_strategy
 from femubench.results import (
@@ -147,7 +148,7 @@ def _cleaned(figures: _Named) -> dict[str, Any]:
 def _strategies(run: Run) -> list[dict[str, Any]]:
     """Return the strategies with what they cite, their version, and what twins and repeats say."""
     citations, twins = run.meta.get("citations") or {}, twins_by_strategy(run)
-    differing = unsteady(run)
+    differing, bare = unsteady(run), unconfined(run)
     said = [(found.strategy, found.provenance.get("strategy")) for found in reversed(run.results)]
     versions = {name: plain(version) for name, version in said if version is not None}
     return [
@@ -158,6 +159,7 @@ def _strategies(run: Run) -> list[dict[str, Any]]:
             "yardstick": (run.meta.get("yardsticks") or {}).get(name, ""),
             "twins": twins.get(name),
             "unsteady": name in differing,
+            "unconfined": name in bare,
         }
         for name in strategies_of(run)
     ]

@@ -462,6 +462,14 @@ def sharer(target: dict[str, Any]) -> bool:
     return bool(found >= 0)
 
 
+@burglar()
+def hider(target: dict[str, Any]) -> bool:
+    """Shows nobody what it has open."""
+    hidden = _LIBC.prctl(4, 0, 0, 0, 0) == 0
+    _LIBC.prctl(4, 1, 0, 0, 0)
+    return hidden
+
+
 @burglar(loose=None)
 def key_keeper(target: dict[str, Any]) -> bool:
     """Keeps a word in a key ring of the kernel, for the next one."""

@@ -53,6 +53,7 @@
       lost && `${bench.plural(lost, "rigid mode")} lost`, negative && bench.plural(negative, "negative eigenvalue"),
       row.unphysical && !lost && !negative && "unphysical", !row.unphysical && !row.ok && "no model",
       twinsOf(row)?.suspicious && "knows the cases?", data.strategies[row.index].unsteady && "two answers to one job",
+      data.strategies[row.index].unconfined && "no sandbox",
     ].filter(Boolean).map((flag) => el("span", { class: "flag" }, el("span", { "aria-hidden": "true" }, "▲ "), flag));
     return el("td", { class: flags.length ? "flags" : "flags soft", "data-lost": lost, "data-negative": negative, "data-sort": lost + negative + (row.ok ? 0 : 1e9) }, flags.length ? flags : "none");
   }
