@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -37,7 +37,7 @@ from truths.posing import SUITE
 from truths.reduction import PLANES
 from truths.sections import Section
 from truths.solid import Solid
-from truths.structure import Structure
+from truths.structure import Block, Structure
 
 Array = npt.NDArray[np.float64]
 CLOSENESS = 2.0  # weight of frequencies where states are paired by shape
@@ -104,21 +104,20 @@ class Solids:
         self.matrices = lru_cache(maxsize=4)(self._matrices)
 
     def _matrices(
-        self, blocks: tuple[str, ...], drawn_mass: frozenset[str]
-    ) -> tuple[Solid, Matrices]:
-        kept = tuple(block for block in self.structure.blocks if block.name in blocks)
-        solid = brick_mesh(replace(self.structure, blocks=kept), self.size, self.structure)
+        self, blocks: tuple[Block, ...], drawn_mass: frozenset[str], massless: frozenset[str]
+    ) -> Matrices:
+        solid = brick_mesh(replace(self.structure, blocks=blocks), self.size, self.structure)
+        solid = solid.scaled(solid.of_part(*massless), mass=0.0)
         for joint in sorted(drawn_mass):
             solid = weighing_as_drawn(self.structure, solid, joint)
-        return solid, assembled(self.structure, solid)
+        return assembled(self.structure, solid)
 
     def solve(self, features: list[Feature]) -> Observed:
         """Return the modes without some features."""
         built = Built(self.structure)
         for feature in features:
             built = feature.out(built)
-        blocks = tuple(block.name for block in built.structure.blocks)
-        _, matrices = self.matrices(blocks, built.drawn_mass)
+        matrices = self.matrices(built.structure.blocks, built.drawn_mass, built.massless)
         bodies = [
             np.flatnonzero(in_overlap(self.structure, joint, matrices.straight))
             for joint in sorted(built.rigid)
@@ -311,27 +310,24 @@ def budget_of(structure: Structure) -> Budget:
         chosen = paired(lead, state, CLOSENESS)
         return np.log(state[0][chosen]), state[1][chosen]
 
-    def solid(removed: list[Feature]) -> tuple[Array, Array]:
-        return partners(planar(solids.solve(removed)))
+    @cache
+    def solid(removed: frozenset[int]) -> tuple[Array, Array]:
+        return partners(planar(solids.solve([features[i] for i in sorted(removed)])))
 
     refine = drawings.refinements
 
     def drawing(names: list[tuple[str, str, str]]) -> tuple[Array, Array]:
         return partners(drawings.solve([refine[name] for name in names]))
 
-    full, ideal = np.log(lead[0]), solid(features)
-    drawn, finest = drawing([]), drawing(list(refine))
-    shares = [
-        Share(
-            item.kind,
-            item.place,
-            item.what,
-            "solid",
-            full - solid([item])[0],
-            solid([other for other in features if other is not item])[0] - ideal[0],
-        )
-        for item in features
-    ]
+    every = frozenset(range(len(features)))
+    ideal, drawn, finest = solid(every), drawing([]), drawing(list(refine))
+    shares = []
+    for i, item in enumerate(features):
+        before = frozenset(j for j in every if features[j] is item.after)
+        since = frozenset(j for j in every if features[j].after is item)
+        first = solid(before)[0] - solid(before | {i})[0]
+        last = solid(every - since - {i})[0] - solid(every - since)[0]
+        shares.append(Share(item.kind, item.place, item.what, "solid", first, last))
     shares += [
         Share(
             *name,

@@ -31,11 +31,13 @@ class Built:
         structure: as it is meshed and held.
         rigid: joints at which the members' overlap is a rigid body.
         drawn_mass: joints of which the overlap weighs what the centre lines in it do.
+        massless: blocks that weigh nothing.
     """
 
     structure: Structure
     rigid: frozenset[str] = frozenset()
     drawn_mass: frozenset[str] = frozenset()
+    massless: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -47,12 +49,14 @@ class Feature:
         place: in the grammar of a case.
         what: in words.
         out: takes it out of the solid.
+        after: a feature that must be out before, as a plate's mass before its stiffness.
     """
 
     kind: str
     place: str
     what: str
     out: Callable[[Built], Built]
+    after: Feature | None = None
 
 
 def own_features(name: str) -> tuple[Feature, ...] | None:
@@ -175,6 +179,32 @@ def without_blocks(kind: str, place: str, what: str, *names: str) -> Feature:
         return replace(structure, blocks=kept)
 
     return edited(kind, place, what, change)
+
+
+def plates(
+    place: str, what: str, *names: str, mass: str = MASS, stiffness: str = STIFFNESS
+) -> tuple[Feature, Feature]:
+    """Return the mass and the stiffness of blocks whose names begin with some words."""
+
+    def light(built: Built) -> Built:
+        own = {block.name for block in built.structure.blocks if _named(block, names)}
+        return replace(built, massless=built.massless | own)
+
+    weight = Feature(mass, place, f"mass of {what}", light)
+    return weight, replace(without_blocks(stiffness, place, what, *names), after=weight)
+
+
+def end_clamps(place: str, what: str, axis: int) -> Feature:
+    """Return the feature of clamps that grip a length of members along an axis: they hold ends."""
+
+    def flat(structure: Structure, clamp: Clamp) -> Clamp:
+        low, high = list(clamp.low), list(clamp.high)
+        low[axis] = high[axis] = structure.joints[clamp.at][axis]
+        return Clamp(clamp.at, (low[0], low[1], low[2]), (high[0], high[1], high[2]))
+
+    return edited(
+        SUPPORT, place, what, lambda s: replace(s, clamps=tuple(flat(s, c) for c in s.clamps))
+    )
 
 
 def rigid_feet(place: str, what: str, *names: str) -> Feature:

@@ -1,6 +1,6 @@
 """A stubby bracket of thick bars with a gusset, clamped by its foot."""
 
-from truths.lacks import STIFFNESS, rigid_feet, without_blocks
+from truths.lacks import plates, rigid_feet
 from truths.sections import bar
 from truths.structure import STEEL, Block, Change, Clamp, Lump, Member, Spring, Structure
 
@@ -75,6 +75,6 @@ lug's axis and is not drawn. The drawing has centre lines of Timoshenko beams fr
 )
 
 LACKS = (
-    without_blocks(STIFFNESS, "type:corner", "a gusset", "gusset"),
-    rigid_feet("support:A", "a foot plate that gives way", "foot"),
+    *plates("type:corner", "a gusset", "gusset"),
+    rigid_feet("type:foot", "a foot plate that gives way", "foot"),
 )

@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 
+from truths.lacks import STIFFNESS, end_clamps, plates, without_blocks
 from truths.sections import bar
 from truths.structure import STEEL, Block, Change, Clamp, Lump, Member, Spring, Structure
 
@@ -103,4 +104,10 @@ over the whole section, and the tabs up to their ends.
     scatter=0.002,
     shape_scatter=0.02,
     together=0.5,
+)
+
+LACKS = (
+    *plates("B2", "plates over a crossing", "plate"),
+    without_blocks(STIFFNESS, "type:crossing", "welds over a part of the width", "notch"),
+    end_clamps("type:support", "jaws that grip the tabs' ends", 0),
 )

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from truths.lacks import Feature
 from truths.sections import bar
 from truths.structure import STEEL, Array, Change, Lump, Member, Spring, Structure
 
@@ -90,3 +91,5 @@ the diagonals to the chords' centre lines; what lies inside the chords' depth do
     guess=200.0,
     scatter=0.002,
 )
+
+LACKS: tuple[Feature, ...] = ()
