@@ -89,13 +89,13 @@ def make_each(
     write: Callable[[Structure, Path], list[str]],
     kind: str = "",
     more: tuple[str, ...] = (),
-    able: Callable[[str], bool] = lambda name: True,
+    among: tuple[str, ...] = (),
 ) -> bool:
-    """Write a kind of files of each able structure, of more modules; tell whether all were made."""
+    """Write a kind of files of structures, from more modules; tell whether all were made."""
     from truths.suite import SUITE, structures
 
     known, sound = structures(), True
-    wanted = names or [name for name in known if able(name)]
+    wanted = names or among or known
     for number, name in enumerate(wanted, 1):
         what = digest(name, *more)
         if not (again or names) and made_before().get(name + kind) == what:
@@ -137,18 +137,11 @@ def make_stretches(names: list[str], again: bool) -> bool:
 
 
 def make_lacks(names: list[str], again: bool) -> bool:
-    """Write what the drawings lack of structures that say it; tell whether all could be made."""
-    from truths.lacks import own_features
+    """Write what drawings lack; tell whether all could be made."""
+    from truths.lacks import TRIED
     from truths.lacks_file import write, write_table
 
-    sound = make_each(
-        names,
-        again,
-        lambda item, _: write(item),
-        " lacks",
-        LACKS,
-        lambda name: own_features(name) is not None,
-    )
+    sound = make_each(names, again, lambda item, _: write(item), " lacks", LACKS, TRIED)
     write_table()
     return sound
 

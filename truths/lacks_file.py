@@ -6,15 +6,15 @@ holds them, so that neither a strategy nor a diagnosis can see them.
 
 from __future__ import annotations
 
-import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
 from femubench.core.challenge.truth_file import is_held
-from truths.counterfactuals import Budget, budget_of
+from truths.counterfactuals import Budget, Share, budget_of
 from truths.drawing import table
 from truths.posing import ROOT
 from truths.structure import Structure
@@ -95,35 +95,33 @@ def _numbers(values: Array) -> tuple[float, ...]:
 
 def lacks_of(structure: Structure, budget: Budget) -> Lacks:
     """Return the content of a structure's file, with the reason where it is refused."""
-    features = tuple(
-        Part(
-            share.kind,
-            share.place,
-            _numbers(share.contribution),
-            _numbers(np.abs(share.first - share.last) / 2),
-            share.what,
-            share.side,
-        )
-        for share in budget.shares
-    )
-    net = []
-    for kind, place in dict.fromkeys((share.kind, share.place) for share in budget.shares):
-        own = [share for share in budget.shares if (share.kind, share.place) == (kind, place)]
-        first, last = (np.sum([getattr(s, end) for s in own], axis=0) for end in ("first", "last"))
-        net.append(Part(kind, place, _numbers((first + last) / 2), _numbers(abs(first - last) / 2)))
+    groups: dict[tuple[str, str], list[Share]] = {}
+    for share in budget.shares:
+        groups.setdefault((share.kind, share.place), []).append(share)
+    net = (_part(shares) for shares in groups.values())
+    misfit = np.log(budget.solid / budget.drawing)
+    remainder = misfit - sum((share.first + share.last) / 2 for share in budget.shares)
     return Lacks(
         structure=structure.name,
         held=is_held(structure.name),
-        refused=refusal(budget.misfit, budget.remainder, budget.alike),
+        refused=refusal(misfit, remainder, budget.alike),
         used=structure.used,
         solid=_numbers(budget.solid),
         drawing=_numbers(budget.drawing),
-        misfit=_numbers(budget.misfit),
-        remainder=_numbers(budget.remainder),
+        misfit=_numbers(misfit),
+        remainder=_numbers(remainder),
         mac=_numbers(budget.alike),
-        features=features,
+        features=tuple(
+            replace(_part([share]), what=share.what, side=share.side) for share in budget.shares
+        ),
         net=tuple(sorted(net, key=lambda part: -part.size)),
     )
+
+
+def _part(shares: list[Share]) -> Part:
+    first, last = (np.sum([getattr(s, end) for s in shares], axis=0) for end in ("first", "last"))
+    contribution, spread = _numbers((first + last) / 2), _numbers(np.abs(first - last) / 2)
+    return Part(shares[0].kind, shares[0].place, contribution, spread)
 
 
 def refusal(misfit: Array, remainder: Array, mac: Array) -> str:
@@ -151,20 +149,7 @@ def lacks_text(lacks: Lacks) -> str:
 
 def read_lacks(file: Path) -> Lacks:
     """Read a file of what a drawing lacks."""
-    document = tomllib.loads(file.read_text(encoding="utf-8"))
-    plain = {name: _tuples(value) for name, value in document.items()}
-    for name in ("features", "net"):
-        parts = document[name]
-        plain[name] = tuple(Part(**{k: _tuples(v) for k, v in part.items()}) for part in parts)
-    return Lacks(**plain)  # type: ignore[arg-type]
-
-
-def _tuples(value: object) -> object:
-    return (
-        tuple(map(float, value))
-        if isinstance(value, list) and value and isinstance(value[0], int | float)
-        else value
-    )
+    return msgspec.toml.decode(file.read_bytes(), type=Lacks)
 
 
 def write(structure: Structure, folder: Path = LACKS) -> list[str]:

@@ -1,6 +1,5 @@
 """A gantry of rectangular tubes: two portals joined by a bridge with a lump at its middle."""
 
-from truths.lacks import Feature
 from truths.sections import rectangular_tube
 from truths.structure import STEEL, Block, Change, Clamp, Lump, Member, Spring, Structure
 
@@ -102,5 +101,3 @@ A trolley of 15 kg hangs at mid-span, drawn as a lump.
     shape_scatter=0.03,
     together=0.4,
 )
-
-LACKS: tuple[Feature, ...] = ()

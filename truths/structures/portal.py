@@ -1,6 +1,5 @@
 """A free portal of rectangular hollow sections with a stub on its beam."""
 
-from truths.lacks import Feature
 from truths.sections import rectangular_tube
 from truths.structure import STEEL, Block, Change, Lump, Member, Spring, Structure
 
@@ -66,5 +65,3 @@ are far softer across the plane than in it. The beam's ends are closed by 3 mm p
     guess=60.0,
     default=True,
 )
-
-LACKS: tuple[Feature, ...] = ()

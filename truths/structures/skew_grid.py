@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from truths.lacks import Feature
 from truths.sections import rectangular_tube
 from truths.structure import STEEL, Change, Lump, Member, Spring, Structure
 
@@ -95,5 +94,3 @@ twisting in both. The drawing has the block, centre lines and rigid joints.
     together=0.6,
     default=True,
 )
-
-LACKS: tuple[Feature, ...] = ()

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-from truths.lacks import Feature
 from truths.sections import Section, angle, rectangular_tube
 from truths.structure import STEEL, Change, Lump, Member, Spring, Structure
 
@@ -99,5 +98,3 @@ and welded to each other; an instrument of 4 kg on the frame is drawn.
     shape_scatter=0.04,
     together=0.6,
 )
-
-LACKS: tuple[Feature, ...] = ()

@@ -2,7 +2,6 @@
 
 from itertools import pairwise
 
-from truths.lacks import Feature
 from truths.sections import rectangular_tube
 from truths.structure import STEEL, Change, Lump, Member, Spring, Structure
 
@@ -69,5 +68,3 @@ the posts and rigid joints.
     shape_scatter=0.015,
     together=0.6,
 )
-
-LACKS: tuple[Feature, ...] = ()

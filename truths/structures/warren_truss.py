@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from truths.lacks import Feature
 from truths.sections import bar
 from truths.structure import STEEL, Array, Change, Lump, Member, Spring, Structure
 
@@ -91,5 +90,3 @@ the diagonals to the chords' centre lines; what lies inside the chords' depth do
     guess=200.0,
     scatter=0.002,
 )
-
-LACKS: tuple[Feature, ...] = ()
