@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
-from itertools import pairwise
+from itertools import combinations, pairwise
+from math import comb
 
 import numpy as np
 import numpy.typing as npt
@@ -27,12 +28,14 @@ from truths.posing import SUITE
 from truths.reduction import PLANES
 from truths.sections import Section
 from truths.solid import Solid
-from truths.structure import Block, Structure
+from truths.structure import Block, Member, Place, Structure
 
 Array = npt.NDArray[np.float64]
 CLOSENESS = 2.0  # weight of frequencies where states are paired by shape
 FINER = 4  # elements of the fine drawing for one of the drawn one, at most
 ROOM = 1.05  # of an arm, which the first element of a member must hold
+State = tuple[Array, Array]  # frequencies, Hz, and shapes at stations, a row a mode
+Made = tuple[tuple[Member, ...], tuple[Block, ...]]
 Refinement = tuple[str, str, str]  # class, place, in words
 
 
@@ -78,15 +81,15 @@ class Solids:
         self.meshed = lru_cache(maxsize=2)(self._meshed)
         self.matrices = lru_cache(maxsize=4)(self._matrices)
 
-    def _meshed(self, blocks: tuple[Block, ...]) -> tuple[Solid, Matrices]:
-        drawn = replace(self.structure, blocks=blocks)
-        solid = brick_mesh(drawn, self.structure.size[0], self.structure)
+    def _meshed(self, made: Made) -> tuple[Solid, Matrices]:
+        built = replace(self.structure, members=made[0], blocks=made[1])
+        solid = brick_mesh(built, self.structure.size[0], self.structure)
         return solid, assembled(self.structure, solid)
 
     def _matrices(
-        self, blocks: tuple[Block, ...], drawn_mass: tuple[str, ...], massless: tuple[str, ...]
+        self, made: Made, drawn_mass: tuple[str, ...], massless: tuple[str, ...]
     ) -> Matrices:
-        solid, matrices = self.meshed(blocks)
+        solid, matrices = self.meshed(made)
         light = [part for part in solid.parts if part.startswith(massless)]
         solid = solid.scaled(solid.of_part(*light), mass=0.0)
         for joint in drawn_mass:
@@ -100,7 +103,7 @@ class Solids:
             built = feature.change(built)
         names = ("drawn_mass", "massless", "rigid")
         drawn_mass, massless, rigid = (sum((getattr(f, n) for f in features), ()) for n in names)
-        matrices = self.matrices(built.blocks, drawn_mass, massless)
+        matrices = self.matrices((built.members, built.blocks), drawn_mass, massless)
         inside = [in_overlap(self.structure, joint, matrices.straight) for joint in rigid]
         bodies, count = [np.flatnonzero(body) for body in inside], built.used + built.held_out
         return modes_of(built, matrices, count, mixed=True, bodies=bodies)
@@ -192,8 +195,8 @@ class Drawings:
                 partial(_twisting, structure=structure)
             )
 
-    def solve(self, names: Iterable[Refinement]) -> tuple[Array, Array]:
-        """Return frequencies (modes,) and shapes at stations (modes, readings) of elastic modes."""
+    def solve(self, names: Iterable[Refinement]) -> State:
+        """Return the elastic modes of the drawing with some refinements."""
         frame, structure = self.frame, self.structure
         for name in names:
             frame = self.refinements[name](frame)
@@ -202,12 +205,20 @@ class Drawings:
         except ModelError as error:
             raise ValueError(f"{structure.name}: {error}") from error
         modes = solve_modes(model, min(count + SPARE + 6, model.size)).elastic
-        places = np.array([structure.point(at) for at, _ in stations(structure)]).T
-        xyz, along = structure.warped(places).T, PLANES[structure.plane]
+        corners, along = {j.name: np.array(j.xyz) for j in frame.joints}, PLANES[structure.plane]
+        xyz = np.array([_chord_point(structure, corners, at) for at, _ in stations(structure)])
         points = np.repeat(xyz, len(along), axis=0)
         directions = tuple("xyz"[axis] for axis in along) * len(xyz)
         sensors = Sensors(tuple(map(str, range(len(points)))), points, directions)
         return modes.natural_frequencies, (model.observe(sensors) @ modes.shapes).T
+
+
+def _chord_point(structure: Structure, corners: Mapping[str, Array], at: Place) -> Array:
+    """Return where a place lies on the straight line between a member's drawn joints, m."""
+    if isinstance(at, str):
+        return corners[at]
+    start, end = (corners[joint] for joint in structure.member(at[0]).ends)
+    return np.asarray(start + at[1] * (end - start))
 
 
 def _divided(frame: Frame, longest: Mapping[str, float], finer: int) -> Frame:
@@ -247,6 +258,27 @@ def _twisting(frame: Frame, structure: Structure) -> Frame:
     return replace(frame, members=tuple(members))
 
 
+def _shapley(
+    value: Callable[[frozenset[int]], Array], item: int, group: set[int], out: Iterable[int]
+) -> Array:
+    """Return what one of a group adds, on average over the orders in which the group comes in.
+
+    Arguments:
+        value: of a state by what is out of it.
+        out: what is out at all times.
+
+    Source: Shapley (1953), the value of an n-person game.
+    """
+    rest, size = group - {item}, len(group)
+    total = np.zeros(())
+    for count in range(size):
+        weight = 1 / (size * comb(size - 1, count))
+        for there in combinations(sorted(rest), count):
+            absent = frozenset(out) | (rest - set(there))
+            total = total + weight * (value(absent) - value(absent | {item}))
+    return total
+
+
 def budget_of(structure: Structure) -> Budget:
     """Return what the drawing of a structure lacks, features removed first and last.
 
@@ -256,38 +288,45 @@ def budget_of(structure: Structure) -> Budget:
     along, count = list(PLANES[structure.plane]), structure.used + structure.held_out
     features, solids, drawings = features_of(structure), Solids(structure), Drawings(structure)
 
-    def planar(modes: Observed) -> tuple[Array, Array]:
+    every, refined = frozenset(range(len(features))), frozenset(drawings.refinements)
+
+    def followed(before: State, state: State) -> State:
+        """Return the modes of a state that are those of the one before, by shape."""
+        if len(state[0]) < count:
+            raise ValueError(f"{structure.name}: {len(state[0])} modes of {count} in one state")
+        partner = paired(before, state, CLOSENESS)
+        return state[0][partner], state[1][partner]
+
+    def solved(removed: frozenset[int]) -> State:
+        modes = solids.solve([features[i] for i in sorted(removed)])
         shapes = modes.stations.reshape(len(modes.frequencies), -1, 3)[:, :, along]
         return modes.frequencies, shapes.reshape(len(shapes), -1)
 
-    hertz, shapes = planar(solids.solve([]))
-
-    def partners(state: tuple[Array, Array]) -> tuple[Array, Array]:
-        if len(state[0]) < count:
-            raise ValueError(f"{structure.name}: {len(state[0])} modes of {count} in one state")
-        chosen = paired((hertz[:count], shapes[:count]), state, CLOSENESS)
-        return np.log(state[0][chosen]), state[1][chosen]
-
-    @cache
-    def solid(removed: frozenset[int]) -> tuple[Array, Array]:
-        return partners(planar(solids.solve([features[i] for i in sorted(removed)])))
+    # From the solid to the ideal frame, to the ideal drawing, to the drawing: each step is small.
+    hertz, shapes = solved(frozenset())
+    lead = hertz[:count], shapes[:count]
+    ideal = followed(lead, solved(every))
+    finest = followed(ideal, drawings.solve(sorted(refined)))
+    drawn = followed(finest, drawings.solve(()))
 
     @cache
-    def drawing(names: frozenset[Refinement]) -> tuple[Array, Array]:
-        return partners(drawings.solve(sorted(names)))
+    def solid(removed: frozenset[int]) -> Array:
+        near = lead if 2 * len(removed) < len(every) else ideal
+        return np.log(followed(near, solved(removed))[0])
+
+    def drawing(names: frozenset[Refinement]) -> Array:
+        near = drawn if 2 * len(names) < len(refined) else finest
+        return np.log(followed(near, drawings.solve(sorted(names)))[0])
 
     shares = []
-    every = frozenset(range(len(features)))
     for i, item in enumerate(features):
-        before = frozenset(j for j in every if features[j] is item.after)
-        since = frozenset(j for j in every if features[j].after is item)
-        first = solid(before)[0] - solid(before | {i})[0]
-        last = solid(every - since - {i})[0] - solid(every - since)[0]
+        group = {j for j in every if features[j].unit == item.unit}
+        before = {j for j in every for k in group if features[j] is features[k].after}
+        since = {j for j in every for k in group if features[j].after is features[k]}
+        first, last = (_shapley(solid, i, group, out) for out in (before, every - group - since))
         shares.append(Share(item.kind, item.place, item.what, "solid", first, last))
-    refined = frozenset(drawings.refinements)
     for name in drawings.refinements:
-        first = drawing(frozenset([name]))[0] - drawing(frozenset())[0]
-        last = drawing(refined)[0] - drawing(refined - {name})[0]
+        first = drawing(frozenset([name])) - np.log(drawn[0])
+        last = np.log(finest[0]) - drawing(refined - {name})
         shares.append(Share(*name, "drawing", first, last))
-    alike = mac(solid(every)[1], drawing(refined)[1]).diagonal()
-    return Budget(hertz[:count], np.exp(drawing(frozenset())[0]), tuple(shares), alike)
+    return Budget(lead[0], drawn[0], tuple(shares), mac(ideal[1], finest[1]).diagonal())

@@ -54,6 +54,11 @@ class Feature:
     massless: tuple[str, ...] = ()
     after: Feature | None = None
 
+    @property
+    def unit(self) -> tuple[str, str]:
+        """Return class and place: what data can show, net of what cancels in it."""
+        return self.kind, self.place
+
 
 def features_of(structure: Structure) -> list[Feature]:
     """Return what the solid has: what its own file names, and what every structure may have."""
@@ -63,12 +68,26 @@ def features_of(structure: Structure) -> list[Feature]:
         at = f"type:{kind}"
         found.append(Feature(STIFFNESS, at, "walls of the overlap that bend", rigid=joints))
         found.append(Feature(MASS, at, "mass of the overlap as it is", drawn_mass=joints))
-    for at in dict.fromkeys(item.at for item in structure.lumps if not item.drawn):
-        out = partial(_without_lump, at)
-        found.append(Feature(LUMP, place(at), "a mass that is not drawn", out))
+    for joint in structure.joints:
+        if any(m.extend[end] > 0.0 and face == 0.0 for m, end, face in ends_at(structure, joint)):
+            out = partial(_without_overhang, joint)
+            found.append(Feature(LUMP, joint, "the end beyond the joint", out))
+    for hung in dict.fromkeys(item.at for item in structure.lumps if not item.drawn):
+        out = partial(_without_lump, hung)
+        found.append(Feature(LUMP, place(hung), "a mass that is not drawn", out))
     if structure.struts or any(not spring.drawn for spring in structure.springs):
         found.append(Feature(SUPPORT, "all", "springs that are not drawn", _without_springs))
     return found
+
+
+def _without_overhang(joint: str, structure: Structure) -> Structure:
+    def cut(member: Member) -> Member:
+        low, high = (
+            0.0 if j == joint else e for j, e in zip(member.ends, member.extend, strict=True)
+        )
+        return replace(member, extend=(low, high))
+
+    return replace(structure, members=tuple(cut(member) for member in structure.members))
 
 
 def _without_lump(at: Place, structure: Structure) -> Structure:
