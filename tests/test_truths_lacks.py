@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truths.counterfactuals import Budget, Share, constants
+from truths.counterfactuals import Budget, Share, constants, shapley
 from truths.eigenmodes import attach, bind, solve
 from truths.lacks import in_overlap
 from truths.lacks_file import LACKS, Lacks, lacks_of, lacks_text, read_lacks, refusal
@@ -59,6 +59,17 @@ def test_an_overlap_that_is_bound_holds_no_energy() -> None:
         )
     assert energy[0].max() > 1e-2
     assert energy[1].max() < 1e-9
+
+
+def test_features_of_a_group_share_its_effect() -> None:
+    """Two that only work together have half of it each; one that works alone has its own."""
+    value = {(): 9.0, (0,): 3.0, (1,): 3.0, (0, 1): 2.0, (2,): 7.0}
+
+    def shares(out: frozenset[int]) -> float:
+        return value[tuple(sorted(out))]
+
+    assert [shapley(shares, i, {0, 1}, ()) for i in (0, 1)] == [3.5, 3.5]
+    assert shapley(shares, 2, {2}, ()) == 2.0
 
 
 def test_a_torsion_constant_is_st_venant_s() -> None:

@@ -1,7 +1,8 @@
 """What a drawing lacks, mode by mode: features out of the solid, refinements into the drawing.
 
 e = ln f(solid) - ln f(drawing). A feature's contribution is the mean of what it does alone, as the
-first, and as the last; half the difference is its spread. What neither chain explains remains.
+first, and as the last; half the difference is its spread. Features of one class and place come in
+all orders: a gusset on walls that bend does other than on a rigid block. The rest is the remainder.
 """
 
 from __future__ import annotations
@@ -18,17 +19,17 @@ import skfem
 from skfem.models.poisson import laplace
 
 from femubench import Model, Sensors, read_case, solve_modes
-from femubench.fem import Frame, ModelError, RigidEnd, constant_kappa
+from femubench.fem import Frame, ModelError, RigidEnd
 from truths.bricks import brick_mesh
 from truths.elasticity import Matrices, reweighed
 from truths.lacks import STIFFNESS, Feature, ends_at, features_of, in_overlap, joints_by_type
 from truths.measurement import mac, paired
-from truths.modes_of import SPARE, Observed, assembled, modes_of, stations
+from truths.modes_of import SHARES, SPARE, Observed, assembled, modes_of
 from truths.posing import SUITE
 from truths.reduction import PLANES
 from truths.sections import Section
 from truths.solid import Solid
-from truths.structure import Block, Member, Place, Structure
+from truths.structure import Block, Member, Structure
 
 Array = npt.NDArray[np.float64]
 CLOSENESS = 2.0  # weight of frequencies where states are paired by shape
@@ -189,7 +190,8 @@ class Drawings:
         finer = partial(_divided, longest=longest, finer=FINER)
         self.refinements["mesh", "all", "elements of finite length"] = finer
         if self.frame.beam == "euler-bernoulli":
-            self.refinements["shear-deformation", "all", "shear and rotary inertia"] = _timoshenko
+            theory = partial(replace, beam="timoshenko", bending_mass="shear-consistent")
+            self.refinements["shear-deformation", "all", "shear and rotary inertia"] = theory
         if structure.plane != "in-plane":
             self.refinements["torsion-constant", "all", "torsion constants of the shapes"] = (
                 partial(_twisting, structure=structure)
@@ -206,19 +208,12 @@ class Drawings:
             raise ValueError(f"{structure.name}: {error}") from error
         modes = solve_modes(model, min(count + SPARE + 6, model.size)).elastic
         corners, along = {j.name: np.array(j.xyz) for j in frame.joints}, PLANES[structure.plane]
-        xyz = np.array([_chord_point(structure, corners, at) for at, _ in stations(structure)])
+        chords = [[corners[j] for j in m.ends] for m in structure.solid_members]
+        xyz = np.array([a + share * (b - a) for a, b in chords for share in SHARES])
         points = np.repeat(xyz, len(along), axis=0)
         directions = tuple("xyz"[axis] for axis in along) * len(xyz)
         sensors = Sensors(tuple(map(str, range(len(points)))), points, directions)
         return modes.natural_frequencies, (model.observe(sensors) @ modes.shapes).T
-
-
-def _chord_point(structure: Structure, corners: Mapping[str, Array], at: Place) -> Array:
-    """Return where a place lies on the straight line between a member's drawn joints, m."""
-    if isinstance(at, str):
-        return corners[at]
-    start, end = (corners[joint] for joint in structure.member(at[0]).ends)
-    return np.asarray(start + at[1] * (end - start))
 
 
 def _divided(frame: Frame, longest: Mapping[str, float], finer: int) -> Frame:
@@ -239,14 +234,6 @@ def _armed(frame: Frame, longest: Mapping[str, float], ends: tuple[RigidEnd, ...
     return replace(_divided(frame, longest, 1), rigid_ends=(*frame.rigid_ends, *ends))
 
 
-def _timoshenko(frame: Frame) -> Frame:
-    members = tuple(
-        replace(m, section=replace(m.section, kappa=m.section.kappa or constant_kappa(5 / 6)))
-        for m in frame.members
-    )
-    return replace(frame, beam="timoshenko", bending_mass="shear-consistent", members=members)
-
-
 def _twisting(frame: Frame, structure: Structure) -> Frame:
     members = []
     for member in frame.members:
@@ -258,7 +245,7 @@ def _twisting(frame: Frame, structure: Structure) -> Frame:
     return replace(frame, members=tuple(members))
 
 
-def _shapley(
+def shapley(
     value: Callable[[frozenset[int]], Array], item: int, group: set[int], out: Iterable[int]
 ) -> Array:
     """Return what one of a group adds, on average over the orders in which the group comes in.
@@ -323,7 +310,7 @@ def budget_of(structure: Structure) -> Budget:
         group = {j for j in every if features[j].unit == item.unit}
         before = {j for j in every for k in group if features[j] is features[k].after}
         since = {j for j in every for k in group if features[j].after is features[k]}
-        first, last = (_shapley(solid, i, group, out) for out in (before, every - group - since))
+        first, last = (shapley(solid, i, group, out) for out in (before, every - group - since))
         shares.append(Share(item.kind, item.place, item.what, "solid", first, last))
     for name in drawings.refinements:
         first = drawing(frozenset([name])) - np.log(drawn[0])

@@ -19,7 +19,6 @@ from truths.drawing import place
 from truths.structure import Block, Clamp, Member, Place, Structure
 
 Array = npt.NDArray[np.float64]
-Box = Callable[[Structure, Clamp], tuple[Array, Array]]
 STIFFNESS, MASS, SUPPORT, LUMP = "joint-stiffness", "joint-mass", "support", "added-mass"
 # Chosen before any result was seen; a file without `LACKS` has no plates, gussets or feet.
 TRIED = (
@@ -155,12 +154,8 @@ def plates(
     return weight, replace(without_blocks(stiffness, place, what, *names), after=weight)
 
 
-def _clamped(
-    place: str, what: str, box: Callable[[Structure, Clamp], tuple[Array, Array]]
-) -> Feature:
-    def clamp(structure: Structure, clamp: Clamp) -> Clamp:
-        low, high = box(structure, clamp)
-        return Clamp(clamp.at, (low[0], low[1], low[2]), (high[0], high[1], high[2]))
+def clamped(place: str, what: str, clamp: Callable[[Structure, Clamp], Clamp]) -> Feature:
+    """Return the feature of clamps that hold something else than drawn ones do."""
 
     def change(structure: Structure) -> Structure:
         return replace(structure, clamps=tuple(clamp(structure, c) for c in structure.clamps))
@@ -168,21 +163,10 @@ def _clamped(
     return Feature(SUPPORT, place, what, change)
 
 
-def end_clamps(place: str, what: str, axis: int) -> Feature:
-    """Return the feature of clamps that grip a length of members along an axis: they hold ends."""
-
-    def box(structure: Structure, clamp: Clamp) -> tuple[Array, Array]:
-        low, high = np.array(clamp.low), np.array(clamp.high)
-        low[axis] = high[axis] = structure.joints[clamp.at][axis]
-        return low, high
-
-    return _clamped(place, what, box)
-
-
 def rigid_feet(place: str, what: str, *names: str) -> Feature:
     """Return the feature of feet that give way: the blocks between clamp and joint are held too."""
 
-    def box(structure: Structure, clamp: Clamp) -> tuple[Array, Array]:
+    def grown(structure: Structure, clamp: Clamp) -> Clamp:
         low, high = np.array(clamp.low), np.array(clamp.high)
         blocks: list[Block] = [b for b in structure.blocks if b.name.startswith(names)]
         # As often as there are blocks: the next one lies on what is held already.
@@ -190,6 +174,6 @@ def rigid_feet(place: str, what: str, *names: str) -> Feature:
             first, last = np.array(block.low), np.array(block.high)
             if (first <= high + 1e-6).all() and (last >= low - 1e-6).all():
                 low, high = np.minimum(low, first), np.maximum(high, last)
-        return low, high
+        return Clamp(clamp.at, (low[0], low[1], low[2]), (high[0], high[1], high[2]))
 
-    return _clamped(place, what, box)
+    return clamped(place, what, grown)

@@ -1,8 +1,9 @@
 """A grid of solid bars on four clamped tabs."""
 
+from dataclasses import replace
 from itertools import pairwise
 
-from truths.lacks import STIFFNESS, end_clamps, plates, without_blocks
+from truths.lacks import STIFFNESS, clamped, plates, without_blocks
 from truths.sections import bar
 from truths.structure import STEEL, Block, Change, Clamp, Lump, Member, Spring, Structure
 
@@ -106,8 +107,14 @@ over the whole section, and the tabs up to their ends.
     together=0.5,
 )
 
+
+def _at_its_end(structure: Structure, clamp: Clamp) -> Clamp:
+    x = structure.joints[clamp.at][0]
+    return replace(clamp, low=(x, *clamp.low[1:]), high=(x, *clamp.high[1:]))
+
+
 LACKS = (
     *plates("B2", "plates over a crossing", "plate"),
     without_blocks(STIFFNESS, "type:crossing", "welds over a part of the width", "notch"),
-    end_clamps("type:support", "jaws that grip the tabs' ends", 0),
+    clamped("type:support", "jaws that grip the tabs' ends", _at_its_end),
 )
