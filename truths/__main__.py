@@ -175,8 +175,11 @@ def main() -> int:
         from truths.faults import write_faults
 
         print(*write_faults(), sep="\n")
-    if options.only in (None, "lacks"):
-        sound = make_lacks(options.names, options.again) and sound
+    from truths.lacks import TRIED
+
+    chosen = [name for name in options.names if name in TRIED or options.only == "lacks"]
+    if options.only in (None, "lacks") and (chosen or not options.names):
+        sound = make_lacks(chosen, options.again) and sound
     return 0 if sound else 1
 
 
