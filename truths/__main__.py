@@ -1,4 +1,6 @@
-"""Make the truths again: ``python -m truths [NAME ...] [--only suite|stretches|defects|faults]``.
+"""Make the truths again: ``python -m truths [NAME ...] [--only STEP]``.
+
+The steps are suite, stretches, defects, faults and lacks.
 
 Structures that have not changed since the last run are left out, so that a run goes on where it
 was cut.
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 HERE = Path(__file__).parent
 STATE = HERE.parent / "build" / "truths.json"
 NEEDED = {"gmsh": "gmsh", "skfem": "scikit-fem", "matplotlib": "matplotlib"}
-STEPS = ("suite", "stretches", "defects", "faults")
+STEPS = ("suite", "stretches", "defects", "faults", "lacks")
 # What a solid's figures follow from, in addition to the structure's own file.
 SOLVER = (
     "bricks",
@@ -38,6 +40,7 @@ SOLVER = (
 
 DEFECTS = ("defects", "defect_cases", "prestress")  # what those of a defect follow from as well
 STRETCHES = ("affine", "remade", "reduction", "stretch", "stretch_file")  # and what twins have
+LACKS = ("lacks", "counterfactuals", "lacks_file", "drawing")  # and what drawings lack
 
 
 def digest(name: str, *more: str) -> str:
@@ -86,12 +89,14 @@ def make_each(
     write: Callable[[Structure, Path], list[str]],
     kind: str = "",
     more: tuple[str, ...] = (),
+    among: tuple[str, ...] = (),
 ) -> bool:
-    """Write a kind of files of each structure, of more modules; tell whether all were made."""
+    """Write a kind of files of structures, from more modules; tell whether all were made."""
     from truths.suite import SUITE, structures
 
     known, sound = structures(), True
-    for number, name in enumerate(names or known, 1):
+    wanted = names or among or known
+    for number, name in enumerate(wanted, 1):
         what = digest(name, *more)
         if not (again or names) and made_before().get(name + kind) == what:
             continue
@@ -103,7 +108,7 @@ def make_each(
             sound = False
             continue
         seconds = time.perf_counter() - began
-        print(f"{number}/{len(names or known)} {name}{kind}: {seconds:.0f} s", file=sys.stderr)
+        print(f"{number}/{len(wanted)} {name}{kind}: {seconds:.0f} s", file=sys.stderr)
         print("\n".join(said) or f"{name}{kind}: as it was", flush=True)
         note(name + kind, what)
     return sound
@@ -127,6 +132,16 @@ def make_stretches(names: list[str], again: bool) -> bool:
     from truths.stretch_file import write, write_table
 
     sound = make_each(names, again, write, " stretched", STRETCHES)
+    write_table()
+    return sound
+
+
+def make_lacks(names: list[str], again: bool) -> bool:
+    """Write what drawings lack; tell whether all could be made."""
+    from truths.lacks import TRIED
+    from truths.lacks_file import write, write_table
+
+    sound = make_each(names, again, lambda item, _: write(item), " lacks", LACKS, TRIED)
     write_table()
     return sound
 
@@ -160,6 +175,11 @@ def main() -> int:
         from truths.faults import write_faults
 
         print(*write_faults(), sep="\n")
+    from truths.lacks import TRIED
+
+    chosen = [name for name in options.names if name in TRIED or options.only == "lacks"]
+    if options.only in (None, "lacks") and (chosen or not options.names):
+        sound = make_lacks(chosen, options.again) and sound
     return 0 if sound else 1
 
 

@@ -116,10 +116,10 @@ def _weld_plane(structure: Structure, member: Member, end: int, axis: int) -> fl
     return float(structure.joints[member.ends[end]][axis] + reach * inwards[axis])
 
 
-def brick_mesh(structure: Structure, size: float) -> Solid:
-    """Mesh a structure with bricks no longer than `size` (m)."""
-    painted = boxes(structure)
-    grid = [planes(structure, painted, axis, size) for axis in range(3)]
+def brick_mesh(structure: Structure, size: float, like: Structure | None = None) -> Solid:
+    """Mesh a structure with bricks no longer than `size` (m), in the planes of `like` if given."""
+    painted, source = boxes(structure), like or structure
+    grid = [planes(source, boxes(source), axis, size) for axis in range(3)]
     middles = [(line[1:] + line[:-1]) / 2 for line in grid]
     names = tuple(dict.fromkeys(name for name, *_ in painted))
     materials = tuple(structure.materials)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
-from scipy.sparse import linalg
+from scipy.sparse import csgraph, linalg
 
 from truths.elasticity import Matrices
-from truths.seats import DIRECTIONS, rigid_fit
+from truths.seats import DIRECTIONS, rigid_fit, rigid_motion
 from truths.structure import Lump, Oscillator, Spring, Structure, Strut
 
 Array = npt.NDArray[np.float64]
@@ -100,6 +100,40 @@ def attach(
         (np.ones(len(keep)), (keep, np.arange(len(keep)))), shape=(n + extra, len(keep))
     )
     return System(sparse.csc_array(K[keep][:, keep]), sparse.csc_array(M[keep][:, keep]), back[:n])
+
+
+def bind(system: System, nodes: Array, bodies: Sequence[npt.NDArray[np.int64]]) -> System:
+    """Return a system of which sets of nodes move as rigid bodies; one that is clamped stays fixed.
+
+    Arguments:
+        nodes: of the solid, (3, n), m.
+        bodies: nodes of each body; those with nodes in common are one.
+    """
+    held = np.asarray(abs(system.observe).sum(axis=1)).ravel().reshape(-1, 3).sum(axis=1) == 0
+    count = nodes.shape[1]
+    ends = np.concatenate([body[:1].repeat(len(body)) for body in bodies])
+    links = sparse.coo_array((np.ones(len(ends)), (ends, np.concatenate(bodies))), (count, count))
+    label = csgraph.connected_components(links, directed=False)[1]
+    tied = np.unique(np.concatenate(bodies))
+    loose = np.setdiff1d(np.flatnonzero(~held), tied)
+    dofs = (3 * loose[:, None] + np.arange(3)).ravel()
+    parts = [
+        sparse.coo_array((np.ones(len(dofs)), (dofs, np.arange(len(dofs)))), (3 * count, len(dofs)))
+    ]
+    for body in (tied[label[tied] == name] for name in np.unique(label[tied])):
+        if held[body].any():
+            continue
+        motion = rigid_motion(nodes[:, body] - nodes[:, body].mean(axis=1, keepdims=True))
+        rows = np.repeat((3 * body[:, None] + np.arange(3)).ravel(), 6)
+        columns = np.tile(np.arange(6), 3 * len(body))
+        parts.append(sparse.coo_array((motion.ravel(), (rows, columns)), (3 * count, 6)))
+    kept = sparse.csr_array(sparse.hstack(parts))
+    own = sparse.csr_array(system.observe.T @ kept)
+    return System(
+        sparse.csc_array(own.T @ system.stiffness @ own),
+        sparse.csc_array(own.T @ system.mass @ own),
+        sparse.csr_array(system.observe @ own),
+    )
 
 
 def factorised(matrix: sparse.csc_array) -> linalg.SuperLU:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -69,7 +69,6 @@ def assemble(solid: Solid, real: Array) -> Matrices:
     fields = {
         "lam": lame[:, None] * per_point,
         "mu": shear[:, None] * per_point,
-        "rho": solid.density[:, None] * per_point,
     }
 
     def component(a: int, b: int) -> Any:  # noqa: ANN401 - a sparse matrix of scikit-fem
@@ -82,17 +81,27 @@ def assemble(solid: Solid, real: Array) -> Matrices:
 
         return form.assemble(basis, **fields)
 
-    @skfem.BilinearForm
-    def inertia(u: Any, v: Any, w: Any) -> Any:  # noqa: ANN401
-        return w["rho"] * u * v
-
     stiff = {(a, b): component(a, b) for a in range(3) for b in range(a, 3)}
     stiff |= {(b, a): stiff[a, b].T for a in range(3) for b in range(a + 1, 3)}
-    mass = inertia.assemble(basis, **fields)
     straight = basis_of(solid, solid.points).doflocs if real is not solid.points else basis.doflocs
     return Matrices(
         nodes=basis.doflocs,
         straight=straight,
         stiffness=interleaved(stiff, basis.N),
-        mass=interleaved({(a, a): mass for a in range(3)}, basis.N),
+        mass=_mass(solid, basis),
     )
+
+
+def reweighed(matrices: Matrices, solid: Solid, real: Array) -> Matrices:
+    """Return the matrices of a solid of other densities, corners at `real` (3, n), m."""
+    return replace(matrices, mass=_mass(solid, basis_of(solid, real)))
+
+
+def _mass(solid: Solid, basis: skfem.CellBasis) -> sparse.csc_array:
+    @skfem.BilinearForm
+    def inertia(u: Any, v: Any, w: Any) -> Any:  # noqa: ANN401
+        return w["rho"] * u * v
+
+    density = solid.density[:, None] * np.ones((1, basis.X.shape[-1]))
+    mass = inertia.assemble(basis, rho=density)
+    return interleaved({(a, a): mass for a in range(3)}, basis.N)

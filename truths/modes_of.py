@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from truths.bricks import brick_mesh
-from truths.eigenmodes import attach, solve
+from truths.eigenmodes import attach, bind, solve
 from truths.elasticity import Matrices, assemble
 from truths.measurement import mac, paired
 from truths.seats import observed
@@ -85,10 +86,12 @@ def modes_of(
     count: int,
     change: Change | None = None,
     mixed: bool = False,
+    bodies: Sequence[npt.NDArray[np.int64]] = (),
 ) -> Observed:
     """Return the lowest elastic modes of a structure, after a change of its design if given.
 
     Arguments:
+        bodies: sets of nodes that are rigid.
         mixed: whether modes may move both in and across the plane, as those of a defect do.
 
     Raises:
@@ -97,6 +100,8 @@ def modes_of(
     lumps = structure.lumps + (change.lumps if change else ())
     springs = structure.springs + (change.springs if change else ())
     matrix = attach(structure, matrices, lumps, springs, structure.struts, structure.oscillators)
+    if bodies:
+        matrix = bind(matrix, matrices.nodes, bodies)
     # Half the modes of a planar structure move across its plane.
     wanted = (count + SPARE) * (1 if structure.plane == "3d" else 2) + 6
     modes = solve(matrix, wanted, structure.guess)

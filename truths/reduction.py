@@ -29,7 +29,7 @@ SPARE = 3  # modes beyond those listed: they mix into those of a changed structu
 PURE = 1e-3  # of a mode's motion, across the plane of a planar structure
 _SEED = 20260423
 _TURNS = {"3d": (0, 1, 2), "in-plane": (1,), "out-of-plane": (0, 1)}
-_PLANES = {"3d": (0, 1, 2), "in-plane": (0, 2), "out-of-plane": (2,)}
+PLANES = {"3d": (0, 1, 2), "in-plane": (0, 2), "out-of-plane": (2,)}
 
 
 def stretched(structure: Structure, solid: KnownSolid, factors: Array) -> Structure:
@@ -69,7 +69,7 @@ def _in_plane(structure: Structure, matrices: Matrices, shapes: Array) -> npt.ND
     """Return which modes move in the drawn plane's directions."""
     motion = observed(structure, matrices, stations(structure)) @ shapes
     squares = (motion**2).reshape(-1, 3, shapes.shape[1]).sum(axis=0)
-    share = squares[list(_PLANES[structure.plane])].sum(axis=0) / squares.sum(axis=0)
+    share = squares[list(PLANES[structure.plane])].sum(axis=0) / squares.sum(axis=0)
     if np.minimum(share, 1 - share).max() > PURE:
         raise ValueError(f"{structure.name}: a mode moves in and across the plane")
     return np.asarray(share > 0.5)
@@ -77,7 +77,7 @@ def _in_plane(structure: Structure, matrices: Matrices, shapes: Array) -> npt.ND
 
 def _loads(structure: Structure, matrices: Matrices) -> sparse.csr_array:
     """Return unit forces where design changes attach masses and springs, (forces, dofs)."""
-    rows, along = [], list(_PLANES[structure.plane])
+    rows, along = [], list(PLANES[structure.plane])
     for change in structure.changes:
         rows += [
             translation(rigid_fit(structure, matrices, lump.at), lump.offset)[along]
@@ -92,7 +92,7 @@ def _loads(structure: Structure, matrices: Matrices) -> sparse.csr_array:
 def rigid_fields(structure: Structure, solid: KnownSolid) -> Array:
     """Return fields of which the rigid motions of every stretched shape are sums, (dofs, n)."""
     parts = [solid.stretch.parts(axis, solid.nodes[axis]) for axis in range(3)]
-    along = _PLANES[structure.plane]
+    along = PLANES[structure.plane]
     fields = np.zeros((len(along), solid.nodes.shape[1], 3))
     for field, axis in zip(fields, along, strict=True):
         field[:, axis] = 1.0

@@ -37,6 +37,17 @@ def seat_nodes(structure: Structure, matrices: Matrices, place: Place) -> npt.ND
     raise ValueError(f"{structure.name}: {len(nodes)} nodes at {place}; a finer mesh is needed")
 
 
+def rigid_motion(arm: Array) -> Array:
+    """Return the motions (3 n, 6) of points at arms (3, n) when a body shifts and turns."""
+    motion = np.zeros((3, arm.shape[1], 6))
+    motion[range(3), :, range(3)] = 1.0
+    # u = t + theta x arm
+    motion[0, :, 4], motion[0, :, 5] = arm[2], -arm[1]
+    motion[1, :, 3], motion[1, :, 5] = -arm[2], arm[0]
+    motion[2, :, 3], motion[2, :, 4] = arm[1], -arm[0]
+    return motion.transpose(1, 0, 2).reshape(-1, 6)
+
+
 def rigid_fit(structure: Structure, matrices: Matrices, place: Place) -> sparse.csr_array:
     """Return the (6, dofs) map to the rigid motion of a place that fits its seat best.
 
@@ -45,13 +56,7 @@ def rigid_fit(structure: Structure, matrices: Matrices, place: Place) -> sparse.
     nodes = seat_nodes(structure, matrices, place)
     centre = structure.warped(structure.point(place)[:, None])
     arm = matrices.nodes[:, nodes] - centre
-    motion = np.zeros((3, len(nodes), 6))
-    motion[range(3), :, range(3)] = 1.0
-    # u = t + theta x arm
-    motion[0, :, 4], motion[0, :, 5] = arm[2], -arm[1]
-    motion[1, :, 3], motion[1, :, 5] = -arm[2], arm[0]
-    motion[2, :, 3], motion[2, :, 4] = arm[1], -arm[0]
-    fit = np.linalg.pinv(motion.transpose(1, 0, 2).reshape(-1, 6))
+    fit = np.linalg.pinv(rigid_motion(arm))
     columns = (3 * nodes[:, None] + np.arange(3)).ravel()
     row = np.repeat(np.arange(6), len(columns))
     shape = (6, matrices.mass.shape[0])

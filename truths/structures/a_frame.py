@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from truths.lacks import LUMP, without_blocks
 from truths.sections import rectangular_tube
 from truths.structure import STEEL, Block, Change, Lump, Member, Spring, Structure
 
@@ -109,3 +110,5 @@ resist rotation. The tie's ends sit on walls that bend.
     shape_scatter=0.025,
     together=0.2,
 )
+
+LACKS = (without_blocks(LUMP, "type:foot", "plates under the legs", "foot"),)

@@ -1,5 +1,6 @@
 """A free space frame of square tubes, nearly a cube."""
 
+from truths.lacks import plates
 from truths.sections import rectangular_tube
 from truths.structure import STEEL, Block, Change, Lump, Member, Spring, Structure
 
@@ -81,3 +82,5 @@ the pieces' stiffness nor their mass.
     shape_scatter=0.02,
     together=0.5,
 )
+
+LACKS = plates("type:corner", "pegs in the tubes", "peg")

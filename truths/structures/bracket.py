@@ -1,5 +1,6 @@
 """A stubby bracket of thick bars with a gusset, clamped by its foot."""
 
+from truths.lacks import plates, rigid_feet
 from truths.sections import bar
 from truths.structure import STEEL, Block, Change, Clamp, Lump, Member, Spring, Structure
 
@@ -71,4 +72,9 @@ lug's axis and is not drawn. The drawing has centre lines of Timoshenko beams fr
     shape_scatter=0.04,
     together=0.3,
     default=True,
+)
+
+LACKS = (
+    *plates("type:corner", "a gusset", "gusset"),
+    rigid_feet("type:foot", "a foot plate that gives way", "foot"),
 )

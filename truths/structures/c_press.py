@@ -1,5 +1,6 @@
 """A C-press: a throat between stubby arms, free."""
 
+from truths.lacks import plates
 from truths.sections import bar
 from truths.structure import STEEL, Block, Change, Lump, Member, Spring, Structure
 
@@ -69,3 +70,5 @@ upper arm, welded to its lower face. The drawing shows centre lines and no steps
     beam="timoshenko",
     scatter=0.002,
 )
+
+LACKS = plates("type:corner", "steps in the inner corners", "step")

@@ -1,5 +1,6 @@
 """A two-storey concrete frame on pad footings in uneven ground."""
 
+from truths.lacks import LUMP, without_blocks
 from truths.sections import bar, tee
 from truths.structure import Block, Change, Lump, Material, Member, Spring, Structure
 
@@ -77,3 +78,5 @@ It takes spans and storeys between centre lines.
     together=0.5,
     weighed=0.0,
 )
+
+LACKS = (without_blocks(LUMP, "A2", "a parapet", "parapet"),)

@@ -1,7 +1,9 @@
 """A grid of solid bars on four clamped tabs."""
 
+from dataclasses import replace
 from itertools import pairwise
 
+from truths.lacks import STIFFNESS, clamped, plates, without_blocks
 from truths.sections import bar
 from truths.structure import STEEL, Block, Change, Clamp, Lump, Member, Spring, Structure
 
@@ -103,4 +105,16 @@ over the whole section, and the tabs up to their ends.
     scatter=0.002,
     shape_scatter=0.02,
     together=0.5,
+)
+
+
+def _at_its_end(structure: Structure, clamp: Clamp) -> Clamp:
+    x = structure.joints[clamp.at][0]
+    return replace(clamp, low=(x, *clamp.low[1:]), high=(x, *clamp.high[1:]))
+
+
+LACKS = (
+    *plates("B2", "plates over a crossing", "plate"),
+    without_blocks(STIFFNESS, "type:crossing", "welds over a part of the width", "notch"),
+    clamped("type:support", "jaws that grip the tabs' ends", _at_its_end),
 )

@@ -1,5 +1,6 @@
 """A free H of three different tubes, drawn for motion across its plane."""
 
+from truths.lacks import LUMP, without_blocks
 from truths.sections import rectangular_tube
 from truths.structure import STEEL, Block, Change, Lump, Member, Spring, Structure
 
@@ -71,3 +72,5 @@ joints; it knows the 0.9 kg block at the short leg's end.
     shape_scatter=0.02,
     together=0.4,
 )
+
+LACKS = (without_blocks(LUMP, "C", "a plate that closes an end", "end-plate"),)

@@ -1,5 +1,6 @@
 """A clamped portal of I sections with plate haunches under its beam."""
 
+from truths.lacks import plates, rigid_feet
 from truths.sections import i_beam
 from truths.structure import STEEL, Block, Change, Clamp, Lump, Member, Spring, Structure
 
@@ -83,4 +84,9 @@ drawing shows centre lines and rigid clamps alone.
     shape_scatter=0.03,
     together=0.3,
     default=True,
+)
+
+LACKS = (
+    *plates("type:corner", "haunches", "haunch"),
+    rigid_feet("type:foot", "base plates held along a strip", "base-plate"),
 )

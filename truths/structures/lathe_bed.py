@@ -1,5 +1,6 @@
 """A lathe bed: two slender shears on stubby cross ribs, headstock and tailstock as lumps, on pads."""
 
+from truths.lacks import LUMP, plates
 from truths.sections import bar, rectangular_tube
 from truths.structure import Block, Change, Lump, Material, Member, Spring, Structure
 
@@ -86,3 +87,5 @@ the drawing leaves it out. Headstock and tailstock are drawn as lumps above the 
     shape_scatter=0.04,
     together=0.6,
 )
+
+LACKS = plates("all", "a tray", "tray", mass=LUMP, stiffness="plate")

@@ -1,5 +1,6 @@
 """A clamped mast with three lumps; its bending modes come in close pairs."""
 
+from truths.lacks import rigid_feet
 from truths.sections import rectangular_tube
 from truths.structure import ALUMINIUM, STEEL, Block, Change, Clamp, Lump, Member, Spring, Structure
 
@@ -73,3 +74,5 @@ held along a strip alone, so that the foot is softer one way than the other. The
     shape_scatter=0.05,
     together=0.7,
 )
+
+LACKS = (rigid_feet("type:foot", "a base plate held along a strip", "base-plate"),)

@@ -1,5 +1,6 @@
 """A mast on a base plate that stands on a soft layer."""
 
+from truths.lacks import LUMP, rigid_feet, without_blocks
 from truths.sections import rectangular_tube
 from truths.structure import (
     ALUMINIUM,
@@ -82,4 +83,9 @@ drawing clamps the mast at the plate and knows nothing of the rubber.
     shape_scatter=0.03,
     together=0.7,
     default=True,
+)
+
+LACKS = (
+    rigid_feet("type:base", "a plate on rubber", "plate", "layer"),
+    without_blocks(LUMP, "top", "a lid", "lid"),
 )

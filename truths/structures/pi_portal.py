@@ -1,5 +1,6 @@
 """A pi-shaped portal with cantilevers for insulators, on mortar."""
 
+from truths.lacks import plates, rigid_feet
 from truths.sections import rectangular_tube
 from truths.structure import STEEL, Block, Change, Clamp, Lump, Material, Member, Spring, Structure
 
@@ -101,4 +102,9 @@ lines clamped at the plates and the insulators at their heights, without plates 
     shape_scatter=0.03,
     together=0.6,
     weighed=0.0,
+)
+
+LACKS = (
+    *plates("type:crossing", "stepped plates under the cantilevers", "plate"),
+    rigid_feet("type:foot", "plates on mortar", "steel", "mortar"),
 )

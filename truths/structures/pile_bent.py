@@ -1,5 +1,6 @@
 """A jetty's bent of two piles in layered ground under a cap beam."""
 
+from truths.lacks import LUMP, plates, without_blocks
 from truths.sections import bar
 from truths.structure import Block, Change, Clamp, Lump, Material, Member, Spring, Structure
 
@@ -96,4 +97,11 @@ N at the water line. The bollard itself is drawn as a mass.
     shape_scatter=0.04,
     together=0.4,
     weighed=0.0,
+)
+
+LACKS = (
+    without_blocks(LUMP, "west", "a plinth", "plinth"),
+    *plates(
+        "pile-N", "a strip at the water line", "strip", mass=LUMP, stiffness="member-stiffness"
+    ),
 )

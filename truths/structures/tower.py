@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from truths.lacks import plates
 from truths.sections import bar
 from truths.structure import ALUMINIUM, Array, Block, Change, Clamp, Lump, Member, Spring, Structure
 
@@ -99,3 +100,5 @@ from centre line to centre line and leaves the knees out.
     guess=40.0,
     scatter=0.003,
 )
+
+LACKS = plates("type:level-1", "knee blocks", "knee")

@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 
+from truths.lacks import plates
 from truths.sections import bar, rectangular_tube
 from truths.structure import STEEL, Block, Change, Lump, Member, Spring, Structure
 
@@ -97,3 +98,5 @@ these are drawn. The drawing has centre lines and rigid joints without the plate
     shape_scatter=0.05,
     together=0.4,
 )
+
+LACKS = plates("type:tee", "plates on the drawbar", "plate")

@@ -1,5 +1,6 @@
 """A free T of a steel tube and an aluminium bar."""
 
+from truths.lacks import plates
 from truths.sections import bar, rectangular_tube
 from truths.structure import ALUMINIUM, STEEL, Block, Change, Lump, Member, Spring, Structure
 
@@ -57,3 +58,5 @@ face. The drawing lets the bar begin at the tube's axis and knows no foot.
     shape_scatter=0.01,
     together=0.0,
 )
+
+LACKS = plates("type:tee", "a foot under the bar", "foot")
