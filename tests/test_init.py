@@ -104,7 +104,7 @@ def test_folder_runs_and_says_what_was_done(tmp_path: Path) -> None:
 
 X = 1e3 * 0.2 * np.arange(1.0, SPANS + 1.0)
 CLOSE, WRONG = X.copy(), X.copy()
-CLOSE[1], WRONG[5] = 210.0, 12000.0  # within the reach of the first node; typed for 1200
+CLOSE[1], WRONG[5] = 195.0, 12000.0  # before the first node; typed for 1200
 # The mistake, more words of `bench init`, coordinates of the test, what the message advises.
 MISTAKES: dict[str, tuple[str, dict[str, np.ndarray], str]] = {
     "unit": ("--frame y,-x,z --unit m", {}, "--unit mm --frame y,-x,z` all fit"),
