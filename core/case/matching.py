@@ -438,7 +438,7 @@ def describe_matches(matches: Sequence[Match], file: str) -> tuple[str, ...]:
     """
     moved = [match for match in matches if match.distance > ON_MEMBER]
     amid = [match for match in matches if BETWEEN in match.place]
-    stated = ()
+    stated: tuple[str, ...] = ()
     if amid:
         count = f"{len(amid)} of the {len(matches)} sensors of {file}"
         stated = (f"{count} lie between nodes: what they read is interpolated linearly.",)

@@ -36,7 +36,7 @@ def _sayings() -> Iterator[_Saying]:
             if block.startswith("#"):
                 heading = block.partition("\n")[0].lstrip("# ").replace("`", "")
             table = [[c.strip() for c in _CELL.split(line)[1:-1]] for line in block.split("\n")]
-            pairs = [([], block)]
+            pairs: list[tuple[list[str], str]] = [([], block)]
             if block.startswith("|"):
                 header, _, *rows = table
                 pairs = [
