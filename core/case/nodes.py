@@ -128,12 +128,10 @@ class MatrixGeometry:
         return best
 
     def _around(self, start: int) -> list[int]:
-        """Return the places that share an element with one, and move along the same directions."""
+        """Return the places that share an element with one, as `mesh` has them."""
         assert self.mesh is not None
-        own = [d for d in DIRECTIONS if (self.placed[start], d) in self.rows]
         row = self.mesh[[list(self._at)[start]]]
-        near = [self._at[node] for node in row.indices if node in self._at]
-        return [i for i in near if all((self.placed[i], d) in self.rows for d in own)]
+        return [self._at[node] for node in row.indices if node in self._at]
 
     def node(self, place: Place) -> str:
         """Return the node of a place; raises Misfit."""
@@ -348,7 +346,12 @@ def with_mesh(model: Model) -> Model:
     assert isinstance(geometry, MatrixGeometry)
     ones = (np.ones(size), (geometry.dofs.node, np.arange(size)))
     nodes = sp.csr_array(ones, shape=(len(geometry.names), size))
-    mesh = sp.csr_array(nodes @ abs(model.stiffness) @ nodes.T)
+    mesh = sp.coo_array(nodes @ abs(model.stiffness) @ nodes.T)
+    moving = np.zeros((len(geometry.names), len(DIRECTIONS)), dtype=bool)
+    moving[geometry.dofs.node, [DIRECTIONS.index(d) for d in geometry.dofs.direction]] = True
+    alike = (moving[mesh.col] | ~moving[mesh.row]).all(axis=1)  # and move along the same directions
+    pairs = (mesh.row[alike], mesh.col[alike])
+    mesh = sp.csr_array((np.ones(alike.sum()), pairs), shape=mesh.shape)
     return replace(model, geometry=replace(geometry, mesh=mesh))
 
 
