@@ -80,8 +80,9 @@ def _small_model(model: Model, found: GroupedReduction) -> Model:
     names = (*(geometry.names[i] for i in nodes), *([_INNER] if inner else []))
 
     mesh = None
-    if geometry.mesh is not None:  # readings stay the same
-        mesh = sp.csr_array(geometry.mesh[nodes][:, nodes])
+    if geometry.mesh is not None:  # readings stay the same, though the node amid them may be gone
+        near = geometry.mesh[nodes]
+        mesh = sp.csr_array(near @ near.T)
         mesh.resize((len(names), len(names)))
 
     def sparse(parts: dict[str, FloatArray]) -> dict[str, SparseArray]:
