@@ -124,11 +124,13 @@ def limit_memory(most: int) -> Iterator[None]:
     Libraries take memory for what the header of a file claims. Only Linux counts it; elsewhere
     nothing is limited.
     """
-    if not sys.platform.startswith("linux"):
+    try:
+        import resource
+    except ModuleNotFoundError:
+        resource = None  # type: ignore[assignment]
+    if resource is None or not sys.platform.startswith("linux"):
         yield
         return
-    import resource
-
     taken = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
     lower = min(v for v in (taken + most, soft, hard) if v != resource.RLIM_INFINITY)

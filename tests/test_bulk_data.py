@@ -195,6 +195,51 @@ def test_point_masses_are_bodies(model: Callable[..., Model]) -> None:
     assert near(model(BAR + there + "PARAM,WTMASS,.5\n"), replace(laden, mass=0.5 * laden.mass))
 
 
+@pytest.mark.parametrize("card", ["CBAR", "CBEAM", "CROD"])
+def test_a_free_line_has_the_mass_of_its_body_and_six_zero_frequencies(
+    model: Callable[..., Model], card: str
+) -> None:
+    """An L of two bars; a rod between bars is a lump of half of its mass at either end."""
+    bar = BAR
+    if card == "CBEAM":
+        bar = BAR.replace("BAR", "BEAM").replace(f"{I2},", f"{I2},,")
+    name = "CBEAM" if card == "CBEAM" else "CBAR"
+    frame = model(f"{bar}GRID,3,,{L},.6,0.\n{name},2,10,2,3,0.,0.,1.\n"
+                  + ("PROD,20,1,2.-5\nCROD,9,20,1,3\n" if card == "CROD" else ""))  # fmt: skip
+    origin = frame.dofs.xyz.mean(axis=0)
+    along = np.array([["x", "y", "z", "rx", "ry", "rz"].index(d) for d in frame.dofs.direction])
+    turned = np.cross(np.eye(3)[None], (frame.dofs.xyz - origin)[:, None])
+    moved = np.dstack([turned, np.tile(np.eye(3), (len(along), 1, 1))])
+    rigid = np.hstack([np.eye(6)[along, :3], moved[np.arange(len(along)), :, along]])
+    found = rigid.T @ (frame.mass @ rigid)
+    spans = [
+        (np.zeros(3), np.array([L, 0.0, 0.0])),
+        (np.array([L, 0.0, 0.0]), np.array([L, 0.6, 0])),
+    ]
+    points, shares = [], []
+    for first, last in spans:  # Simpson's rule is exact for squares
+        weight = RHO * A * np.linalg.norm(last - first)
+        points += [first, 0.5 * (first + last), last]
+        shares += [weight / 6.0, weight / 1.5, weight / 6.0]
+    if card == "CROD":
+        points += [spans[0][0], spans[1][1]]
+        shares += [0.5 * RHO * 2e-5 * float(np.hypot(L, 0.6))] * 2
+    arms, weights = np.array(points) - origin, np.array(shares)
+    assert found[0, 0] == pytest.approx(weights.sum(), rel=1e-6)
+    centre = weights @ arms / weights.sum()
+    turned = np.cross(np.eye(3)[:, None], arms[None])  # of the points, by each rotation
+    wanted = np.einsum("p,ipk,jpk->ij", weights, turned, turned)
+    own = RHO * (I1 + I2) * np.array([L, 0.6])  # of the twist of each bar
+    if card == "CBEAM":  # which has shear, and rotary inertia with it
+        own += RHO * np.array([0.6 * I1, L * I2])
+    np.testing.assert_allclose(
+        found[:3, 3:], found[0, 0] * np.cross(np.eye(3), centre).T, atol=1e-8
+    )
+    assert np.diag(found[3:, 3:] - wanted)[:2] == pytest.approx(own[:2], abs=1e-7)
+    assert hertz(frame)[:6] == pytest.approx(np.zeros(6), abs=1e-2)
+    assert hertz(frame)[6] > 1.0
+
+
 def test_mass_without_stiffness_adds_to_translations(model: Callable[..., Model]) -> None:
     bare, laden = model(BAR), model(BAR.replace(f"{J}\n", f"{J},.05\n"))
     assert laden.total_mass == pytest.approx((RHO * A + 0.05) * L)

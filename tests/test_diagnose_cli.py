@@ -118,7 +118,7 @@ def invoke(site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Invok
 def screen(found: Diagnosis, written: Path | None = None) -> str:
     from femubench.core.diagnosis.serial import diagnosis_to_json
 
-    return diagnosis_text(diagnosis_to_json(found, written=written)) + "\n"
+    return diagnosis_text(diagnosis_to_json(found, written=written)) + "\nNext: bench run case\n"
 
 
 class TestAsking:

@@ -112,6 +112,9 @@ def test_both_tails_of_chi_square_are_said_with_their_numbers(data: Data) -> Non
     assert "so little with probability" in few["shapes"].warning
     assert "times too large" in few["shapes"].warning
     assert few["all"].warning == ""  # a kind by itself says more
+    assumed = replace(data, measurement=replace(data.measurement, assumed=True))
+    state.problem = SimpleNamespace(**{**vars(state.problem), "data": assumed})
+    assert not any(row.warning for row in scatter_rows(state))  # nobody has stated that much
     state.residual *= 16.0
     much = {row.kind: row for row in scatter_rows(state)}
     assert much["shapes"].more_p < 1e-12

@@ -22,6 +22,7 @@ from femubench.core.cli.main import bench
 from femubench.modal import FrequencyResponses
 from tests.frf_problems import write_universal
 
+DOCS = Path(__file__).parents[1] / "docs"
 SPANS, MASS, STIFFNESS = 8, 2.0, 4.0e6
 
 
@@ -104,38 +105,69 @@ def test_folder_runs_and_says_what_was_done(tmp_path: Path) -> None:
 
 X = 1e3 * 0.2 * np.arange(1.0, SPANS + 1.0)
 CLOSE, WRONG = X.copy(), X.copy()
-CLOSE[1], WRONG[5] = 210.0, 12000.0  # within the reach of the first node; typed for 1200
+CLOSE[1], WRONG[5] = 195.0, 12000.0  # before the first node; typed for 1200
 # The mistake, more words of `bench init`, coordinates of the test, what the message advises.
 MISTAKES: dict[str, tuple[str, dict[str, np.ndarray], str]] = {
-    "unit": ("--frame y,-x,z --unit m", {}, "--unit mm --frame y,-x,z` all fit"),
-    "unit of the model": (
+    "a unit of the test that is wrong": (
+        "--frame y,-x,z --unit m",
+        {},
+        "--unit mm --frame y,-x,z` all fit",
+    ),
+    "a unit of the model that is wrong": (
         "--frame y,-x,z --model-unit mm",
         {},
         "--model-unit m --unit mm --frame y,-x,z` all",
     ),
-    "axes": (
+    "other axes in the test": (
         "",
         {},
         "--unit mm --frame y,x,-z` all fit; by symmetry so they do with y,-x,z: compare",
     ),
-    "tolerance": ("--frame y,-x,z --tolerance 0.0001", {}, "--tolerance 0.0022` all fit"),
-    "origin": ("--frame y,-x,z", {"y": X + 5e3}, "--frame y,-x,z --origin -5,"),
-    "all at once": (
+    "a tolerance that is too small": (
+        "--frame y,-x,z --tolerance 0.0001",
+        {},
+        "--tolerance 0.0022` all fit",
+    ),
+    "another origin in the test": ("--frame y,-x,z", {"y": X + 5e3}, "--frame y,-x,z --origin -5,"),
+    "unit, axes and tolerance at once": (
         "--tolerance 1e-6 --unit ft",
         {"y": X / 25.4, "x": X / X},
         "--unit in --frame y",
     ),
-    "one wrong place": ("--frame y,-x,z", {"y": WRONG}, "--frame y,-x,z --without 6:z` the"),
-    "two at one place": ("--frame y,-x,z", {"y": CLOSE}, "bench init --without 2:z"),
-    "no model of it": ("--frame y,-x,z", {"y": X**2, "x": X**3}, "is it the right model"),
-    "no frame": ("--frame x,x,z", {}, "each once and right-handed"),
-    "no origin": ("--origin 1,2", {}, "is no X,Y,Z in m"),
-    "no modes": ("--modes @K.mtx", {}, "K.mtx: no modes are read"),
-    "no kind": ("--modes @notes.docx", {}, "a folder that `bench identify` writes"),
-    "no folder of it": ("--modes @empty", {}, "`bench identify FILE --output"),
-    "no places": ("--modes @modes.csv", {}, "bench init --sensors FILE"),
-    "not new": ("--frame y,-x,z", {"full": X}, "a new or an empty folder"),
+    "one sensor with a wrong place": (
+        "--frame y,-x,z",
+        {"y": WRONG},
+        "--frame y,-x,z --without 6:z` the",
+    ),
+    "two sensors that go to one place": (
+        "--frame y,-x,z",
+        {"y": CLOSE},
+        "bench init --without 2:z",
+    ),
+    "the model of something else": (
+        "--frame y,-x,z",
+        {"y": X**2, "x": X**3},
+        "is it the right model",
+    ),
+    "axes that are none": ("--frame x,x,z", {}, "each once and right-handed"),
+    "an origin that is none": ("--origin 1,2", {}, "is no X,Y,Z in m"),
+    "a matrix in place of modes": ("--modes @K.mtx", {}, "K.mtx: no modes are read"),
+    "a kind of file that is not read": (
+        "--modes @notes.docx",
+        {},
+        "a folder that `bench identify` writes",
+    ),
+    "a folder without modes": ("--modes @empty", {}, "`bench identify FILE --output"),
+    "modes without places of sensors": ("--modes @modes.csv", {}, "bench init --sensors FILE"),
+    "a folder that is in use": ("--frame y,-x,z", {"full": X}, "a new or an empty folder"),
 }
+
+
+def assert_on_page(mistake: str, output: str, folder: Path) -> None:
+    """Check that a message is one line, which the docs list under its mistake."""
+    (line,) = output.splitlines()
+    own = line.replace(f"{folder}/", "").removeprefix("bench: ").replace("|", "\\|")
+    assert f"| {mistake} | {own} |\n" in (DOCS / "your-structure.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
@@ -151,10 +183,14 @@ def test_a_mistake_names_its_remedy_and_leaves_nothing(tmp_path: Path, mistake: 
     done = init(tmp_path, *more.replace("@", f"{tmp_path}/").split())
     assert done.exit_code == 2, done.output
     assert advice in done.output
-    assert len(done.output.splitlines()) == 1
+    assert_on_page(mistake, done.output, tmp_path)
     assert (tmp_path / "case").exists() == full
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
-    if mistake in ("origin", "all at once", "one wrong place"):
+    if mistake in (
+        "another origin in the test",
+        "unit, axes and tolerance at once",
+        "one sensor with a wrong place",
+    ):
         command = re.search("`(bench init .*?)`", done.output)
         assert command is not None
         again = CliRunner().invoke(bench, shlex.split(command[1])[1:])
@@ -162,28 +198,31 @@ def test_a_mistake_names_its_remedy_and_leaves_nothing(tmp_path: Path, mistake: 
 
 
 @pytest.mark.parametrize(
-    ("words", "advice"),
+    ("mistake", "words", "advice"),
     [
-        ("strategies list", "Did you mean plugins list?"),
-        ("run nosuch", "`bench init` writes one"),
-        ("diagnose .", "which `bench init` writes"),
-        ("update portal -s baruch -o new", "`elements` with a node at every sensor"),
-        ("identify one.csv", "two or more in one file"),
+        ("a verb that is none", "strategies list", "Did you mean plugins list?"),
+        ("a case that is not there", "run nosuch", "`bench init` writes one"),
+        ("a folder that is no case", "diagnose .", "which `bench init` writes"),
+        ("a sensor between two nodes", "update portal -s baruch -o new", "node at every sensor"),
+        ("one sensor over time", "identify one.csv", "two or more in one file"),
+        ("responses in several files", "identify a.uff a.uff", "one file, that has all of them"),
     ],
 )
 def test_other_mistakes_name_their_remedy(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str, advice: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mistake: str, words: str, advice: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     if "portal" in words:
         femubench.init_case("portal")
+    if "a.uff" in words:
+        write_universal(Path("a.uff"), responses(tmp_path))
     signal = np.random.default_rng(0).standard_normal(2100)
     rows = "".join(f"{0.01 * i:.2f};{v}\n".replace(".", ",") for i, v in enumerate(signal))
     Path("one.csv").write_text(f"time;1:z\n{rows}")
     done = CliRunner().invoke(bench, words.split())
     assert done.exit_code == 2, done.output
     assert advice in done.output
-    assert len(done.output.splitlines()) == 1
+    assert_on_page(mistake, done.output, tmp_path)
 
 
 def responses(folder: Path, noise: float = 1e-3) -> FrequencyResponses:

@@ -66,6 +66,9 @@ def origin(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder.mkdir()
     for name in ("femubench", "tests", *ROOMS):
         shutil.copytree(ROOT / name, folder / name, symlinks=True, ignore=CACHES)
+    (folder / "docs").mkdir()
+    for page in (ROOT / "femubench" / "docs").iterdir():
+        shutil.copy(page, folder / "docs")
     for name in FILES:
         shutil.copy(ROOT / name, folder)
     who = ("-c", "user.name=test", "-c", "user.email=test@localhost")
@@ -171,6 +174,9 @@ def test_wheel_works_where_it_is_installed(archives: list[Path], tmp_path: Path)
     assert "not installed" not in listed.stdout
     shown = succeeded(python.with_name("bench"), "scenarios", "show", "frame", cwd=tmp_path)
     assert "frame" in shown
+    assert "docs/effects.md" in succeeded(
+        python.with_name("bench"), "help", "density", cwd=tmp_path
+    )
 
 
 @pytest.mark.nightly

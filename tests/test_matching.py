@@ -10,8 +10,10 @@ import pytest
 
 from femubench import InputError, Measurement, Sensors, read_case
 from femubench.core.case.case import Case
+from femubench.core.case.nodes import with_mesh
 from femubench.core.case.writing import write_case
 from femubench.core.errors import FemubenchError
+from femubench.fem import MatrixGeometry, matrix_model
 
 CASES = Path(__file__).parent / "cases"
 PLACES = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.5], [0.75, 0.0, 1.1], [1.5, 0.0, 0.6]])
@@ -169,3 +171,34 @@ def test_coordinates_in_a_table_have_the_unit_of_the_case(tmp_path: Path) -> Non
     (folder / "case.toml").write_text(text.replace("[measurement]", '[measurement]\nunit = "mm"'))
     found = read_case(folder).measurement.sensors
     np.testing.assert_allclose(found.xyz, read_case(CASES / "3d").measurement.sensors.xyz)
+
+
+def test_a_sensor_between_nodes_reads_a_linear_field_of_its_own_body() -> None:
+    """Two bricks of 50, 40 and 10 mm, 1 mm apart, which no stiffness couples."""
+    corners = np.array(list(np.ndindex(2, 2, 2))) * [0.05, 0.04, 0.01]
+    xyz = np.vstack([corners, corners + np.array([0.0, 0.0, 0.011])])
+    rows = np.repeat(np.arange(16), 3)
+    stiffness = (rows[:, None] // 8 == rows // 8) + 48.0 * np.eye(48)
+    model = with_mesh(matrix_model(np.eye(48), stiffness, rows, "xyz" * 16, xyz[rows]))
+    rng = np.random.default_rng(7)
+    inside = rng.uniform(size=(40, 3)) * [0.05, 0.04, 0.01] + np.repeat([[0, 0, 0.011]], 40, 0)
+    inside[20:] -= [0.0, 0.0, 0.011]
+    points = np.vstack([inside, xyz[3] + np.array([-0.001, 0.001, 0.0]), [0.02, 0.02, -0.003]])
+    geometry = model.geometry
+    assert isinstance(geometry, MatrixGeometry)
+    names, feet = zip(*geometry.nearest(points), strict=True)
+    np.testing.assert_allclose(feet[:40], inside, atol=1e-9)
+    np.testing.assert_allclose(feet[40:], [xyz[3], [0.02, 0.02, 0.0]], atol=1e-7)
+    assert {int(name) > 7 for name in " + ".join(names[:20]).split(" + ")} == {True}
+    assert names[40] == "3"
+    directions = ("x", "-z", "0 0.6 0.8", "y") * 10
+    sensors = Sensors(tuple(map(str, range(40))), np.array(feet[:40]), directions)
+    gradient, offset = rng.standard_normal((3, 3)), rng.standard_normal(3)
+    field = (xyz @ gradient.T + offset).ravel()
+    expected = np.einsum("ij,ij->i", inside @ gradient.T + offset, sensors.axes[:, :3])
+    np.testing.assert_allclose(model.observe(sensors) @ field, expected, atol=1e-7)
+    # Amid four alike corners each has a quarter, whatever the rounding.
+    ((place, _),) = geometry.nearest(np.array([[0.025, 0.02, 0.0]]))
+    assert place == "0 + 2 + 4 + 6"
+    shares = model.observe(Sensors(("m",), np.array([[0.025, 0.02, 0.0]]), ("z",))).data
+    np.testing.assert_allclose(shares, 0.25, atol=1e-6)

@@ -7,11 +7,16 @@ import re
 import tomllib
 from importlib.metadata import entry_points
 from pathlib import Path
+from typing import get_args
 
 import pytest
+from click.testing import CliRunner
 
 import femubench
+from femubench.core.cli.main import bench
+from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.markers import PROJECT
+from femubench.core.schema.diagnosis import Verdict
 
 ROOT = Path(__file__).parents[1]
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -68,3 +73,24 @@ def test_index_of_the_docs_names_every_page() -> None:
     linked = set(re.findall(r"\]\(([\w/-]+\.md)\)", index))
     pages = {page.relative_to(docs).as_posix() for page in docs.rglob("*.md")}
     assert linked | {"index.md"} == pages
+
+
+def test_help_has_every_key_effect_and_verdict_of_pages_that_are_installed() -> None:
+    data = SETUPTOOLS["package-data"]["femubench.docs"]
+    pages = sorted((ROOT / "femubench" / "docs").iterdir())
+    assert (data, [page.resolve() == ROOT / "docs" / page.name for page in pages]) == (
+        ["*.md"],
+        [True] * 4,
+    )
+    example = (ROOT / "core" / "case" / "example_files" / "case.toml").read_text(encoding="utf-8")
+    keys = set(re.findall(r"^(\w+) = ", example, re.MULTILINE))
+    assert len(keys) > 15
+    for key in (*keys, *load_plugins().effects, *get_args(Verdict), "measurement.tolerance"):
+        done = CliRunner().invoke(bench, ["help", key])
+        assert (done.exit_code, len(done.output) > 40) == (0, True), key
+    assert done.output.startswith("tolerance (measurement, docs/case-format.md)\n  how far a")
+    done = CliRunner().invoke(bench, ["help", "tolerence"])
+    assert (done.exit_code, done.output) == (
+        2,
+        "bench: no key 'tolerence'; did you mean 'tolerance'?\n",
+    )

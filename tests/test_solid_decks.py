@@ -106,13 +106,29 @@ def test_a_distorted_element_has_the_matrices_of_calculix(kind: str, tmp_path: P
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_an_element_has_the_mass_of_its_volume_and_six_motions_without_force(
+def test_an_element_has_the_mass_of_its_body_and_six_motions_without_force(
     kind: str, tmp_path: Path
 ) -> None:
-    model = read(tmp_path, element_of(kind, KINDS[kind].places * [0.2, 0.1, 0.3]))
-    volume = 0.2 * 0.1 * 0.3 / (6.0 if len(KINDS[kind].corners) == 4 else 1.0)
-    along_z = np.array([d == "z" for d in model.dofs.direction], dtype=float)
-    assert along_z @ model.mass @ along_z == pytest.approx(7850.0 * volume, rel=1e-12)
+    """Mass, centre and moments of inertia, of an oblique element; those of a body in the field."""
+    turn = np.array([[0.2, 0.03, 0.0], [0.0, 0.1, 0.02], [0.01, 0.0, 0.3]])
+    model = read(tmp_path, element_of(kind, KINDS[kind].places @ turn.T))
+    simplex = len(KINDS[kind].corners) == 4
+    mass = 7850.0 * la.det(turn) / (6.0 if simplex else 1.0)
+    middle = np.full(3, 0.25 if simplex else 0.5)
+    spread = (np.ones((3, 3)) + np.eye(3)) / 20.0 if simplex else 0.25 + np.eye(3) / 12.0
+    origin = model.dofs.xyz.mean(axis=0)
+    centre = turn @ middle - origin
+    second = turn @ spread @ turn.T - np.outer(turn @ middle, turn @ middle)
+    second += np.outer(centre, centre)
+    x, y, z = centre
+    arm = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    body = np.block([[np.eye(3), -arm], [arm, np.trace(second) * np.eye(3) - second]])
+    if kind == "C3D4":  # one point of integration, as CalculiX has: no inertia about its middle
+        body[3:, 3:] = arm.T @ arm
+    along = np.array(["xyz".index(d) for d in model.dofs.direction])
+    turned = np.cross(np.eye(3)[None], (model.dofs.xyz - origin)[:, None])
+    rigid = np.hstack([np.eye(3)[along], turned[np.arange(len(along)), :, along]])
+    np.testing.assert_allclose(rigid.T @ (model.mass @ rigid), mass * body, atol=1e-9 * mass)
     values = la.eigvalsh(model.stiffness.toarray())
     assert (abs(values[:6]) < 1e-9 * values[-1]).all()
     # The reduced brick has six more, which its neighbours hold.

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from femubench.core.case.case import Match
 from femubench.core.case.faults import Misfit, Remedy, WrongDirection
 from femubench.core.case.frames import FrameSite, Site
+from femubench.core.case.nodes import BETWEEN
 from femubench.core.case.schema import LengthUnit, MeasurementSpec
 from femubench.core.case.tables import PLACES
 from femubench.core.case.units import METRES
@@ -221,10 +222,11 @@ class Placement:
         Raises:
             Misfit: naming both sensors and the place.
         """
-        taken: dict[tuple[str, str], Match] = {}
+        taken: dict[tuple[object, ...], Match] = {}
         for match, direction in found:
             way = direction.lstrip("+-")
-            other = taken.setdefault((match.place, way), match)
+            x, y, z = np.round(match.xyz, 6).tolist()
+            other = taken.setdefault((match.place, x, y, z, way), match)
             if np.linalg.norm(other.measured - match.measured) > ON_MEMBER:
                 what = (
                     f"sensors {other.sensor!r} and {match.sensor!r} both lie nearest to "
@@ -428,17 +430,23 @@ def match_sensors(
 
 
 def describe_matches(matches: Sequence[Match], file: str) -> tuple[str, ...]:
-    """Return what to say of sensors that were moved to the structure, in one sentence.
+    """Return what to say of sensors between nodes, and of those moved to the structure.
 
     Arguments:
         matches: of all sensors.
         file: that lists them.
     """
     moved = [match for match in matches if match.distance > ON_MEMBER]
+    amid = [match for match in matches if BETWEEN in match.place]
+    stated: tuple[str, ...] = ()
+    if amid:
+        count = f"{len(amid)} of the {len(matches)} sensors of {file}"
+        stated = (f"{count} lie between nodes: what they read is interpolated linearly.",)
     if not moved:
-        return ()
+        return stated
     worst = max(moved, key=lambda match: match.distance)
     return (
+        *stated,
         f"{len(moved)} of the {len(matches)} sensors of {file} were moved to the nearest place of "
         f"the structure, {worst.sensor} furthest: {worst.distance:.3g} m to {worst.place}.",
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.optimize import nnls
 from scipy.spatial import cKDTree
 
 from femubench.core.case.faults import Misfit, WrongDirection
@@ -24,6 +25,9 @@ from femubench.core.typing import BoolArray, FloatArray, SparseArray
 _MOST_DOFS = 1_000_000
 DOF_COLUMNS = ("row", "node", "direction", "x", "y", "z")
 INTERNAL = "internal"  # the column that marks what moves with no motion of the body
+BETWEEN = " + "  # the names of nodes that a place lies amid
+_STARTS = 4  # nearest nodes, one of which has the element of a point
+_NEARER, _ALIKE = 1e-4, 1e-6  # how much near nodes are preferred, and even shares among these
 
 
 @dataclass(frozen=True)
@@ -34,11 +38,13 @@ class MatrixGeometry:
         names: the nodes, in the order in which the dofs file first names them.
         dofs: the rows; `dofs.node` counts the names.
         first_row: the number that the dofs file gives to the first row, 0 or 1.
+        mesh: which nodes share an element, sparse (k, k); None where a sensor sits at nodes alone.
     """
 
     names: tuple[str, ...]
     dofs: Dofs
     first_row: int = 1
+    mesh: SparseArray | None = None
 
     @cached_property
     def rows(self) -> dict[tuple[str, str], int]:
@@ -73,14 +79,59 @@ class MatrixGeometry:
         """Return where the nodes are in m, (k, 3)."""
         return np.array(list(self.places.values()))
 
+    @cached_property
+    def _at(self) -> dict[int, int]:
+        """Return from the number of a node to its place in `points`, in the order of these."""
+        numbers = np.unique(self.dofs.node[~self.dofs.internal]).tolist()
+        return {number: i for i, number in enumerate(numbers)}
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.points)
+
     def nearest(self, xyz: FloatArray) -> list[tuple[str, FloatArray]]:
-        """Return the nearest node of every point, by name, and where it is in m.
+        """Return the nearest place of every point and where it is in m: a node, or amid some.
 
         Arguments:
             xyz: in m, (k, 3).
         """
-        found = cKDTree(self.points).query(xyz)[1]
-        return [(self.placed[i], self.points[i]) for i in np.atleast_1d(found)]
+        found = [self._shares(point) for point in np.atleast_2d(xyz)]
+        return [(BETWEEN.join(shares), foot) for shares, foot in found]
+
+    def _shares(self, point: FloatArray) -> tuple[dict[str, float], FloatArray]:
+        """Return the shares that nodes have in the motion nearest to a point, and where that is.
+
+        They are those of the simplex of Delaunay among the nodes of the elements there: exact for
+        motions of a body and, as are linear elements, for constant strains; no share is negative.
+        """
+        starts = np.atleast_1d(self._tree.query(point, min(_STARTS, len(self.placed)))[1])
+        first = self.points[starts[0]]
+        best: tuple[dict[str, float], FloatArray] = ({self.placed[starts[0]]: 1.0}, first)
+        gap = float(np.linalg.norm(first - point))
+        for start in starts if self.mesh is not None else ():
+            if gap <= ON_MEMBER:
+                break
+            near = self._around(int(start))
+            arms = self.points[near] - point
+            size = float(np.abs(arms).max())
+            far = np.square(arms / size).sum(axis=1)
+            sums = [np.ones(len(near)), *(arms / size).T, _NEARER * far]
+            wanted = np.zeros(5 + len(near))
+            wanted[0] = 1.0
+            shares = nnls(np.vstack([*sums, _ALIKE * np.diag(np.sqrt(far))]), wanted)[0]
+            shares /= shares.sum()
+            foot = shares @ self.points[near]
+            if (own := float(np.linalg.norm(foot - point))) < gap - ON_MEMBER:
+                some = np.flatnonzero(shares > ON_MEMBER)
+                best = {self.placed[near[i]]: float(shares[i]) for i in some}, foot
+                gap = own
+        return best
+
+    def _around(self, start: int) -> list[int]:
+        """Return the places that share an element with one, as `mesh` has them."""
+        assert self.mesh is not None
+        row = self.mesh[[list(self._at)[start]]]
+        return [self._at[node] for node in row.indices if node in self._at]
 
     def node(self, place: Place) -> str:
         """Return the node of a place; raises Misfit."""
@@ -107,19 +158,25 @@ class MatrixGeometry:
     def check_sensor(self, xyz: Vector, direction: str) -> None:
         """Check that a node with that direction lies at a point; raises Misfit."""
         for name in moved_names(direction):
-            self.row_at(np.array(xyz), name)
+            self.rows_at(np.array(xyz), name)
 
     def near(self, xyz: Vector | FloatArray) -> list[tuple[str, float]]:
         """Return the nodes within 1e-6 m of a point with their distances."""
         gaps = np.linalg.norm(self.points - np.array(xyz), axis=1)
         return [(self.placed[i], float(gaps[i])) for i in np.flatnonzero(gaps <= ON_MEMBER)]
 
-    def row_at(self, xyz: FloatArray, direction: str) -> int:
-        """Return the row that a sensor reads; raises Misfit."""
+    def rows_at(self, xyz: FloatArray, direction: str) -> dict[int, float]:
+        """Return the rows that a sensor reads and their shares; raises Misfit."""
         names = [name for name, _ in self.near(xyz)]
         where = f"({', '.join(f'{v:g}' for v in xyz)})"
         if not names:
-            raise Misfit(f"there is no node at {where}", "the place of a node, within 1e-6 m")
+            shares, foot = self._shares(xyz)
+            if np.linalg.norm(foot - xyz) > ON_MEMBER:
+                what = "the place of a node, within 1e-6 m"
+                raise Misfit(f"there is no node at {where}", what)
+            names = [name for name in shares if (name, direction) not in self.rows]
+            if not names:
+                return {self.rows[name, direction]: share for name, share in shares.items()}
         rows = [self.rows[name, direction] for name in names if (name, direction) in self.rows]
         if not rows:
             there = sorted({d for name, d in self.rows if name in names}, key=DIRECTIONS.index)
@@ -127,19 +184,20 @@ class MatrixGeometry:
         if len(rows) > 1:
             what = f"nodes {' and '.join(map(repr, names))} share the place {where}"
             raise Misfit(what, "a sensor at a place of one node")
-        return rows[0]
+        return {rows[0]: 1.0}
 
     def observe(self, sensors: Sensors) -> SparseArray:
         """Return sensor readings from dofs, sparse (n_sensors, n)."""
-        axes = sensors.axes
-        row, column = np.nonzero(axes)
+        axes, entries = sensors.axes, []
         try:
-            pairs = zip(sensors.xyz[row], column, strict=True)
-            found = [self.row_at(xyz, DIRECTIONS[k]) for xyz, k in pairs]
+            for i, k in zip(*np.nonzero(axes), strict=True):
+                shares = self.rows_at(sensors.xyz[i], DIRECTIONS[k])
+                entries += [(axes[i, k] * share, i, row) for row, share in shares.items()]
         except Misfit as misfit:
             raise ModelError(misfit.what) from None
+        values, i, rows = np.array(entries, dtype=float).reshape(-1, 3).T
         shape = (len(sensors), len(self.dofs))
-        return sp.csr_array((axes[row, column], (row, np.array(found, dtype=int))), shape=shape)
+        return sp.csr_array((values, (i.astype(int), rows.astype(int))), shape=shape)
 
     def assemble_attachments(
         self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]
@@ -280,6 +338,21 @@ def read_dofs(file: Path) -> MatrixGeometry:
         xyz=np.array([places[node] for node, _ in order], dtype=float),
     )
     return MatrixGeometry(tuple(names), mark_internal(dofs, internal), first)
+
+
+def with_mesh(model: Model) -> Model:
+    """Return a model from files with the nodes that share an element, so far as K couples them."""
+    geometry, size = model.geometry, model.size
+    assert isinstance(geometry, MatrixGeometry)
+    ones = (np.ones(size), (geometry.dofs.node, np.arange(size)))
+    nodes = sp.csr_array(ones, shape=(len(geometry.names), size))
+    mesh = sp.coo_array(nodes @ abs(model.stiffness) @ nodes.T)
+    moving = np.zeros((len(geometry.names), len(DIRECTIONS)), dtype=bool)
+    moving[geometry.dofs.node, [DIRECTIONS.index(d) for d in geometry.dofs.direction]] = True
+    alike = (moving[mesh.col] | ~moving[mesh.row]).all(axis=1)  # and move along the same directions
+    pairs = (mesh.row[alike], mesh.col[alike])
+    mesh = sp.csr_array((np.ones(alike.sum()), pairs), shape=mesh.shape)
+    return replace(model, geometry=replace(geometry, mesh=mesh))
 
 
 def mark_internal(dofs: Dofs, internal: BoolArray) -> Dofs:

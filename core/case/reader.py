@@ -37,7 +37,7 @@ from femubench.core.case.modes import (
     select_measured,
     with_scatter,
 )
-from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.case.nodes import MatrixGeometry, with_mesh
 from femubench.core.case.reducing import reduce_case
 from femubench.core.case.repeats import with_covariance, with_repeats
 from femubench.core.case.response_files import read_responses
@@ -129,6 +129,8 @@ class _Building:
     def case(self, name: str | None) -> Case:
         """Return the case; raises BadKey or InputError."""
         model = self.model()
+        if isinstance(model.geometry, MatrixGeometry):
+            model = with_mesh(model)
         site: Site = (
             model.geometry
             if isinstance(model.geometry, MatrixGeometry)

@@ -79,6 +79,12 @@ def _small_model(model: Model, found: GroupedReduction) -> Model:
     )
     names = (*(geometry.names[i] for i in nodes), *([_INNER] if inner else []))
 
+    mesh = None
+    if geometry.mesh is not None:  # readings stay the same, though the node amid them may be gone
+        near = geometry.mesh[nodes]
+        mesh = sp.csr_array(near @ near.T)
+        mesh.resize((len(names), len(names)))
+
     def sparse(parts: dict[str, FloatArray]) -> dict[str, SparseArray]:
         return {name: sp.csc_array(part) for name, part in parts.items()}
 
@@ -87,7 +93,7 @@ def _small_model(model: Model, found: GroupedReduction) -> Model:
         mass=sp.csc_array(found.mass),
         stiffness=sp.csc_array(found.stiffness),
         dofs=small,
-        geometry=MatrixGeometry(names, small),
+        geometry=MatrixGeometry(names, small, mesh=mesh),
         # What holds to ground is not to be seen in coordinates that lie nowhere.
         group_kinds={**dict.fromkeys(support_groups(model), "support"), **model.group_kinds},
         groups=sparse(found.groups),

@@ -246,7 +246,7 @@ class _Keys:
         source = " and ".join(path.name for path in every)
         lines = [
             f"# Written by `bench init` from {source}.",
-            "# Every key is explained in docs/case-format.md; an unknown key is an error.",
+            "# `bench help KEY` explains a key (docs/case-format.md); an unknown key is an error.",
             "",
             "[case]",
             f"name = {_quoted(self.name)}",

@@ -8,7 +8,6 @@ from __future__ import annotations
 import importlib
 import os
 import pickle
-import resource
 import signal
 import sys
 import tempfile
@@ -70,6 +69,8 @@ class Confinement:
             enter(self.walls, self.folder, room, limits.processes)
         elif limits.sandbox == "processes":
             go_apart(None, self.folder, room, limits.processes)
+        import resource
+
         lower_limit(resource.RLIMIT_CORE, 0)
         lower_limit(resource.RLIMIT_FSIZE, limits.file)
         # Without this the signal would end the process before the write could fail.
@@ -133,6 +134,8 @@ def address_space() -> int:
         import psutil
 
         return int(psutil.Process().memory_info().vms)
+    import resource
+
     with open("/proc/self/statm", "rb") as pages:
         return int(pages.read().split()[0]) * resource.getpagesize()
 

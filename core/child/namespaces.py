@@ -16,7 +16,6 @@ import ctypes
 import json
 import os
 import platform
-import resource
 import signal
 import socket
 import struct
@@ -135,6 +134,8 @@ def go_apart(walls: Walls | None, at: str, room: int, processes: int) -> None:
             head = struct.pack("=Ii", _CAPABILITY_VERSION, 0)
             _call("capset", "capabilities", head, bytes(24))
         os.setsid()
+        import resource
+
         lower_limit(resource.RLIMIT_NPROC, processes)
     except Exception as error:
         os.write(2, f"no sandbox: {error}\n".encode())
@@ -181,6 +182,8 @@ def _unshare(*, alone: bool) -> None:
 
 def lower_limit(what: int, wanted: int) -> None:
     """Lower a limit of this process, as far as it is not lower yet."""
+    import resource
+
     # Where there is no limit, -1 stands for it.
     soft, hard = (min(wanted, given % 2**64) for given in resource.getrlimit(what))
     resource.setrlimit(what, (soft, hard))

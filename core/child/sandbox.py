@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import os
 import platform
-import resource
 import subprocess
 import sys
 import tempfile
@@ -149,6 +148,8 @@ def enter(walls: Walls, at: str, room: int, processes: int) -> None:
     Raises:
         OSError: as for `go_apart`.
     """
+    import resource
+
     go_apart(walls, at, room, processes)
     os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
     lower_limit(resource.RLIMIT_NOFILE, _MOST_FILES)

@@ -126,6 +126,8 @@ def diagnose(
     if report_file is not None:
         write_atomically(report_file, rendering(data, _STYLES[report_file.suffix.lower()]))
     _tell(data, json_file, None if quiet else style)
+    if not quiet and style == "terminal" and json_file != options.SCREEN and Path(case).is_dir():
+        click.echo(f"Next: bench run {case}")
     if fault is not None:
         raise fault
     if output is not None and written is None:

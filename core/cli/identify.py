@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -104,3 +105,7 @@ def identify(
             click.echo(f"\nwrote modes.csv, sensors.csv and identification.html to {output}")
             if not found.located:
                 click.echo("The file has no coordinates: fill in x, y and z of sensors.csv.")
+    if not quiet:
+        read = output or (files[0] if len(files) == 1 else "FOLDER")
+        and_so = ", with --output FOLDER here" if read == "FOLDER" else ""
+        click.echo(f"Next: bench init CASE --model MODEL --modes {shlex.quote(str(read))}{and_so}")

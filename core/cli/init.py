@@ -103,7 +103,7 @@ def init(
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         click.echo(f"wrote {path}")
     _show_match(case)
-    click.echo(f"Now look at {folder / 'case.toml'}, and run: bench run {folder}")
+    click.echo(f"Next, once {folder / 'case.toml'} says what you know: bench diagnose {folder}")
 
 
 def _show_match(case: Case) -> None:

@@ -39,6 +39,7 @@ VERBS = {
     "reproduce": "Recompute the tables of the papers, cell by cell.",
     "init": "Write a case folder into FOLDER, which must be new or empty.",
     "challenge": "Write blind cases with a hidden fault, and score answers.",
+    "help": "Explain a key of a case, an effect, a verdict or a setting.",
     "scenarios": "List the built-in scenarios, or show one.",
     "plugins": "List, show and check plugins, or write a new one.",
 }
@@ -60,7 +61,8 @@ class VerbGroup(click.Group):
         """Import one verb."""
         if cmd_name not in VERBS:
             return None
-        command = getattr(import_module(f"{__package__}.{cmd_name}"), cmd_name)
+        module = import_module(f"{__package__}.{cmd_name}")
+        command = getattr(module, cmd_name, None) or getattr(module, f"{cmd_name}_")
         assert isinstance(command, click.Command)
         return command
 
@@ -94,6 +96,13 @@ class VerbGroup(click.Group):
         """Run a verb; print one line for an error that the user can act upon."""
         try:
             return super().invoke(ctx)
+        except ModuleNotFoundError as fault:
+            if fault.name not in ("fcntl", "resource"):
+                raise
+            raise click.ClickException(
+                "this verb starts processes under limits, which takes Linux or macOS (on Windows "
+                f"WSL): there is no module {fault.name!r}"
+            ) from None
         except (FemubenchError, OSError) as fault:
             if isinstance(fault, OSError) and fault.errno == errno.EPIPE:
                 raise

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -64,6 +66,7 @@ def run(
     del asked  # taken from the context
     plugins = _checked(ctx, cases, strategies)
     from femubench.core.library.rank import plan_again, plan_run, request_of
+    from femubench.core.score.leaderboard import list_rows
 
     output = RunOutput.of(ctx, plugins)
     old = None if locked is None else output.store.load(locked)
@@ -74,6 +77,10 @@ def run(
         else plan_again(request_of(old), plugins)
     )
     outcome, code = output.run(plan, partial(_header, plan), output.store.exhibits, *_going_on(ctx))
+    if len(cases) == 1 and Path(cases[0]).is_dir() and not ctx.params["quiet"]:
+        rows = list_rows(outcome)
+        if lead := next((r["strategy"] for r in rows if r["rank"] == 1 and r["gain"] > 0.0), None):
+            click.echo(f"Next: bench update {cases[0]} -s {shlex.quote(lead)} -o updated")
     return code if old is None else _compare(old, outcome)
 
 

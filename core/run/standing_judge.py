@@ -7,7 +7,6 @@ all workers, is sent every case once, and is replaced when it dies, hangs or has
 from __future__ import annotations
 
 import pickle
-import resource
 import sys
 import time
 from collections import OrderedDict
@@ -73,6 +72,8 @@ def _first_peak() -> int:
 
 def _peak() -> int:
     """Return the largest resident memory that this process has had so far in bytes."""
+    import resource
+
     found = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return found if sys.platform == "darwin" else 1024 * found
 
@@ -80,6 +81,8 @@ def _peak() -> int:
 @contextmanager
 def _limit_memory(allowed: int | None) -> Iterator[None]:
     """Limit what the block may take beyond what the process has."""
+    import resource
+
     before = resource.getrlimit(resource.RLIMIT_AS)
     if allowed is not None:
         most = address_space() + allowed

@@ -222,6 +222,8 @@ def _in_another_order(model: Model, geometry: MatrixGeometry, names: Disguise) -
         group_kinds={groups[name]: kind for name, kind in model.group_kinds.items()},
         dofs=moved,
         geometry=MatrixGeometry(
-            tuple(names.joints[geometry.names[node]] for node in numbers), moved
+            tuple(names.joints[geometry.names[node]] for node in numbers),
+            moved,
+            mesh=None if geometry.mesh is None else geometry.mesh[list(numbers)][:, list(numbers)],
         ),
     )
