@@ -149,6 +149,22 @@ def test_all_modes_make_the_modal_coordinates_exact(problems: dict[str, Problem]
     assert (error < 1e-10 + high)[elastic].all()
 
 
+def test_few_coordinates_give_what_all_do(problems: dict[str, Problem]) -> None:
+    problem = problems["hframe"]
+    fewer = 0
+    for part in of_each_kind(problem):
+        x = inside(part)
+        own = problem.space.condense((part,), problem.compared).space
+        fewer += len(own) < 0.7 * len(problem.space)
+        few, every = (state_at(problem, (part,), x, every=not k) for k in (1, 0))
+        low = slice(0, problem.compared)
+        assert few.eigenvalues[low] == pytest.approx(every.eigenvalues[low], rel=1e-7, abs=1.0)
+        assert few.raw == pytest.approx(every.raw, abs=1e-4), part.hypothesis.name
+        size = np.abs(every.slopes).max(axis=0)
+        assert (np.abs(few.slopes - every.slopes) <= 1e-3 * size).all(), part.hypothesis.name
+    assert fewer > 10
+
+
 def test_rebased_coordinates_are_those_of_the_model_with_the_cause_in_it(
     problems: dict[str, Problem],
 ) -> None:

@@ -18,7 +18,7 @@ from femubench.core.fit.modal_basis import nominal_space
 from femubench.core.fit.modal_fit import Fit, Problem, State, signed_hz, state_at
 from femubench.core.fit.static_response import LargeProblem
 from femubench.core.inference.settings import settings
-from femubench.core.modal.eigen import solve_modes
+from femubench.core.modal.eigen import modes_of
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 
@@ -208,7 +208,7 @@ class Outlook:
         """Return the explanation with some coordinates of the causes at zero."""
         x = self.state.x.copy()
         x[columns] = 0.0
-        return state_at(self.state.problem, self.state.parts, x)
+        return state_at(self.state.problem, self.state.parts, x, every=True)
 
 
 def outlook_of(problem: Problem, found: Fit, points: Points) -> Outlook:
@@ -222,12 +222,13 @@ def outlook_of(problem: Problem, found: Fit, points: Points) -> Outlook:
     # In coordinates of our own: those of the problem are not kept as motions of the dofs.
     hypotheses = [part.hypothesis for part in found.parts]
     if isinstance(problem, LargeProblem):
-        own = problem.common.enrich(problem.space, found.parts)
-        space, shapes = own.space, own.vectors
+        enriched = problem.common.enrich(problem.space, found.parts)
+        space, shapes = enriched.space, enriched.vectors
     else:
-        modes = solve_modes(problem.model)
+        modes = modes_of(problem.model)
         shapes = modes.shapes[:, np.argsort(~modes.rigid, kind="stable")]
         space = nominal_space(problem.model, modes, problem.data.measurement.sensors, hypotheses)
-    state = state_at(replace(problem, space=space), space.projections, found.state.x)
+    own = replace(problem, space=space)
+    state = state_at(own, space.projections, found.state.x, every=True)
     root = la.cholesky(found.covariance, lower=True) if hypotheses else np.zeros((0, 0))
     return Outlook(state, np.asarray(root), points.rows(problem.model) @ shapes)

@@ -12,6 +12,7 @@ from femubench.core.display import Shown, modes_line
 from femubench.core.fem.alteration import Alteration, alter_model
 from femubench.core.fem.frame import GroundSpring, Place, PointMass
 from femubench.core.fem.model import Model
+from femubench.core.modal.eigen import DENSE_LIMIT, once_for
 from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray
@@ -49,14 +50,20 @@ class Modification:
         return (*own, *(support.at for support in self.alteration.supports))
 
     def modify(self, model: Model) -> Model:
-        """Return a model with the change.
+        """Return a model with the change, of a small model the same one every time.
 
         Raises:
             ModelError: when something lies off the structure, or is not there to be taken away.
             NotApplicable: where members are to be taken of matrices.
         """
-        attached = model.attach(self.masses, self.springs)
-        return alter_model(attached, self.alteration) if self.alteration else attached
+
+        def make() -> tuple[Modification, Model]:
+            attached = model.attach(self.masses, self.springs)
+            return self, alter_model(attached, self.alteration) if self.alteration else attached
+
+        # A small one is kept with all that follows from it, and this object with its number.
+        few = model.size <= DENSE_LIMIT
+        return (once_for(model, ("with", id(self)), make) if few else make())[1]
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import product
 
 import numpy as np
@@ -236,33 +236,32 @@ def _offered(
     model: Model, effects: Iterable[Effect], damage: float
 ) -> list[tuple[Hypothesis, bool]]:
     """Return every effect at every place, and whether it holds what is known to hang free."""
-    known = tuple(effects)
-    # Kept with the effects, so that no other one has their addresses meanwhile.
-    key = "hypotheses", damage, *map(id, known)
-    return once_for(model, key, lambda: (known, _hypotheses(model, known, damage)))[1]
-
-
-def _hypotheses(
-    model: Model, effects: Iterable[Effect], damage: float
-) -> list[tuple[Hypothesis, bool]]:
-    found = []
+    found: list[tuple[Hypothesis, bool]] = []
     for effect in effects:
-        each = {p: tuple(effect.parameters(model, p)) for p in dict.fromkeys(effect.places(model))}
-        if damage:  # what is true of the whole is a matter of the material, or of the weather
-            parts = [p for p in each if p != "all"]
-            each |= {p: tuple(parameter_of(q).widen(damage) for q in each[p]) for p in parts}
-        # A rod has no bending stiffness by which a rotational spring could be measured.
-        places = {p: own for p, own in each.items() if all(one.scale > 0.0 for one in own)}
-        own = [
-            Hypothesis(effect, place_change(effect, model, p, own), len(places))
-            for p, own in places.items()
-        ]
-        held = [model.free and _holds(model, one) for one in own]
-        count = held.count(False)
-        found += [
-            (replace(one, places=count or len(own)), h) for one, h in zip(own, held, strict=True)
-        ]
+        # Kept with the effect, so that no other one has its address meanwhile.
+        make = partial(_placed, model, effect, damage)
+        found += once_for(model, ("hypotheses", damage, id(effect)), make)[1]
     return found
+
+
+def _placed(
+    model: Model, effect: Effect, damage: float
+) -> tuple[Effect, list[tuple[Hypothesis, bool]]]:
+    """Return an effect with its hypotheses, each with whether it holds what hangs free."""
+    each = {p: tuple(effect.parameters(model, p)) for p in dict.fromkeys(effect.places(model))}
+    if damage:  # what is true of the whole is a matter of the material, or of the weather
+        parts = [p for p in each if p != "all"]
+        each |= {p: tuple(parameter_of(q).widen(damage) for q in each[p]) for p in parts}
+    # A rod has no bending stiffness by which a rotational spring could be measured.
+    places = {p: own for p, own in each.items() if all(one.scale > 0.0 for one in own)}
+    own = [
+        Hypothesis(effect, place_change(effect, model, p, own), len(places))
+        for p, own in places.items()
+    ]
+    held = [model.free and _holds(model, one) for one in own]
+    count = held.count(False)
+    pairs = zip(own, held, strict=True)
+    return effect, [(replace(one, places=count or len(own)), h) for one, h in pairs]
 
 
 def _holds(model: Model, hypothesis: Hypothesis) -> bool:

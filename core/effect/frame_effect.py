@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 from femubench.core.change.parameter import Parameter
@@ -66,12 +66,21 @@ class FrameEffect(Effect):
         return None
 
     def extend(self, model: Model, place: str, values: Sequence[float]) -> Model:
-        """Return the model with the effect in it.
+        """Return the model with the effect in it."""
+        structure = model.structure
+        if structure is None:
+            return self.extend_matrices(model, place, values)
+        return Model.of(structure.rebuilt(self.frame(structure.frame, place, values)))
+
+    @property
+    def writes(self) -> Callable[[Frame, str, Sequence[float]], Frame] | None:
+        """Return what writes the effect into a frame, where `extend` does no more; else None."""
+        return self.frame if type(self).extend is FrameEffect.extend else None
+
+    def extend_matrices(self, model: Model, place: str, values: Sequence[float]) -> Model:
+        """Return a model that came as matrices with the effect in it.
 
         Raises:
-            NotApplicable: when the model came as matrices.
+            NotApplicable: here, where it needs a frame.
         """
-        if model.structure is None:
-            raise NotApplicable(f"{self.name} needs a frame, not a pair of matrices")
-        structure = model.structure
-        return Model.of(structure.rebuilt(self.frame(structure.frame, place, values)))
+        raise NotApplicable(f"{self.name} needs a frame, not a pair of matrices")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,6 +12,7 @@ import scipy.sparse as sp
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 AT_ONCE = 4096  # elements whose dense matrices are held at a time, 5 MB each kind
+_KEPT_ENTRIES = 20_000  # of a pattern, up to which its plan is kept
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,25 @@ def plan_assembly(gather: SparseArray, order: int) -> AssemblyPlan:
         gather: sparse, (n_elements * order, n).
         order: local dofs of an element.
     """
-    g, size = sp.csr_array(gather), gather.shape[1]
+    g = sp.csr_array(gather)
+    if g.nnz > _KEPT_ENTRIES or {g.indices.dtype, g.indptr.dtype} != {np.dtype(np.int32)}:
+        return _planned(g, order)
+    # Frames that are meshed anew with other numbers in them mostly have the same pattern.
+    bare = _known_plan(g.shape, g.indices.tobytes(), g.indptr.tobytes(), order)
+    return replace(bare, weights=g.data)
+
+
+@lru_cache(maxsize=32)
+def _known_plan(shape: tuple[int, int], indices: bytes, bounds: bytes, order: int) -> AssemblyPlan:
+    """Return the plan of a pattern, whatever the entries of `gather` are."""
+    pattern = np.frombuffer(indices, np.int32), np.frombuffer(bounds, np.int32)
+    one = np.ones(len(pattern[0]), dtype=np.int8)
+    return _planned(sp.csr_array((one, *pattern), shape=shape), order)
+
+
+def _planned(g: SparseArray, order: int) -> AssemblyPlan:
+    """Return the plan for elements whose local displacements are `g @ free dofs`."""
+    size = g.shape[1]
     batches = tuple(_batches(g, order))
     rows, columns = _pair_side(batches, 0), _pair_side(batches, 1)
     turned = _by_column(rows, columns, size)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from graphlib import CycleError, TopologicalSorter
 
 import numpy as np
@@ -55,6 +56,15 @@ def linkage(
         ModelError: for a joint that is not there, one that follows two others in one motion, or
             links that go round in a circle.
     """
+    # A frame that is meshed anew with something else changed has the same links.
+    return _linkage(tuple(links), tuple(names), np.asarray(xyz, float).tobytes(), active.tobytes())
+
+
+@lru_cache(maxsize=8)
+def _linkage(
+    links: tuple[Link, ...], names: tuple[str, ...], points: bytes, moves: bytes
+) -> Linkage:
+    xyz, active = np.frombuffer(points).reshape(-1, 3), np.frombuffer(moves, dtype=bool)
     index = {name: i for i, name in enumerate(names)}
     leader = np.full((len(names), 6), -1)
     for link in links:

@@ -15,8 +15,8 @@ import scipy.sparse as sp
 from femubench.core.errors import ModelError
 from femubench.core.fem.assembly import AssemblyPlan, narrow_indices, plan_assembly
 from femubench.core.fem.beam import BeamProperties
-from femubench.core.fem.frame import Frame, GroundSpring, PointMass
-from femubench.core.fem.kinematics import Kinematics, point_rows, spring_rows
+from femubench.core.fem.frame import Frame, GroundSpring, Place, PointMass
+from femubench.core.fem.kinematics import Kinematics, point_block, spring_rows
 from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.mesh import Mesh
 from femubench.core.fem.parameters import Property
@@ -33,6 +33,13 @@ def _same(one: object, other: object, rounding: float) -> bool:
     if one.shape != other.shape:
         return False
     return bool((np.abs(one - other) <= rounding * np.abs(one)).all())
+
+
+def _gram(rows: SparseArray, each: FloatArray) -> SparseArray:
+    """Return rows' diag(each) rows, sparse."""
+    rows = sp.csr_array(rows)
+    pull = rows.data * np.repeat(each, np.diff(rows.indptr))
+    return sp.csc_array(rows.T @ sp.csr_array((pull, rows.indices, rows.indptr), shape=rows.shape))
 
 
 def _positions(labels: Sequence[str]) -> dict[str, IntArray]:
@@ -227,24 +234,38 @@ class MeshedFrame:
         if masses:
             # In a plane a mass acts in the directions of the plane, and in no other.
             moves = self.active_local[:3]
-            arms = [sp.csr_array(rigid_arm(np.array(item.offset))[:3][moves]) for item in masses]
-            points = [point_rows(self.frame, self.mesh, self.properties, m.at) for m in masses]
-            pairs = zip(arms, points, strict=True)
-            rows = sp.vstack([arm @ point for arm, point in pairs]) @ self.kinematics.transform
-            each = np.repeat([item.mass for item in masses], np.count_nonzero(moves))
-            mass = sp.csc_array(rows.T @ (sp.diags_array(each) @ rows))
+            arms = [rigid_arm(np.array(item.offset))[:3][moves] for item in masses]
+            rows = self._rows_at([item.at for item in masses], arms)
+            mass = _gram(rows, np.repeat([m.mass for m in masses], np.count_nonzero(moves)))
         if springs:
-            rows = self._ground_rows(springs)
-            each = np.array([spring.stiffness for spring in springs])
-            stiffness = sp.csc_array(rows.T @ (sp.diags_array(each) @ rows))
+            each = np.array([spring.stiffness for spring in springs], dtype=float)
+            stiffness = _gram(self._ground_rows(springs), each)
         return mass, stiffness
 
     def _ground_rows(self, springs: Sequence[GroundSpring]) -> SparseArray:
         """Return the elongation of springs to ground from free dofs, sparse (n_springs, n)."""
-        points = [point_rows(self.frame, self.mesh, self.properties, s.at) for s in springs]
         each = [DIRECTIONS.index(spring.direction.lstrip("+-")) for spring in springs]
-        rows = [point[row : row + 1] for point, row in zip(points, each, strict=True)]
-        return sp.csr_array(sp.vstack(rows)) @ self.kinematics.transform
+        return self._rows_at([spring.at for spring in springs], np.eye(6)[each][:, None])
+
+    def _rows_at(
+        self, places: Sequence[Place], taken: Sequence[FloatArray] | FloatArray
+    ) -> SparseArray:
+        """Return motions of points from free dofs, sparse (n, n_dofs).
+
+        Arguments:
+            places: of the points.
+            taken: of each, what is taken of its displacement and rotation, (p, 6).
+        """
+        values, columns, counts = [], [], []
+        for at, own in zip(places, taken, strict=True):
+            block, moved = point_block(self.frame, self.mesh, self.properties, at)
+            values.append((own @ block).ravel())
+            columns.append(np.tile(moved, len(own)))
+            counts += [len(moved)] * len(own)
+        entries = np.concatenate(values), np.concatenate(columns), np.cumsum([0, *counts])
+        rows = sp.csr_array(entries, shape=(len(counts), self.kinematics.transform.shape[0]))
+        rows.eliminate_zeros()
+        return rows @ self.kinematics.transform
 
     def loose(self, motion: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
         """Return the combinations of motions that no support or spring to ground sees, (n, f).

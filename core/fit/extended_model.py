@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from femubench.core.errors import FemubenchError, ModelError
+from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
 from femubench.core.fit.modal_fit import Fit, Problem, fit, signed_hz
 from femubench.core.fit.projection import Projection
@@ -25,25 +26,31 @@ def extend_model(model: Model, parts: Sequence[Projection], x: FloatArray) -> Mo
     Raises:
         ModelError: when an effect gives something else.
     """
-    start = 0
+    start, structure = 0, model.structure
+    waiting: Frame | None = None  # meshed once for all that is written into it one after the other
     for part in parts:
         h = part.hypothesis
-        values = h.values(x[None, start : start + len(h.parameters)])[0]
+        own = h.values(x[None, start : start + len(h.parameters)])[0]
         start += len(h.parameters)
         # A stiffness that hardly gives costs digits alone.
-        found = h.effect.extend(
-            model,
-            h.place,
-            [
-                np.inf if p.scaling == "compliance" and v > _RIGID * p.scale else float(v)
-                for p, v in zip(h.parameters, values, strict=True)
-            ],
-        )
+        values = [
+            np.inf if p.scaling == "compliance" and v > _RIGID * p.scale else float(v)
+            for p, v in zip(h.parameters, own, strict=True)
+        ]
+        write = getattr(h.effect, "writes", None)
+        if structure is not None and write is not None:
+            waiting = write(structure.frame if waiting is None else waiting, h.place, values)
+            continue
+        if structure is not None and waiting is not None:
+            model, waiting = Model.of(structure.rebuilt(waiting)), None
+        found = h.effect.extend(model, h.place, values)
         if not isinstance(found, Model):
             what = f"effect {h.effect.name!r} gave {type(found).__name__}"
             raise ModelError(f"{what}, expected femubench.Model")
-        model = found
-    return model
+        model, structure = found, found.structure
+    if structure is None or waiting is None:
+        return model
+    return Model.of(structure.rebuilt(waiting))
 
 
 def raw_residual(problem: Problem, model: Model) -> FloatArray:

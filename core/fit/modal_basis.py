@@ -8,7 +8,7 @@ this is exact.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.linalg as la
@@ -23,6 +23,11 @@ from femubench.core.fit.projection import Projection, Projector
 from femubench.core.modal.eigen import Modes
 from femubench.core.typing import BoolArray, FloatArray, IntArray
 
+_HIGH = 4.0  # of the highest eigenvalue that is asked for, from where on modes only follow
+_AT = (0.07, 0.5, 0.93)  # of it, where the higher modes follow exactly: Chebyshev's points
+_WORTH = 0.7  # of all coordinates, above which fewer are no gain
+_LIES_IN = 1e-9  # relative length below which a motion lies in the span of the others
+
 
 @dataclass(frozen=True)
 class Space:
@@ -34,6 +39,7 @@ class Space:
         projections: the hypotheses.
         mass: of the structure in kg.
         rigid: number of coordinates that are rigid-body motions.
+        condensed: what `condense` has found.
     """
 
     eigenvalues: FloatArray
@@ -41,6 +47,9 @@ class Space:
     projections: tuple[Projection, ...]
     mass: float
     rigid: int
+    condensed: dict[tuple[int, ...], Condensed] = field(
+        default_factory=dict, compare=False, repr=False
+    )
 
     def __len__(self) -> int:
         return len(self.eigenvalues)
@@ -123,8 +132,48 @@ class Space:
         more = size - self.readings.shape[1]
         return np.pad(self.readings, ((0, 0), (0, more))) if more else self.readings
 
+    def condense(self, parts: Sequence[Projection], count: int) -> Condensed:
+        """Return fewer coordinates in which the lowest modes with some hypotheses are as here.
+
+        In a mode of eigenvalue lambda the high coordinates are (lambda - Lambda)^-1 rows' g,
+        whatever the size of the hypotheses, so that this at three lambdas spans what they do.
+
+        Arguments:
+            parts: the hypotheses.
+            count: number of modes that are asked for.
+
+        Source: Grimme (1997), rational Krylov methods, for the span.
+        """
+        key = count, *map(id, parts)
+        if key not in self.condensed:
+            self.condensed[key] = self._condensed(tuple(parts), count)
+        return self.condensed[key]
+
+    def _condensed(self, parts: tuple[Projection, ...], count: int) -> Condensed:
+        n, values = len(self), self.eigenvalues
+        everything = Condensed(parts, self, parts, None)
+        if count >= n or not values[count - 1] > 0.0:
+            return everything
+        top = float(values[count - 1])
+        low = int(np.searchsorted(values, _HIGH * top))
+        local = [part.rows[:, low:n] for part in parts if not part.whole]
+        # What acts on each coordinate by itself, such as all of Young's modulus, moves no other.
+        if not all(part.apart for part in parts if part.whole) or not local:
+            return everything
+        pulls, high = _range(np.concatenate(local).T), values[low:, None]
+        if low + len(_AT) * pulls.shape[1] > _WORTH * n:
+            return everything
+        left = _range(np.hstack([pulls / (high - share * top) for share in _AT]))
+        inner, turn = la.eigh(left.T @ (high * left), check_finite=False)
+        left = left @ turn
+        readings = np.hstack([self.readings[:, :low], self.readings[:, low:] @ left])
+        space = Space(np.append(values[:low], inner), readings, (), self.mass, self.rigid)
+        return Condensed(parts, space, tuple(p.follow(low, left) for p in parts), left)
+
     def rebase(self, parts: Sequence[Projection], x: FloatArray) -> Space:
         """Return the modal coordinates of the model with some hypotheses in it."""
+        if not parts:
+            return self
         stiffness, mass, weight = self.assemble(parts, x)
         values, turn = solve_pencil(stiffness, mass)
         readings = self.pad_readings(len(stiffness)) @ turn
@@ -141,6 +190,40 @@ class Space:
         small = float(np.abs(values[self.rigid : self.rigid + 1]).sum()) * 1e-8
         rigid = int((np.abs(values[: self.rigid]) <= small).sum())
         return Space(values, readings, tuple(projections), weight, rigid)
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """Coordinates in which some hypotheses do to the lowest modes what they do in all.
+
+    Arguments:
+        given: the hypotheses in all coordinates.
+        space: the coordinates.
+        parts: the hypotheses in them.
+        follow: the high ones of all coordinates from the last ones of these, (h, r); None where
+            these are all coordinates.
+    """
+
+    given: tuple[Projection, ...]
+    space: Space
+    parts: tuple[Projection, ...]
+    follow: FloatArray | None
+
+    def expand(self, vectors: FloatArray) -> FloatArray:
+        """Return vectors in all coordinates, those that hypotheses add behind them."""
+        if self.follow is None:
+            return vectors
+        n, r = len(self.space), self.follow.shape[1]
+        parts = vectors[: n - r], self.follow @ vectors[n - r : n], vectors[n:]
+        return np.concatenate(parts)
+
+
+def _range(columns: FloatArray) -> FloatArray:
+    """Return orthonormal vectors that span some, whatever their lengths, (n, r)."""
+    size = np.linalg.norm(columns, axis=0)
+    kept = columns[:, size > 0.0] / size[size > 0.0]
+    left, size, _ = la.svd(kept, full_matrices=False, check_finite=False)
+    return np.asarray(left[:, size > _LIES_IN * size.max(initial=0.0)])
 
 
 def place_parts(size: int, parts: Sequence[Projection]) -> list[tuple[Projection, IntArray, slice]]:

@@ -22,6 +22,7 @@ from femubench.core.typing import FloatArray, IntArray
 
 _STEPS = 12
 _SETTLED = 2e-2  # of chi-square plus prior: a hundredth of a nat
+_SPARE = 8  # modes beyond twice the measured ones
 _LONGEST = 1.5  # prior deviations a step
 # Two modes closer than this share of an eigenvalue turn into each other at the least change; a
 # linear rule has no more to say there.
@@ -49,6 +50,11 @@ class Problem:
     offset: FloatArray | float = 0.0
     kept: dict[object, Any] = field(default_factory=dict, compare=False, repr=False)
 
+    @property
+    def compared(self) -> int:
+        """Return how many of the lowest modes are compared with the measured ones."""
+        return self.space.rigid + 2 * len(self.data.measurement) + _SPARE
+
 
 @dataclass(frozen=True)
 class State:
@@ -58,7 +64,8 @@ class State:
         problem: data and modal coordinates.
         parts: the hypotheses; none for the model as it is.
         x: coordinates, (k,).
-        eigenvalues, vectors: all modes in the coordinates of the space.
+        eigenvalues, vectors: modes in the coordinates of the space, (q,) and (N, q): the lowest
+            ones, and above them what follows the hypotheses.
         partner: of every measured mode, (m,).
         mass: total mass in kg.
         raw: residuals in standard deviations of the measurement, (n_data,).
@@ -161,16 +168,29 @@ def signed_hz(eigenvalues: FloatArray) -> FloatArray:
     return np.asarray(np.copysign(np.sqrt(np.abs(eigenvalues)), eigenvalues) / (2.0 * np.pi))
 
 
-def state_at(problem: Problem, parts: Sequence[Projection], x: FloatArray) -> State:
+def state_at(
+    problem: Problem, parts: Sequence[Projection], x: FloatArray, *, every: bool = False
+) -> State:
     """Return the prediction of some hypotheses at given coordinates.
+
+    Arguments:
+        problem, parts, x: as in `State`.
+        every: return every mode, for what is not measured and not moved by the hypotheses.
 
     Raises:
         ModelError: when they make the mass indefinite.
     """
-    stiffness, mass, weight = problem.space.assemble(parts, x)
-    values, vectors = solve_pencil(stiffness, mass)
     data = problem.data
-    count = min(len(values), problem.space.rigid + 2 * len(data.measurement) + 8)
+    if parts:
+        few = problem.space.condense(parts, len(problem.space) if every else problem.compared)
+        stiffness, mass, weight = few.space.assemble(few.parts, x)
+        values, vectors = solve_pencil(stiffness, mass)
+        vectors = few.expand(vectors)
+    else:
+        order = np.argsort(problem.space.eigenvalues, kind="stable")
+        values, vectors = problem.space.eigenvalues[order], np.eye(len(order))[:, order]
+        weight = problem.space.mass
+    count = min(len(values), problem.compared)
     seen = problem.space.pad_readings(len(vectors)) @ vectors[:, :count]
     hertz = signed_hz(values[:count])
     for group, turn in data.turns(hertz, seen, problem.space.zero) if data.closeness else ():
@@ -185,7 +205,7 @@ def _predicted(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the frequencies and readings of enough modes, (1, q) and (1, n_sensors, q)."""
     space, data = problem.space, problem.data
-    count = min(len(values), space.rigid + 2 * len(data.measurement) + 8)
+    count = min(len(values), problem.compared)
     seen = space.pad_readings(len(vectors)) @ vectors[:, :count]
     return data.predict(signed_hz(values[None, :count]), seen[None], space.zero)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy.linalg as la
 
 from femubench.core.change.hypothesis import Hypothesis
 from femubench.core.change.terms import (
@@ -21,6 +22,7 @@ from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 _MANY = 4  # elements to one kind, from which on these are taken together
 _EQUAL = 1e-9  # of the largest factor
+_APART = 1e-7  # the same of what couples coordinates
 _AT_ONCE = 512  # elements whose forces are held at once
 
 
@@ -79,6 +81,26 @@ class Projection:
         rows, own = self.rows.copy(), slice(first, first + len(turn))
         rows[:, own] = rows[:, own] @ turn
         return replace(self, rows=rows, whole=False)
+
+    @cached_property
+    def apart(self) -> bool:
+        """Tell whether each coordinate is acted on by itself, where the rows are the coordinates.
+
+        As by Young's modulus, or the density, of everything.
+        """
+        if not self.whole or self.extra:
+            return False
+        own = np.einsum("tii->ti", self.cores)
+        rest = np.abs(self.cores).sum(axis=2) - np.abs(own)
+        return bool((rest <= _APART * np.abs(own).max(axis=1, initial=0.0)[:, None]).all())
+
+    def follow(self, low: int, left: FloatArray) -> Projection:
+        """Return the same where the coordinates from one on move as others say, (h, r)."""
+        n, r = low + len(left), self.rows
+        if not self.whole:
+            return replace(self, rows=np.hstack([r[:, :low], r[:, low:n] @ left, r[:, n:]]))
+        rows = la.block_diag(np.eye(low), left)
+        return replace(self, rows=np.eye(rows.shape[1]), cores=rows.T @ self.cores @ rows)
 
     def restrict(self, kept: IntArray) -> Projection:
         """Return the same in some of the coordinates."""

@@ -89,12 +89,12 @@ class Explanation:
         trust = self.fit.state.problem.noise.trust
         return self.log_prior + trust * self.fit.log_evidence
 
-    @property
+    @cached_property
     def searched(self) -> Key:
         """Return the slugs of the causes, sorted."""
         return tuple(sorted(part.hypothesis.name for part in self.parts))
 
-    @property
+    @cached_property
     def effects(self) -> frozenset[str]:
         """Return the slugs of all that is in the model, textbook or fitted."""
         return frozenset({*self.base.names, *self.searched})
@@ -189,11 +189,15 @@ class Posterior:
         return tuple(sorted({*explanation.searched, *physics}))
 
     @cached_property
+    def keys(self) -> tuple[Key, ...]:
+        """Return the name of every explanation."""
+        return tuple(map(self.key, self.explanations))
+
+    @cached_property
     def names(self) -> dict[Key, float]:
         """Return the probability of every name, most probable first."""
         totals: dict[Key, float] = {}
-        for e, p in zip(self.explanations, self.probabilities, strict=True):
-            key = self.key(e)
+        for key, p in zip(self.keys, self.probabilities, strict=True):
             totals[key] = totals.get(key, 0.0) + p
         return {key: totals[key] for key in by_probability(totals)}
 
@@ -222,5 +226,5 @@ class Posterior:
 
     def members(self, key: Key) -> list[tuple[Explanation, float]]:
         """Return the explanations of that name with their probabilities."""
-        pairs = zip(self.explanations, self.probabilities, strict=True)
-        return [(e, p) for e, p in pairs if self.key(e) == key]
+        rows = zip(self.explanations, self.probabilities, self.keys, strict=True)
+        return [(e, p) for e, p, own in rows if own == key]

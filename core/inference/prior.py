@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 from math import factorial, log
 
@@ -25,12 +26,12 @@ class Base:
     parts: tuple[Projection, ...]
     log_prior: float
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Return the slugs."""
         return tuple(part.hypothesis.name for part in self.parts)
 
-    @property
+    @cached_property
     def x(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
         """Return the textbook coordinates, (k,)."""
         found = [part.hypothesis.textbook for part in self.parts]

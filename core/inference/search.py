@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,19 +14,18 @@ from femubench.core.change.hypothesis import (
     finer,
     hypotheses_of,
 )
-from femubench.core.errors import ModelError
 from femubench.core.fit.extended_model import check_joint_fit, extend_model
 from femubench.core.fit.modal_fit import Fit, Problem, State, fit, log_evidence, state_at
 from femubench.core.fit.projection import Projection
 from femubench.core.fit.static_response import Basis, LargeProblem, enrich_problem, place_data
 from femubench.core.inference.effort import Effort, of_a_search
-from femubench.core.inference.grid_search import Screened, likely, screen
+from femubench.core.inference.grid_search import Screened, likely, residuals_at, screen
 from femubench.core.inference.posterior import Explanation, by_weight
 from femubench.core.inference.prior import Base, selection_cost, textbook_bases
 from femubench.core.inference.screening import rebase_problem, screen_hypotheses, with_shortlist
 from femubench.core.inference.settings import settings
 from femubench.core.roles import Effect
-from femubench.core.ties import in_order
+from femubench.core.ties import in_order, least
 from femubench.core.typing import FloatArray
 
 
@@ -394,16 +392,18 @@ def _fit_from_grid(
     """Return the fit of causes one of which is new, from the best point of its grid."""
     first = sum(len(part.hypothesis.parameters) for part in parts[:new])
     last = first + len(known.parts[new].hypothesis.parameters)
-    x = known.state.x
+    before, _, after = np.split(known.state.x, [first, last])
     own, parts = enrich_problem(problem, parts)
-    starts = [np.concatenate([x[:first], point, x[last:]]) for point in parts[new].hypothesis.grid]
-    states = []
-    for start in starts:
-        with suppress(ModelError):
-            states.append(state_at(own, parts, start))
-    if not states:
+    there = replace(own.space, projections=(parts[new],))
+    # The others stay as they are: in the modes with them in it one hypothesis is tried alone.
+    there = there.rebase((*parts[:new], *parts[new + 1 :]), np.append(before, after))
+    few = there.condense(there.projections, own.compared)
+    grid = parts[new].hypothesis.grid
+    grid, raw = residuals_at(replace(own, space=few.space), few.parts[0], grid)
+    if not len(grid):
         return None
-    found = fit(own, parts, in_order(states, lambda state: state.cost)[0].x)
+    cost = np.square(own.noise.residual(raw + own.offset)).sum(axis=1) + np.square(grid).sum(axis=1)
+    found = fit(own, parts, np.concatenate([before, grid[least(cost)], after]))
     return found if found is None or isinstance(own, LargeProblem) else check_joint_fit(found)
 
 

@@ -24,6 +24,7 @@ from femubench.core.modal.sparse_eigen import lowest_eigenpairs
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 DENSE_LIMIT = 500
+_FEW_FROM, _FEW_SHARE = 250, 6  # dofs, and dofs a mode, above which a few modes are solved alone
 _MANY = 20  # modes of a large model, where nobody says how many
 _RIGID_SHARE = 0.9
 _ROUNDOFF = 32.0 * np.finfo(float).eps
@@ -200,12 +201,17 @@ def solve_modes(model: Model, count: int | None = None) -> Modes:
         >>> print(femubench.solve_modes(model).elastic.natural_frequencies[:3].round(1))
         [255.8 277.7 581.3]
     """
+    return _solved(model, count, model.size > DENSE_LIMIT)
+
+
+def _solved(model: Model, count: int | None, sparsely: bool) -> Modes:
+    """Return what `solve_modes` does, a small model solved as a large one where that is asked."""
     wanted = _MANY if count is None else count
-    lowest = _lowest_known(model).get(_LOWEST) if model.size > DENSE_LIMIT else None
+    lowest = _lowest_known(model).get(_LOWEST) if sparsely else None
     if lowest is not None and lowest.count >= wanted:
         return lowest.first(wanted)
     count_evaluation()
-    if model.size <= DENSE_LIMIT:
+    if not sparsely:
         mass, stiffness = dense_matrices(model)
         if not (np.isfinite(mass).all() and np.isfinite(stiffness).all()):
             raise ModelError("a matrix has entries that are not finite")
@@ -319,15 +325,17 @@ def modes_of(model: Model, count: int | None = None) -> Modes:
     Raises:
         ModelError: when the model has no modes.
     """
-    if model.size <= DENSE_LIMIT:
+    small = model.size <= DENSE_LIMIT
+    few = count is not None and model.size > max(_FEW_FROM, _FEW_SHARE * count)
+    if small and not (few and "modes" not in _kept.get(model, {})):
         modes = once_for(model, "modes", lambda: solve_modes(model))
         return modes if count is None else modes.take(np.arange(min(count, len(modes))))
     wanted = _MANY if count is None else count
-    modes = solve_modes(model, wanted)
+    modes = _solved(model, wanted, sparsely=True)
     lowest = _lowest_known(model)
     if _LOWEST not in lowest or lowest[_LOWEST].count < wanted:
         lowest[_LOWEST] = _Lowest(wanted, modes)
-    return modes
+    return modes.take(np.arange(min(wanted, len(modes)))) if small else modes
 
 
 @cache_by_model

@@ -52,11 +52,9 @@ class AddedMass(FrameEffect):
         mass = PointMass(point_of(frame, place), values[0])
         return replace(frame, masses=(*frame.masses, mass))
 
-    def extend(self, model: Model, place: str, values: Sequence[float]) -> Model:
-        """Return the model with the mass in it; matrices will do."""
-        if model.structure is None:
-            return model.attach([PointMass(point_in(model, place), values[0])], [])
-        return super().extend(model, place, values)
+    def extend_matrices(self, model: Model, place: str, values: Sequence[float]) -> Model:
+        """Return the model with the mass in it."""
+        return model.attach([PointMass(point_in(model, place), values[0])], [])
 
     def change(self, model: Model, place: str) -> Change:
         """Return the mass matrix of 1 kg at the point."""

@@ -55,12 +55,10 @@ class GroundingSpring(FrameEffect):
         at, direction = find_directed_point(frame, place)
         return replace(frame, springs=(*frame.springs, GroundSpring(at, direction, values[0])))
 
-    def extend(self, model: Model, place: str, values: Sequence[float]) -> Model:
-        """Return the model with the spring in it; matrices will do."""
-        if model.structure is None:
-            at, direction = find_directed_point(model, place)
-            return model.attach([], [GroundSpring(at, direction, values[0])])
-        return super().extend(model, place, values)
+    def extend_matrices(self, model: Model, place: str, values: Sequence[float]) -> Model:
+        """Return the model with the spring in it."""
+        at, direction = find_directed_point(model, place)
+        return model.attach([], [GroundSpring(at, direction, values[0])])
 
     def change(self, model: Model, place: str) -> Change:
         """Return the stiffness matrix of 1 N/m."""

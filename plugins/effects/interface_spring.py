@@ -63,12 +63,10 @@ class InterfaceSpring(FrameEffect):
         )
         return replace(frame, braces=(*frame.braces, *found))
 
-    def extend(self, model: Model, place: str, values: Sequence[float]) -> Model:
-        """Return the model with the springs in it; matrices will do."""
-        if model.structure is None:
-            rows = _rows(model, place)
-            return replace(model, stiffness=model.stiffness + values[0] * (rows.T @ rows))
-        return super().extend(model, place, values)
+    def extend_matrices(self, model: Model, place: str, values: Sequence[float]) -> Model:
+        """Return the model with the springs in it."""
+        rows = _rows(model, place)
+        return replace(model, stiffness=model.stiffness + values[0] * (rows.T @ rows))
 
     def change(self, model: Model, place: str) -> Change:
         """Return the stiffness matrix of springs of 1 N/m."""

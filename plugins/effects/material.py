@@ -82,10 +82,8 @@ class MaterialEffect(FrameEffect):
         value = getattr(member.material, self.constant) * factor
         return replace(member, material=replace(member.material, **{self.constant: value}))
 
-    def extend(self, model: Model, place: str, values: Sequence[float]) -> Model:
-        """Return the model with the change; matrices without a frame are scaled as they are."""
-        if model.structure is not None:
-            return super().extend(model, place, values)
+    def extend_matrices(self, model: Model, place: str, values: Sequence[float]) -> Model:
+        """Return the model with its matrices scaled as they are."""
         quantity = "E" if self.constant == "E" else "density"
         return with_group_factors(model, [Property(place, quantity, (place,))], [1.0 + values[0]])
 
