@@ -106,7 +106,9 @@ def _places(value: object) -> tuple[str, ...]:
 
 
 Share = Annotated[bool | float, PlainValidator(_share)]
-Quantity = Literal["EA", "EI", "GJ", "E", "rhoA", "rhoJp", "density", "shear", "rotary"]
+Quantity = Literal[
+    "EA", "EI", "GJ", "bending ry", "bending rz", "E", "rhoA", "rhoJp", "density", "shear", "rotary"
+]  # fmt: skip
 
 
 class FactorSpec(TomlTable):

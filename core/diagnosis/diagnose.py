@@ -10,6 +10,7 @@ import numpy as np
 
 from femubench.core.advise.advice import advise
 from femubench.core.case.case import Case
+from femubench.core.diagnosis.budget import budget_of
 from femubench.core.diagnosis.faults import correct_case, fault_causes, with_faults
 from femubench.core.diagnosis.proof import (
     Unseen,
@@ -131,6 +132,11 @@ def diagnose(
             differs = None if states is None else states.differs
             decision = decide(posterior, leader, proof.test, differs)
             found = _written(repaired, inquiry, decision, proof, looks, begin)
+        # With a reference both states have what the drawing lacks.
+        budget = budget_of(repaired, registered) if states is None else None
+        if budget is not None:
+            lines, hidden = budget.lines, budget.hidden_percent
+            found = replace(found, budget=lines, budget_modes=budget.modes, hidden_percent=hidden)
     left_out = list_left_out(repaired.model, known, reference)
     notes = (*case.notes, *found.notes, *notes_left_out(left_out), *_conditions(effort))
     return replace(found, states=states, left_out=left_out, notes=notes)

@@ -101,7 +101,7 @@ def sentence_of(
         sure = f" (probability {percent(decision.nothing)})" if decision.nothing > 0.5 else ""
         if not (reference or beam):
             off = f"The model is {gain.used_percent[0]:.2g} % off in the used modes (rms)"
-            return f"{off}, and no defect shows beyond what models of its kind get wrong{sure}."
+            return f"{off}, and no hidden defect shows beyond what drawings of its kind lack{sure}."
         return f"The data show {nothing}{sure}."
     if decision.verdict == "named":
         lacks = _DIFFERS if reference else _LACKS

@@ -1,0 +1,352 @@
+"""What a drawing gets wrong of the structure that it stands for: a budget of its frequency errors.
+
+The handbook says what it knows. Then all that drawings of real structures lack is fitted at once to
+the used modes, each with the room that the drawing leaves it. A joint zone may be stiffer or softer
+about every axis, with the drawing in the middle: the arm of half a depth, a wall that gives and a
+gusset are one net number, for data cannot tell them apart. Modulus, density and masses have little
+room, for they take what is not theirs. What the data do not see stays as drawn.
+
+Source: Tarantola (2005), section 3.2, the most probable point of an iterated linear-Gaussian model;
+Shapley (1953) for shares: the mean of what a class does alone and of what is lost without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Literal, cast
+
+import numpy as np
+
+from femubench.core.case.case import Case
+from femubench.core.change.change import Change, proportional
+from femubench.core.change.hypothesis import Hypothesis
+from femubench.core.change.parameter import Parameter
+from femubench.core.change.terms import ElementOperator, Term
+from femubench.core.effect.attachments import mass_term
+from femubench.core.effect.textbook import textbook_values
+from femubench.core.fem.beam import BEND_XY, BEND_XZ, TWIST, mass_matrices, stiffness_matrices
+from femubench.core.fem.frame import ACTIVE, Factor, Frame, Place, PointMass
+from femubench.core.fem.joints import half_depth, joint_groups
+from femubench.core.fem.model import Model
+from femubench.core.fem.structure import Structure
+from femubench.core.fit.mesh_error import mesh_bias
+from femubench.core.fit.modal_fit import Problem, State, fit, state_at
+from femubench.core.fit.noise import Noise
+from femubench.core.fit.projection import Projection
+from femubench.core.fit.residuals import Data
+from femubench.core.fit.static_response import (
+    Basis,
+    LargeProblem,
+    enrich_problem,
+    place_data,
+)
+from femubench.core.inference.settings import settings
+from femubench.core.modal.eigen import zero_tolerance
+from femubench.core.modal.measurement import Measurement
+from femubench.core.roles import Effect, Scaling
+from femubench.core.schema.diagnosis import BudgetLine, BudgetMode
+from femubench.core.typing import FloatArray, IntArray
+
+# Of every axis of a joint zone the displacements of an element, and what a factor multiplies.
+_AXES = {"rx": (TWIST, "GJ"), "ry": (BEND_XZ, "bending ry"), "rz": (BEND_XY, "bending rz")}
+Source = Literal["handbook", "data", "drawing"]
+_Parts = Sequence[Projection]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One number that a drawing leaves open.
+
+    Arguments:
+        place, kind: of the line of the budget that it belongs to.
+        change: what it does, and its prior.
+        quantity, at: the factor of a frame that does the same; without a quantity, masses at
+            joints.
+    """
+
+    place: str
+    kind: str
+    change: Change
+    quantity: str
+    at: tuple[str, ...]
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        """Return it as what a fit takes."""
+        change = replace(self.change, name=self.kind, places=(self.place,))
+        return Hypothesis(cast(Effect, SimpleNamespace(name=self.kind)), change, 1)
+
+    def put_in(self, frame: Frame, x: float) -> Frame:
+        """Return a frame with it at a coordinate."""
+        value = float(self.hypothesis.values(np.array([[x]]))[0, 0])
+        if not value:
+            return frame
+        if self.quantity:
+            return replace(
+                frame, factors=(*frame.factors, Factor(self.quantity, self.at, 1.0 + value))
+            )
+        masses = tuple(PointMass(Place(joint=name), value) for name in self.at)
+        return replace(frame, masses=(*frame.masses, *masses))
+
+
+@dataclass(frozen=True)
+class Budget:
+    """A budget of errors, and the model that it leads to.
+
+    Arguments:
+        lines: by place and class, largest first.
+        modes: those of the measurement.
+        extended: the drawing with the handbook, and with all that the data see.
+        state: of `extended`, on all measured modes; its parts are all that the drawing leaves open.
+        covariance: of their coordinates, (k, k).
+    """
+
+    lines: tuple[BudgetLine, ...]
+    modes: tuple[BudgetMode, ...]
+    extended: Model
+    state: State
+    covariance: FloatArray
+
+    @property
+    def hidden_percent(self) -> float:
+        """Return the rms change of the frequencies below which no defect shows next to it."""
+        left = [mode.left_percent for mode in self.modes if mode.used]
+        least = float(np.sqrt(np.mean(np.square(left))))
+        return settings.visible_deviations * max(least, 100.0 * settings.budget_rest[0])
+
+
+def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
+    """Return what the drawing of a case lacks; None for a model that came as matrices.
+
+    Arguments:
+        case: only its used modes are fitted; the others are predicted.
+        effects: whose handbook values come first.
+
+    Raises:
+        NotApplicable: when a frequency has no standard deviation.
+        ModelError: when the model has no modes.
+    """
+    model, every = case.model, case.measurement
+    if model.structure is None:
+        return None
+    lines, start = [], _as_it_is(model, every)
+    last = drawn = log_frequencies(start)
+    for effect in effects:
+        for place, values in textbook_values(effect, model).items():
+            model = cast(Model, effect.extend(model, place, values))
+            start = _as_it_is(model, every)
+            now = log_frequencies(start)
+            std = settings.budget_handbook * np.abs(now - last)
+            lines.append(_line(place, effect.name, now - last, np.outer(std, std), "handbook"))
+            last = now
+    entries = list_entries(model)
+    hypotheses = [entry.hypothesis for entry in entries]
+    problem, parts = _pose(model, every.select(case.used), hypotheses, every)
+    whole = fit(problem, parts, np.zeros(len(parts)))
+    if whole is None:
+        return None
+    seen = np.flatnonzero(1.0 - whole.covariance.diagonal() >= settings.budget_seen)
+    x, covariance = np.zeros(len(parts)), whole.covariance
+    kept = [parts[int(i)] for i in seen]
+    again = fit(problem, kept, whole.state.x[seen])
+    x[seen] = whole.state.x[seen] if again is None else again.state.x
+    wide, places = _pose(model, every, hypotheses, every)
+
+    def at(own: FloatArray) -> FloatArray:
+        return log_frequencies(state_at(wide, places, own))
+
+    state = state_at(wide, places, x)
+    slopes, found = frequency_slopes(state), log_frequencies(state)
+    lines += _share_out(entries, x, at, slopes, covariance, set(seen.tolist()))
+    deviation = np.sqrt(np.einsum("mk,kl,ml->m", slopes, covariance, slopes))
+    measured = np.log(every.frequencies)
+    figures = 100.0 * np.column_stack([measured - drawn, measured - found, deviation])
+    numbers = zip(every.numbers, figures.tolist(), strict=True)
+    modes = tuple(BudgetMode(number, number in case.used, *row) for number, row in numbers)
+    frame = model.frame_structure.frame
+    for entry, own in zip(entries, x, strict=True):
+        frame = entry.put_in(frame, float(own))
+    extended = Model.of(model.frame_structure.rebuilt(frame))
+    lines.sort(key=lambda line: -abs(line.rms_percent))
+    return Budget(tuple(lines), modes, extended, state, covariance)
+
+
+def list_entries(model: Model) -> list[Entry]:
+    """Return all that the drawing of a frame leaves open: joint zones, E, density, masses."""
+    structure = model.frame_structure
+    frame = structure.frame
+    stiff, heavy = (f(structure.properties) for f in (stiffness_matrices, mass_matrices))
+    found = []
+    for (place, role), ends in _ends_of_joints(frame).items():
+        rows = np.unique(np.concatenate([_zone(structure, end) for end in ends]))
+        labels = tuple(structure.labels[row] for row in rows)
+        std = settings.budget_joints[role == "through"]
+        for axis in (axis for axis in ACTIVE[frame.plane] if axis in _AXES):
+            own, quantity = _AXES[axis]
+            index = slice(None), own[:, None], own
+            blocks = np.zeros((len(rows), 12, 12))
+            blocks[index] = stiff[rows][index]
+            if np.abs(blocks).max():
+                term = Term("stiffness", ElementOperator(structure, rows, blocks))
+                name = axis if role == "end" else f"{role} {axis}"
+                change = _open(term, name, std, scaling="factor")
+                found.append(Entry(place, "joint stiffness", change, quantity, labels))
+    every, known = np.arange(len(structure.properties)), settings.budget_known
+    for quantity, term, std in (
+        ("E", Term("stiffness", ElementOperator(structure, every, stiff)), known[0]),
+        (
+            "density",
+            Term("mass", ElementOperator(structure, every, heavy)),
+            known[1],
+        ),
+    ):
+        change = _open(term, quantity, std, scaling="factor")
+        found.append(Entry("all", quantity, change, quantity, ("all",)))
+    kinds: dict[str, list[str]] = {}
+    for joint in frame.joints:
+        kinds.setdefault(joint.type or joint.name, []).append(joint.name)
+    for place, names in kinds.items():
+        term = mass_term(model, [Place(joint=name) for name in names])
+        std = known[2] * model.total_mass / np.sqrt(len(names))
+        change = _open(term, "mass", std, least=0.0)
+        found.append(Entry(place, "joint mass", change, "", tuple(names)))
+    return found
+
+
+def _open(
+    term: Term, name: str, std: float, *, scaling: Scaling = "linear", least: float = -0.95
+) -> Change:
+    """Return a change that grows with its value, which is as likely above the drawing as below."""
+    own = Parameter(name, "", std, lower=least, scaling=scaling, reach=settings.widest_coordinate)
+    return replace(proportional(term), parameters=(own,))
+
+
+def _ends_of_joints(frame: Frame) -> dict[tuple[str, str], list[str]]:
+    """Return ``member@joint`` by joint type and role; a foot is an end that is held alone."""
+    found = {(group.type, group.role): list(group.ends) for group in joint_groups(frame)}
+    held = {str(s.at) for s in frame.supports} | {str(s.at) for s in frame.springs}
+    for joint in frame.joints:
+        ends = frame.ends_at(joint.name)
+        if joint.name in held and len(ends) == 1:
+            own = found.setdefault((joint.type or joint.name, "foot"), [])
+            own.append(f"{next(iter(ends))}@{joint.name}")
+    return found
+
+
+def _zone(structure: Structure, end: str) -> IntArray:
+    """Return the elements of a joint at a member end, one at least, (k,).
+
+    They reach half the depth of what crosses, and once the own depth, from the centre of the joint.
+    """
+    frame, mesh = structure.frame, structure.mesh
+    name, _, joint = end.rpartition("@")
+    number = frame.member_index[name]
+    own = np.flatnonzero(mesh.member == number)
+    own = own[np.argsort(mesh.stations[own, 0])]
+    own = own[[bool(structure.labels[row]) for row in own]]
+    if structure.element_ends[end][1] == 1:
+        own = own[::-1]
+    section, length = frame.members[number].section, structure.properties.length[own]
+    crossing = half_depth(frame, end) if len(frame.ends_at(joint)) > 1 else 0.0
+    reach = crossing + max(section.height or 0.0, section.width or 0.0)
+    reach = min(reach, settings.budget_zone * float(length.sum()))
+    inside = np.cumsum(length) - 0.5 * length < reach
+    inside[0] = True
+    return np.asarray(own[inside])
+
+
+def _pose(
+    model: Model, measurement: Measurement, hypotheses: Sequence[Hypothesis], every: Measurement
+) -> tuple[Problem, _Parts]:
+    """Return some modes in the coordinates of a model, with what no class of a budget is as noise.
+
+    Arguments:
+        every: all measured modes, which the coordinates serve.
+    """
+    basis, bias = Basis.of(model, every), mesh_bias(model, 2 * len(every) + settings.spare_modes)
+    still = basis.modes.rigid | (basis.modes.eigenvalues <= zero_tolerance(basis.modes))
+    data = Data(measurement, np.zeros(0) if bias is None else bias, int(still.sum()))
+    mode, _ = data.shape_rows
+    largest = np.abs(data.shapes).max(axis=0, initial=0.0)
+    rest_f, rest_s = settings.budget_rest
+    rest = np.zeros(len(data))
+    rest[: len(measurement)] = rest_f * measurement.frequencies
+    rest[len(measurement) :][: len(mode)] = rest_s * largest[mode]
+    noise = Noise(np.diag(np.hypot(1.0, rest / data.std)))
+    problem = place_data(basis, data, noise, hypotheses)
+    if isinstance(problem, LargeProblem):
+        return enrich_problem(problem, [problem.common.projector(h) for h in hypotheses])
+    return problem, problem.space.projections
+
+
+def _as_it_is(model: Model, every: Measurement) -> State:
+    return state_at(_pose(model, every, (), every)[0], (), np.zeros(0))
+
+
+def log_frequencies(state: State) -> FloatArray:
+    """Return ln of the frequency of the partner of every measured mode, (m,)."""
+    hertz, _ = state.predicted
+    return np.asarray(np.log(np.abs(hertz[0, state.partner])))
+
+
+def frequency_slopes(state: State) -> FloatArray:
+    """Return d ln f / d x of the partner of every measured mode, (m, k)."""
+    values, near = state.eigenvalues[state.partner], state.vectors[:, state.partner]
+    forces, _ = state.problem.space.forces(state.parts, state.x, near, values)
+    return np.asarray(np.einsum("nm,nmk->mk", near, forces) / (2.0 * values[:, None]))
+
+
+def _share_out(
+    entries: Sequence[Entry],
+    x: FloatArray,
+    at: Callable[[FloatArray], FloatArray],
+    slopes: FloatArray,
+    covariance: FloatArray,
+    seen: set[int],
+) -> list[BudgetLine]:
+    """Return the lines of what was fitted, which add up to all that it changes.
+
+    Arguments:
+        at: from coordinates to ln of the frequencies.
+    """
+    lines: dict[tuple[str, str], list[int]] = {}
+    for i, entry in enumerate(entries):
+        lines.setdefault((entry.place, entry.kind), []).append(i)
+    first, last = at(np.zeros(len(x))), at(x)
+    shares = []
+    for own in lines.values():
+        alone, without = np.zeros(len(x)), x.copy()
+        alone[own], without[own] = x[own], 0.0
+        shares.append(0.5 * (at(alone) - first + last - at(without)))
+    total = np.abs(shares).sum(axis=0)
+    weight = np.abs(shares) / np.where(total > 0.0, total, 1.0)
+    shares = list(shares + weight * (last - first - np.sum(shares, axis=0)))
+    found = []
+    for ((place, kind), own), share in zip(lines.items(), shares, strict=True):
+        spread = slopes[:, own] @ covariance[np.ix_(own, own)] @ slopes[:, own].T
+        names = {entries[i].change.parameters[0].name: i in seen for i in own}
+        unseen = tuple(name for name, sees in names.items() if not sees)
+        source: Source = "data" if len(unseen) < len(own) else "drawing"
+        found.append(_line(place, kind, share, spread, source, unseen))
+    return found
+
+
+def _line(
+    place: str,
+    kind: str,
+    share: FloatArray,
+    covariance: FloatArray,
+    source: Source,
+    unseen: tuple[str, ...] = (),
+) -> BudgetLine:
+    """Return a line from its share in ln f of every mode, and the covariance of that."""
+    rms = float(np.sqrt(np.mean(np.square(share))))
+    std = np.sqrt(np.maximum(covariance.diagonal(), 0.0))
+    # Of the root mean square: along the share itself; of no share, that of one drawn at random.
+    along = share / np.sqrt(len(share)) / rms if rms > 0.0 else np.zeros(len(share))
+    spread = np.sqrt(along @ covariance @ along / len(share)) if rms else np.sqrt(np.mean(std**2))
+    rms = -rms if share.sum() < 0.0 else rms
+    percent = tuple((100.0 * share).tolist()), tuple((100.0 * std).tolist())
+    return BudgetLine(place, kind, *percent, 100.0 * rms, 100.0 * float(spread), source, unseen)

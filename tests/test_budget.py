@@ -1,0 +1,123 @@
+"""The budget of what a drawing lacks: its lines, its model, what it does not see."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from femubench.core.case.case import Case
+from femubench.core.diagnosis.budget import (
+    Budget,
+    budget_of,
+    frequency_slopes,
+    list_entries,
+    log_frequencies,
+)
+from femubench.core.fem.model import Model
+from femubench.core.fit.modal_fit import state_at
+from femubench.core.library.cases import cases
+from femubench.core.modal.eigen import modes_of
+from femubench.core.plugin.loader import list_effects
+from femubench.reports.diagnosis_words import as_drawn, budget
+
+STD = 1e-3
+
+
+def measured_as(case: Case, model: Model) -> Case:
+    """Return a case whose measurement is what a model gives, without noise."""
+    old = case.measurement
+    modes = modes_of(model, 2 * len(old) + 8).elastic
+    chosen = modes.take(np.arange(len(old)))
+    shapes = np.asarray(model.observe(old.sensors) @ chosen.shapes)
+    largest = np.abs(shapes).max(axis=0)
+    frequencies = chosen.natural_frequencies
+    fresh = replace(
+        old,
+        frequencies=frequencies,
+        frequency_std=STD * frequencies,
+        shapes=shapes / largest,
+        shape_std=np.full_like(shapes, 0.01),
+        total_mass=None,
+    )
+    return replace(case, measurement=fresh)
+
+
+@pytest.fixture(scope="module")
+def drawn() -> Case:
+    return cases["suite/h-tube"]
+
+
+@pytest.fixture(scope="module")
+def real(drawn: Case) -> Budget:
+    found = budget_of(drawn, list_effects())
+    assert found is not None
+    return found
+
+
+def test_a_soft_joint_is_found_with_its_sign_at_its_type(drawn: Case) -> None:
+    entries = {(e.place, e.change.parameters[0].name): e for e in list_entries(drawn.model)}
+    structure = drawn.model.frame_structure
+    softer = entries["tee", "branch ry"].put_in(structure.frame, -1.2)
+    found = budget_of(measured_as(drawn, Model.of(structure.rebuilt(softer))), [])
+    assert found is not None
+    top, *others = found.lines
+    error = np.array([mode.error_percent for mode in found.modes])
+    assert (top.place, top.name, top.source) == ("tee", "joint stiffness", "data")
+    assert np.linalg.norm(np.array(top.percent) - error) < 0.15 * np.linalg.norm(error)
+    assert all(abs(line.rms_percent) < 0.1 * abs(top.rms_percent) for line in others)
+    # Not all of the prior's pull is overcome.
+    left = np.array([mode.left_percent for mode in found.modes])
+    assert np.linalg.norm(left) < 0.15 * np.linalg.norm(error)
+
+
+def test_lines_add_up_and_the_extended_model_gives_what_the_fit_does(real: Budget) -> None:
+    total = sum(np.array(line.percent) for line in real.lines)
+    left = np.array([mode.left_percent for mode in real.modes])
+    error = np.array([mode.error_percent for mode in real.modes])
+    np.testing.assert_allclose(total + left, error, atol=1e-9)
+    assert {line.source for line in real.lines} == {"handbook", "data", "drawing"}
+    solved = modes_of(real.extended, 20).elastic.natural_frequencies
+    fitted = np.sort(real.state.frequencies)
+    np.testing.assert_allclose(solved[:7], fitted[fitted > 1.0][:7], rtol=1e-6)
+
+
+def test_what_the_modes_do_not_see_stays_as_drawn_with_all_its_room(real: Budget) -> None:
+    names = [p.hypothesis.parameters[0].name for p in real.state.parts]
+    blind = names.index("through rx")
+    assert real.state.x[blind] == 0.0
+    assert real.covariance[blind, blind] > 0.9
+    (tee,) = [line for line in real.lines if (line.place, line.name) == ("tee", "joint stiffness")]
+    assert tee.unseen == ("through rx",)
+
+
+def test_slopes_are_those_of_the_frequencies(real: Budget) -> None:
+    state, step = real.state, 1e-4
+    slopes = frequency_slopes(state)
+    for i in range(len(state.x)):
+        moved = [state.x + sign * step * np.eye(len(state.x))[i] for sign in (1.0, -1.0)]
+        more, less = (log_frequencies(state_at(state.problem, state.parts, x)) for x in moved)
+        np.testing.assert_allclose(slopes[:, i], (more - less) / (2.0 * step), atol=2e-6)
+
+
+def test_there_is_no_budget_of_matrices(drawn: Case) -> None:
+    bare = replace(drawn.model, structure=None)
+    assert budget_of(replace(drawn, model=bare), []) is None
+
+
+def test_the_words_say_how_far_off_why_and_what_is_left() -> None:
+    line = {"class": "joint stiffness", "place": "tee", "rms_percent": -3.0, "rms_std": 0.5}
+    vague = {"class": "E", "place": "all", "rms_percent": 0.0, "rms_std": 1.0}
+    used = {"mode": 1, "used": True, "error_percent": -3.0, "left_percent": 0.5, "std_percent": 0.5}
+    other = {**used, "mode": 2, "used": False, "error_percent": 6.0, "std_percent": 9.0}
+    data = {"budget": [line, vague], "budget_modes": [used, other], "hidden_percent": 3.0}
+    assert budget(data) == (
+        "The drawing is off by 3 % in the used modes and 6 % in the others (rms). It lacks joint "
+        "stiffness at tee (-3.00 ± 0.50 %). This leaves 0.5 % in the used modes and 0.5 % in the "
+        "others. Mode 2 is predicted to ± 9 % only. Next to that no defect shows that moves "
+        "frequencies by less than 3 %."
+    )
+    (said,) = as_drawn(data["budget"], 0.1)
+    assert said == "As drawn, for these modes do not say otherwise: E everywhere ± 1 %."
+    assert as_drawn([line], 0.1) == []
