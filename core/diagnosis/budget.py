@@ -7,12 +7,12 @@ gusset are one net number, for data cannot tell them apart. Modulus, density and
 room, for they take what is not theirs. What the data do not see stays as drawn.
 
 Source: Tarantola (2005), section 3.2, the most probable point of an iterated linear-Gaussian model;
-Shapley (1953) for shares: the mean of what a class does alone and of what is lost without it.
+Aumann & Shapley (1974) for the shares of what is fitted together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Literal, cast
@@ -153,13 +153,9 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
     again = fit(problem, kept, whole.state.x[seen])
     x[seen] = whole.state.x[seen] if again is None else again.state.x
     wide, places = _pose(model, every, hypotheses, every)
-
-    def at(own: FloatArray) -> FloatArray:
-        return log_frequencies(state_at(wide, places, own))
-
     state = state_at(wide, places, x)
     slopes, found = frequency_slopes(state), log_frequencies(state)
-    lines += _share_out(entries, x, at, slopes, covariance, set(seen.tolist()))
+    lines += _share_out(entries, state, covariance, set(seen.tolist()))
     deviation = np.sqrt(np.einsum("mk,kl,ml->m", slopes, covariance, slopes))
     measured = np.log(every.frequencies)
     figures = 100.0 * np.column_stack([measured - drawn, measured - found, deviation])
@@ -299,37 +295,30 @@ def frequency_slopes(state: State) -> FloatArray:
 
 
 def _share_out(
-    entries: Sequence[Entry],
-    x: FloatArray,
-    at: Callable[[FloatArray], FloatArray],
-    slopes: FloatArray,
-    covariance: FloatArray,
-    seen: set[int],
+    entries: Sequence[Entry], state: State, covariance: FloatArray, seen: set[int]
 ) -> list[BudgetLine]:
     """Return the lines of what was fitted, which add up to all that it changes.
 
-    Arguments:
-        at: from coordinates to ln of the frequencies.
+    Each entry has the integral of its slope on the straight way from the drawing (Aumann & Shapley
+    1974), by Simpson's rule; what that misses goes to the lines by their size.
     """
+    x, problem, parts = state.x, state.problem, state.parts
+    way = [state_at(problem, parts, t * x) for t in (0.0, 0.5)] + [state]
+    first, middle, slopes = map(frequency_slopes, way)
+    each = (first + 4.0 * middle + slopes) / 6.0 * x
+    missing = log_frequencies(state) - log_frequencies(way[0]) - each.sum(axis=1)
+    total = np.abs(each).sum(axis=1)
+    each += np.abs(each) * (missing / np.where(total > 0.0, total, 1.0))[:, None]
     lines: dict[tuple[str, str], list[int]] = {}
     for i, entry in enumerate(entries):
         lines.setdefault((entry.place, entry.kind), []).append(i)
-    first, last = at(np.zeros(len(x))), at(x)
-    shares = []
-    for own in lines.values():
-        alone, without = np.zeros(len(x)), x.copy()
-        alone[own], without[own] = x[own], 0.0
-        shares.append(0.5 * (at(alone) - first + last - at(without)))
-    total = np.abs(shares).sum(axis=0)
-    weight = np.abs(shares) / np.where(total > 0.0, total, 1.0)
-    shares = list(shares + weight * (last - first - np.sum(shares, axis=0)))
     found = []
-    for ((place, kind), own), share in zip(lines.items(), shares, strict=True):
+    for (place, kind), own in lines.items():
         spread = slopes[:, own] @ covariance[np.ix_(own, own)] @ slopes[:, own].T
         names = {entries[i].change.parameters[0].name: i in seen for i in own}
         unseen = tuple(name for name, sees in names.items() if not sees)
         source: Source = "data" if len(unseen) < len(own) else "drawing"
-        found.append(_line(place, kind, share, spread, source, unseen))
+        found.append(_line(place, kind, each[:, own].sum(axis=1), spread, source, unseen))
     return found
 
 
