@@ -14,13 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Literal, cast
 
 import numpy as np
 
 from femubench.core.case.case import Case
-from femubench.core.change.change import Change, proportional
+from femubench.core.change.change import Change
 from femubench.core.change.hypothesis import Hypothesis
 from femubench.core.change.parameter import Parameter
 from femubench.core.change.terms import ElementOperator, Term
@@ -45,11 +46,12 @@ from femubench.core.fit.static_response import (
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import zero_tolerance
 from femubench.core.modal.measurement import Measurement
-from femubench.core.roles import Effect, Scaling
+from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import BudgetLine, BudgetMode
 from femubench.core.typing import FloatArray, IntArray
 
 # Of every axis of a joint zone the displacements of an element, and what a factor multiplies.
+_JOINTS = "joint stiffness"
 _AXES = {"rx": (TWIST, "GJ"), "ry": (BEND_XZ, "bending ry"), "rz": (BEND_XY, "bending rz")}
 Source = Literal["handbook", "data", "drawing"]
 _Parts = Sequence[Projection]
@@ -57,38 +59,48 @@ _Parts = Sequence[Projection]
 
 @dataclass(frozen=True)
 class Entry:
-    """One number that a drawing leaves open.
+    """What a drawing leaves open of one class at one place: some numbers with a common prior.
 
     Arguments:
         place, kind: of the line of the budget that it belongs to.
-        change: what it does, and its prior.
-        quantity, at: the factor of a frame that does the same; without a quantity, masses at
-            joints.
+        names: of the numbers, (q,).
+        terms: what each changes.
+        root: of their prior covariance, of ln(factor) or in kg, (q, q).
+        quantities: the factor of a frame that each is; of masses none.
+        at: elements with these factors, ``all``, or joints with the mass.
     """
 
     place: str
     kind: str
-    change: Change
-    quantity: str
+    names: tuple[str, ...]
+    terms: tuple[Term, ...]
+    root: FloatArray
+    quantities: tuple[str, ...]
     at: tuple[str, ...]
+
+    def grow(self, x: FloatArray) -> FloatArray:
+        """Return the factors of the terms at coordinates, (g, q) both."""
+        moved = x @ self.root.T
+        return np.asarray(np.expm1(moved) if self.quantities else moved)
 
     @property
     def hypothesis(self) -> Hypothesis:
-        """Return it as what a fit takes."""
-        change = replace(self.change, name=self.kind, places=(self.place,))
+        """Return it as what a fit takes; a mass cannot be negative."""
+        lower = -np.inf if self.quantities else 0.0
+        reach = settings.widest_coordinate
+        own = tuple(Parameter(n, "", 1.0, lower=lower, reach=reach) for n in self.names)
+        change = Change(self.terms, self.grow, name=self.kind, places=(self.place,), parameters=own)
         return Hypothesis(cast(Effect, SimpleNamespace(name=self.kind)), change, 1)
 
-    def put_in(self, frame: Frame, x: float) -> Frame:
-        """Return a frame with it at a coordinate."""
-        value = float(self.hypothesis.values(np.array([[x]]))[0, 0])
-        if not value:
-            return frame
-        if self.quantity:
-            return replace(
-                frame, factors=(*frame.factors, Factor(self.quantity, self.at, 1.0 + value))
-            )
-        masses = tuple(PointMass(Place(joint=name), value) for name in self.at)
-        return replace(frame, masses=(*frame.masses, *masses))
+    def list_seen(self, covariance: FloatArray) -> list[bool]:
+        """Tell of which numbers the data take away enough of the prior variance.
+
+        Arguments:
+            covariance: of the coordinates by data and prior, (q, q).
+        """
+        left = np.einsum("qk,kl,ql->q", self.root, covariance, self.root)
+        prior = np.square(self.root).sum(axis=1)
+        return [bool(share >= settings.budget_seen) for share in 1.0 - left / prior]
 
 
 @dataclass(frozen=True)
@@ -131,42 +143,72 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
     model, every = case.model, case.measurement
     if model.structure is None:
         return None
-    lines, start = [], _as_it_is(model, every)
-    last = drawn = log_frequencies(start)
+    start = _as_it_is(model, every)
+    last, drawn = log_frequencies(start), np.log(np.abs(start.frequencies[start.partner]))
+    lines = [_line("all", "mesh", last - drawn, np.zeros((len(every),) * 2), "handbook")]
     for effect in effects:
         for place, values in textbook_values(effect, model).items():
             model = cast(Model, effect.extend(model, place, values))
-            start = _as_it_is(model, every)
-            now = log_frequencies(start)
+            now = log_frequencies(_as_it_is(model, every))
             std = settings.budget_handbook * np.abs(now - last)
             lines.append(_line(place, effect.name, now - last, np.outer(std, std), "handbook"))
             last = now
     entries = list_entries(model)
     hypotheses = [entry.hypothesis for entry in entries]
     problem, parts = _pose(model, every.select(case.used), hypotheses, every)
-    whole = fit(problem, parts, np.zeros(len(parts)))
+    whole = fit(problem, parts, np.zeros(sum(len(entry.names) for entry in entries)))
     if whole is None:
         return None
-    seen = np.flatnonzero(1.0 - whole.covariance.diagonal() >= settings.budget_seen)
-    x, covariance = np.zeros(len(parts)), whole.covariance
-    kept = [parts[int(i)] for i in seen]
-    again = fit(problem, kept, whole.state.x[seen])
-    x[seen] = whole.state.x[seen] if again is None else again.state.x
+    x, covariance = whole.state.x, whole.covariance
     wide, places = _pose(model, every, hypotheses, every)
     state = state_at(wide, places, x)
     slopes, found = frequency_slopes(state), log_frequencies(state)
-    lines += _share_out(entries, state, covariance, set(seen.tolist()))
+    lines += _share_out(entries, state, covariance)
     deviation = np.sqrt(np.einsum("mk,kl,ml->m", slopes, covariance, slopes))
     measured = np.log(every.frequencies)
     figures = 100.0 * np.column_stack([measured - drawn, measured - found, deviation])
     numbers = zip(every.numbers, figures.tolist(), strict=True)
     modes = tuple(BudgetMode(number, number in case.used, *row) for number, row in numbers)
-    frame = model.frame_structure.frame
-    for entry, own in zip(entries, x, strict=True):
-        frame = entry.put_in(frame, float(own))
+    frame = extend_frame(model.frame_structure.frame, entries, x)
     extended = Model.of(model.frame_structure.rebuilt(frame))
     lines.sort(key=lambda line: -abs(line.rms_percent))
     return Budget(tuple(lines), modes, extended, state, covariance)
+
+
+def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame:
+    """Return a frame with some entries at coordinates, (k,), as factors and masses.
+
+    Changes of the matrices add up, as in the fit, where factors of a frame multiply.
+    """
+    everywhere: dict[str, float] = {}
+    zones: dict[tuple[str, str], float] = {}
+    masses = []
+    for entry, own in zip(entries, _split(entries), strict=True):
+        values = entry.grow(x[None, own])[0].tolist()
+        for quantity, value in zip(entry.quantities, values, strict=False):
+            if entry.kind != _JOINTS:
+                everywhere[quantity] = value
+            else:
+                for label in entry.at:
+                    zones[quantity, label] = zones.get((quantity, label), 0.0) + value
+        if not entry.quantities:
+            masses += [PointMass(Place(joint=name), values[0]) for name in entry.at if values[0]]
+    stiffer = 1.0 + everywhere.get("E", 0.0)
+    twisted = stiffer + everywhere.get("GJ", 0.0)
+    factors = [
+        Factor("E", ("all",), stiffer),
+        Factor("GJ", ("all",), twisted / stiffer),
+        Factor("density", ("all",), 1.0 + everywhere.get("density", 0.0)),
+    ]
+    alike: dict[tuple[str, float], list[str]] = {}
+    for (quantity, label), value in zones.items():
+        whole = twisted if quantity == "GJ" else stiffer
+        alike.setdefault((quantity, max(1.0 + value / whole, settings.quiet_share)), []).append(
+            label
+        )
+    factors += [Factor(name, tuple(labels), factor) for (name, factor), labels in alike.items()]
+    wanted = tuple(factor for factor in factors if factor.factor != 1.0)
+    return replace(frame, factors=(*frame.factors, *wanted), masses=(*frame.masses, *masses))
 
 
 def list_entries(model: Model) -> list[Entry]:
@@ -174,49 +216,62 @@ def list_entries(model: Model) -> list[Entry]:
     structure = model.frame_structure
     frame = structure.frame
     stiff, heavy = (f(structure.properties) for f in (stiffness_matrices, mass_matrices))
-    found = []
+    found, (ending, passing, correlation) = [], settings.budget_joints
     for (place, role), ends in _ends_of_joints(frame).items():
         rows = np.unique(np.concatenate([_zone(structure, end) for end in ends]))
         labels = tuple(structure.labels[row] for row in rows)
-        std = settings.budget_joints[role == "through"]
+        terms = {}
         for axis in (axis for axis in ACTIVE[frame.plane] if axis in _AXES):
-            own, quantity = _AXES[axis]
+            own = _AXES[axis][0]
             index = slice(None), own[:, None], own
             blocks = np.zeros((len(rows), 12, 12))
             blocks[index] = stiff[rows][index]
             if np.abs(blocks).max():
-                term = Term("stiffness", ElementOperator(structure, rows, blocks))
-                name = axis if role == "end" else f"{role} {axis}"
-                change = _open(term, name, std, scaling="factor")
-                found.append(Entry(place, "joint stiffness", change, quantity, labels))
-    every, known = np.arange(len(structure.properties)), settings.budget_known
-    for quantity, term, std in (
-        ("E", Term("stiffness", ElementOperator(structure, every, stiff)), known[0]),
-        (
-            "density",
-            Term("mass", ElementOperator(structure, every, heavy)),
-            known[1],
-        ),
+                terms[axis] = Term("stiffness", ElementOperator(structure, rows, blocks))
+        if terms:
+            bends = np.array([axis != "rx" for axis in terms])
+            alike = np.where(np.outer(bends, bends), correlation, 0.0)
+            np.fill_diagonal(alike, 1.0)
+            root = (passing if role == "through" else ending) * np.linalg.cholesky(alike)
+            names = tuple(axis if role == "end" else f"{role} {axis}" for axis in terms)
+            factors = tuple(_AXES[axis][1] for axis in terms)
+            found.append(Entry(place, _JOINTS, names, tuple(terms.values()), root, factors, labels))
+    every = np.arange(len(structure.properties))
+    twist = np.zeros_like(stiff)
+    index = slice(None), TWIST[:, None], TWIST
+    twist[index] = stiff[index]
+    *wholes, mass = settings.budget_known
+    for quantity, matrix, blocks, std in (
+        ("E", "stiffness", stiff, wholes[0]),
+        ("GJ", "stiffness", twist, wholes[1]),
+        ("density", "mass", heavy, wholes[2]),
     ):
-        change = _open(term, quantity, std, scaling="factor")
-        found.append(Entry("all", quantity, change, quantity, ("all",)))
+        if blocks.any():
+            operator = ElementOperator(structure, every, blocks)
+            term = Term("mass" if matrix == "mass" else "stiffness", operator)
+            found.append(_alone("all", quantity, term, std, (quantity,), ("all",)))
     kinds: dict[str, list[str]] = {}
     for joint in frame.joints:
         kinds.setdefault(joint.type or joint.name, []).append(joint.name)
-    for place, names in kinds.items():
-        term = mass_term(model, [Place(joint=name) for name in names])
-        std = known[2] * model.total_mass / np.sqrt(len(names))
-        change = _open(term, "mass", std, least=0.0)
-        found.append(Entry(place, "joint mass", change, "", tuple(names)))
+    for place, alike_joints in kinds.items():
+        std = mass * model.total_mass / np.sqrt(len(alike_joints))
+        for name in alike_joints:
+            term = mass_term(model, [Place(joint=name)])
+            found.append(_alone(place, "joint mass", term, std, (), (name,)))
     return found
 
 
-def _open(
-    term: Term, name: str, std: float, *, scaling: Scaling = "linear", least: float = -0.95
-) -> Change:
-    """Return a change that grows with its value, which is as likely above the drawing as below."""
-    own = Parameter(name, "", std, lower=least, scaling=scaling, reach=settings.widest_coordinate)
-    return replace(proportional(term), parameters=(own,))
+def _alone(
+    place: str, kind: str, term: Term, std: float, quantities: tuple[str, ...], at: tuple[str, ...]
+) -> Entry:
+    """Return an entry of one number, in the name of what it is at."""
+    return Entry(place, kind, (*quantities, *at)[:1], (term,), np.array([[std]]), quantities, at)
+
+
+def _split(entries: Sequence[Entry]) -> list[slice]:
+    """Return which coordinates belong to each entry."""
+    ends = np.cumsum([0, *(len(entry.names) for entry in entries)]).tolist()
+    return [slice(start, end) for start, end in pairwise(ends)]
 
 
 def _ends_of_joints(frame: Frame) -> dict[tuple[str, str], list[str]]:
@@ -294,9 +349,7 @@ def frequency_slopes(state: State) -> FloatArray:
     return np.asarray(np.einsum("nm,nmk->mk", near, forces) / (2.0 * values[:, None]))
 
 
-def _share_out(
-    entries: Sequence[Entry], state: State, covariance: FloatArray, seen: set[int]
-) -> list[BudgetLine]:
+def _share_out(entries: Sequence[Entry], state: State, covariance: FloatArray) -> list[BudgetLine]:
     """Return the lines of what was fitted, which add up to all that it changes.
 
     Each entry has the integral of its slope on the straight way from the drawing (Aumann & Shapley
@@ -309,15 +362,20 @@ def _share_out(
     missing = log_frequencies(state) - log_frequencies(way[0]) - each.sum(axis=1)
     total = np.abs(each).sum(axis=1)
     each += np.abs(each) * (missing / np.where(total > 0.0, total, 1.0))[:, None]
-    lines: dict[tuple[str, str], list[int]] = {}
-    for i, entry in enumerate(entries):
-        lines.setdefault((entry.place, entry.kind), []).append(i)
+    lines: dict[tuple[str, str], list[tuple[Entry, slice]]] = {}
+    for entry, one in zip(entries, _split(entries), strict=True):
+        lines.setdefault((entry.place, entry.kind), []).append((entry, one))
     found = []
-    for (place, kind), own in lines.items():
+    for (place, kind), owners in lines.items():
+        own = np.concatenate([np.arange(len(x))[one] for _, one in owners])
         spread = slopes[:, own] @ covariance[np.ix_(own, own)] @ slopes[:, own].T
-        names = {entries[i].change.parameters[0].name: i in seen for i in own}
-        unseen = tuple(name for name, sees in names.items() if not sees)
-        source: Source = "data" if len(unseen) < len(own) else "drawing"
+        sees = {
+            name: seen
+            for entry, one in owners
+            for name, seen in zip(entry.names, entry.list_seen(covariance[one, one]), strict=True)
+        }
+        unseen = tuple(name for name, seen in sees.items() if not seen)
+        source: Source = "data" if len(unseen) < len(sees) else "drawing"
         found.append(_line(place, kind, each[:, own].sum(axis=1), spread, source, unseen))
     return found
 

@@ -29,6 +29,7 @@ T = TypeVar(
     tuple[float, ...],
     tuple[float, float],
     tuple[float, float, float],
+    tuple[float, float, float, float],
     tuple[int, int],
 )
 
@@ -188,18 +189,18 @@ class Settings:
     budget_handbook: float = _prior(
         0.1, "of what it changes", "shear coefficients and rotary inertia by handbooks are so sure"
     )
-    budget_joints: tuple[float, float] = _prior(
-        (0.7, 0.3),
-        "of ln(stiffness of the zone)",
-        "at ends it is rigid or gives like a wall; a member that passes goes on as it is",
+    budget_joints: tuple[float, float, float] = _prior(
+        (0.7, 0.3, 0.5),
+        "of ln(stiffness) of a zone that ends, that passes; correlation of two axes",
+        "an end is rigid or gives like a wall, what passes goes on, and bending is alike",
     )
     budget_zone: float = _prior(
         1.0 / 3.0, "of a member", "a joint reaches no farther, however deep what meets there"
     )
-    budget_known: tuple[float, float, float] = _prior(
-        (0.02, 0.01, 0.01),
-        "of E, of density, of the structure",
-        "masses at a type of joints likewise: all three are apt to take what is not theirs",
+    budget_known: tuple[float, float, float, float] = _prior(
+        (0.02, 0.05, 0.01, 0.01),
+        "of E, of GJ, of density, of the structure",
+        "masses at the joints of a type likewise: all of them are apt to take what is not theirs",
     )
     budget_rest: tuple[float, float] = _prior(
         (0.01, 0.03),
