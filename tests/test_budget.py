@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import femubench
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.budget import (
     Budget,
@@ -116,6 +118,20 @@ def test_a_zone_that_gives_about_one_axis_is_expected_to_give_about_the_other() 
 def test_there_is_no_budget_of_matrices(drawn: Case) -> None:
     bare = replace(drawn.model, structure=None)
     assert budget_of(replace(drawn, model=bare), []) is None
+
+
+@pytest.mark.slow(15)
+def test_the_model_is_written_provisionally_where_unseen_modes_bear_it_out(tmp_path: Path) -> None:
+    folder = tmp_path / "extended"
+    found = femubench.diagnose("suite/h-tube", pairs=False, output=folder)
+    assert found.verdict != "named"
+    assert found.provisional is not None
+    assert found.sentence.startswith("Provisional, ")
+    for before, after in (found.provisional.held_out_percent, found.provisional.modified_percent):
+        assert after < 0.5 * before
+    written = femubench.read_case(folder).model
+    one, other = (modes_of(m, 20).elastic.natural_frequencies for m in (written, found.extended))
+    np.testing.assert_allclose(one[:10], other[:10], rtol=1e-6)
 
 
 def test_the_words_say_how_far_off_why_and_what_is_left() -> None:

@@ -19,6 +19,7 @@ from types import SimpleNamespace
 from typing import Literal, cast
 
 import numpy as np
+from msgspec import structs
 
 from femubench.core.case.case import Case
 from femubench.core.change.change import Change
@@ -375,8 +376,9 @@ def _share_out(entries: Sequence[Entry], state: State, covariance: FloatArray) -
             for name, seen in zip(entry.names, entry.list_seen(covariance[one, one]), strict=True)
         }
         unseen = tuple(name for name, seen in sees.items() if not seen)
-        source: Source = "data" if len(unseen) < len(sees) else "drawing"
-        found.append(_line(place, kind, each[:, own].sum(axis=1), spread, source, unseen))
+        line = _line(place, kind, each[:, own].sum(axis=1), spread, "data", unseen)
+        moved = len(unseen) < len(sees) or abs(line.rms_percent) > line.rms_std
+        found.append(line if moved else structs.replace(line, source="drawing"))
     return found
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from femubench.core.advise.advice import advise
 from femubench.core.case.case import Case
-from femubench.core.diagnosis.budget import budget_of
+from femubench.core.diagnosis.budget import Budget, budget_of
 from femubench.core.diagnosis.faults import correct_case, fault_causes, with_faults
 from femubench.core.diagnosis.proof import (
     Unseen,
@@ -37,7 +37,7 @@ from femubench.core.diagnosis.tables import (
     smallest_visible,
 )
 from femubench.core.diagnosis.verdict import Decision, Sufficiency, decide, elsewhere
-from femubench.core.diagnosis.words import sentence_of
+from femubench.core.diagnosis.words import sentence_of, words_of_provisional
 from femubench.core.fem.model import Model
 from femubench.core.fit.extended_model import departure
 from femubench.core.fit.static_response import LargeProblem
@@ -135,11 +135,28 @@ def diagnose(
         # With a reference both states have what the drawing lacks.
         budget = budget_of(repaired, registered) if states is None else None
         if budget is not None:
-            lines, hidden = budget.lines, budget.hidden_percent
-            found = replace(found, budget=lines, budget_modes=budget.modes, hidden_percent=hidden)
+            found = _with_budget(repaired, found, budget)
     left_out = list_left_out(repaired.model, known, reference)
     notes = (*case.notes, *found.notes, *notes_left_out(left_out), *_conditions(effort))
     return replace(found, states=states, left_out=left_out, notes=notes)
+
+
+def _with_budget(case: Case, found: Diagnosis, budget: Budget) -> Diagnosis:
+    """Return a diagnosis with a budget, and with its model where no name stands alone.
+
+    That model is provisional: unseen data of every kind must be nearer to it than to the drawing.
+    """
+    lines, hidden = budget.lines, budget.hidden_percent
+    found = replace(found, budget=lines, budget_modes=budget.modes, hidden_percent=hidden)
+    if found.verdict == "named":
+        return found
+    before, after = (score_model(case, model) for model in (case.model, budget.extended))
+    gain = rms_gain_of(before, after, None)
+    unseen = [pair for pair in (gain.held_out_percent, gain.modified_percent) if pair is not None]
+    if not unseen or any(new >= old for old, new in unseen):
+        return found
+    said = f"{words_of_provisional(gain)} {found.sentence}"
+    return replace(found, provisional=gain, sentence=said, extended=budget.extended)
 
 
 def _expected(case: Case) -> dict[Kind, Number]:

@@ -151,6 +151,13 @@ def _either(options: Sequence[Sequence[Cause]], reference: bool) -> str:
     return f"{something}, and these data cannot tell which: {open_}."
 
 
+def words_of_provisional(gain: Gain) -> str:
+    """Return what a model gains that has all that its drawing lacks, while no name is sure."""
+    return f"Provisional, with all that the drawing lacks in the model{_gain(gain)}.".replace(
+        "model; ", "model: "
+    )
+
+
 def _gain(gain: Gain) -> str:
     if gain.change_percent is not None and gain.change_percent[0] > 0.0:
         change, left = gain.change_percent

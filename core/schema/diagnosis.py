@@ -387,6 +387,8 @@ class DiagnosisReport:
         budget: what the drawing lacks by place and class, largest first; empty with a reference
             and for a model from matrices.
         budget_modes: every measured mode in it.
+        provisional: rms before and after with all that the drawing lacks in the model, which is
+            then the extended one; None where a name stands alone or unseen data do not confirm it.
         hidden_percent: rms change of the frequencies below which no defect shows next to it.
     """
 
@@ -419,3 +421,4 @@ class DiagnosisReport:
     budget: tuple[BudgetLine, ...] = ()
     budget_modes: tuple[BudgetMode, ...] = ()
     hidden_percent: Number = math.nan
+    provisional: Gain | None = None
