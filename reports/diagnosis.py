@@ -13,6 +13,7 @@ from typing import Any
 from femubench import InputError
 from femubench.plot import (
     MOST_ROWS,
+    error_budget,
     evidence,
     residual_dots,
     residuals,
@@ -117,7 +118,7 @@ def _sections(data: Data, *, page: bool = False) -> list[Passage]:
     found = (
         Passage("", [said], area="first"),
         Passage("The two measurements", _states(data, page=page), area="first"),
-        Passage("What the drawing lacks", _budget(data), area="first"),
+        Passage("What the drawing lacks", _budget(data, page=page), area="first"),
         Passage(words.CAUSES.get(verdict, ""), [*_cards(data), *textbook], area="first"),
         Passage("", [Items(_tiles(data), look="tiles"), *_error(data)], area="first"),
         Passage("", [_map(data)] if page else [], area="aside"),
@@ -186,7 +187,7 @@ def _states(data: Data, *, page: bool) -> list[Block]:
     return [*([Row([Drawing("", _ARROWS, drawn)])] * page), table]
 
 
-def _budget(data: Data) -> list[Block]:
+def _budget(data: Data, *, page: bool) -> list[Block]:
     """Return what the drawing lacks, by class and mode."""
     modes = data.get("budget_modes") or []
     if not modes:
@@ -212,7 +213,12 @@ def _budget(data: Data) -> list[Block]:
         "In % of the frequencies (ln measured / predicted), mode by mode; + where the drawing is "
         "too soft or too heavy. Modes in brackets had no part in it: their lines are predictions."
     )
-    return [said, Table(columns, rows), *words.as_drawn(data["budget"], _NOTABLE)]
+    size = 3.4 + 0.34 * min(len(modes), MOST_ROWS), 3.6
+    title = "What the drawing lacks, mode by mode"
+    drawn = _drawn(partial(error_budget, data), "budget", title, _lead(data)[0], size)
+    table = Table(columns, rows, folded=f"The {len(modes)} modes in figures" * page)
+    drawing = [Row([Drawing("", said, drawn)]), table] if page else [said, table]
+    return [*drawing, *words.as_drawn(data["budget"], _NOTABLE)]
 
 
 def _cards(data: Data, *, faults: bool = False) -> list[Block]:

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 import femubench
+from femubench import plot
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.budget import (
     Budget,
+    advise_modes,
     budget_of,
     extend_frame,
     frequency_slopes,
     list_entries,
     log_frequencies,
 )
+from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
 from femubench.core.fit.modal_fit import state_at
 from femubench.core.inference.settings import settings
@@ -132,6 +136,42 @@ def test_the_model_is_written_provisionally_where_unseen_modes_bear_it_out(tmp_p
     written = femubench.read_case(folder).model
     one, other = (modes_of(m, 20).elastic.natural_frequencies for m in (written, found.extended))
     np.testing.assert_allclose(one[:10], other[:10], rtol=1e-6)
+
+
+def test_the_mode_that_says_most_of_what_is_open_is_advised_first(drawn: Case) -> None:
+    found = budget_of(drawn, list_effects())
+    assert found is not None
+    rows = advise_modes(found, drawn)
+    stds = {mode.mode: mode.std_percent for mode in found.modes if not mode.used}
+    loosest = max(stds, key=lambda number: stds[number])
+    (row,) = [row for row in rows if f"use mode {loosest} " in row.measurement]
+    rest = 100.0 * settings.budget_rest[0]
+    assert row.separation == pytest.approx((stds[loosest] / rest) ** 2)
+    assert [r.separation for r in rows] == sorted((r.separation for r in rows), reverse=True)
+    # A fit with it knows it.
+    more = replace(drawn, used=(*drawn.used, loosest), held_out=())
+    again = budget_of(more, list_effects())
+    assert again is not None
+    assert next(m for m in again.modes if m.mode == loosest).std_percent < 0.5 * stds[loosest]
+
+
+def test_the_drawing_of_a_budget_reaches_every_error(real: Budget) -> None:
+    lines = [structs.asdict(line) for line in real.lines]
+    rows = [{**line, "class": line.pop("name")} for line in lines]
+    modes = [asdict(mode) for mode in real.modes]
+    data = {"residuals": [], "locations": [], "causes": [], "budget": rows, "budget_modes": modes}
+    ax = plot.error_budget(data)
+    bars = [bar for group in ax.containers for bar in group]
+    tops: dict[float, float] = {}
+    for bar in bars:
+        at = round(bar.get_x() + 0.5 * bar.get_width(), 6)
+        tops[at] = tops.get(at, 0.0) + bar.get_height()
+    assert list(tops.values()) == pytest.approx([mode.error_percent for mode in real.modes])
+    assert [label.get_text() for label in ax.get_xticklabels()] == list("1234567")
+    apart = np.diff(sorted(tops))
+    assert apart.argmax() == sum(mode.used for mode in real.modes) - 1
+    with pytest.raises(InputError, match="no budget"):
+        plot.error_budget({**data, "budget_modes": []})
 
 
 def test_the_words_say_how_far_off_why_and_what_is_left() -> None:

@@ -48,7 +48,8 @@ from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import zero_tolerance
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
-from femubench.core.schema.diagnosis import BudgetLine, BudgetMode
+from femubench.core.schema.diagnosis import Advice, BudgetLine, BudgetMode
+from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray, IntArray
 
 # Of every axis of a joint zone the displacements of an element, and what a factor multiplies.
@@ -343,9 +344,42 @@ def log_frequencies(state: State) -> FloatArray:
     return np.asarray(np.log(np.abs(hertz[0, state.partner])))
 
 
-def frequency_slopes(state: State) -> FloatArray:
-    """Return d ln f / d x of the partner of every measured mode, (m, k)."""
-    values, near = state.eigenvalues[state.partner], state.vectors[:, state.partner]
+def advise_modes(budget: Budget, case: Case) -> tuple[Advice, ...]:
+    """Return the modes that say most of what the drawing lacks, if they were used too.
+
+    Of as many further modes as are used; the separation is the variance of a mode's prediction in
+    those of what no class of a budget is.
+    """
+    state, count = budget.state, len(case.used)
+    numbers = np.array(case.measurement.numbers)
+    used = state.partner[np.isin(numbers, case.used)]
+    moving = np.flatnonzero(~state.problem.space.still(state.eigenvalues))
+    further = np.setdiff1d(moving, used)[:count]
+    slopes = frequency_slopes(state, further)
+    variance = np.einsum("mk,kl,ml->m", slopes, budget.covariance, slopes)
+    separation = variance / settings.budget_rest[0] ** 2
+    space, labels = state.problem.space, case.measurement.sensors.labels
+    seen = np.abs(space.pad_readings(len(state.vectors)) @ state.vectors[:, further])
+    found = []
+    for mode, size, std, reading in zip(
+        further, separation, np.sqrt(variance), seen.T, strict=True
+    ):
+        if size < settings.visible_deviations:  # hardly more than is not known anyhow
+            continue
+        hertz = state.frequencies[mode]
+        low, high = hertz * (1.0 - std), hertz * (1.0 + std)
+        where = " and ".join(labels[i] for i in np.argsort(-reading)[: settings.least_modes])
+        held = numbers[state.partner == mode].tolist()
+        what = f"use mode {held[0]}" if held else "measure and use the mode"
+        text = f"{what} between {low:.4g} and {high:.4g} Hz, where {where} move most"
+        found.append(Advice(text, float(size)))
+    return tuple(in_order(found, lambda advice: -advice.separation))[: settings.of_a_kind]
+
+
+def frequency_slopes(state: State, modes: IntArray | None = None) -> FloatArray:
+    """Return d ln f / d x of the partner of every measured mode, or of other modes, (m, k)."""
+    modes = state.partner if modes is None else modes
+    values, near = state.eigenvalues[modes], state.vectors[:, modes]
     forces, _ = state.problem.space.forces(state.parts, state.x, near, values)
     return np.asarray(np.einsum("nm,nmk->mk", near, forces) / (2.0 * values[:, None]))
 

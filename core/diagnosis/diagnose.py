@@ -10,7 +10,7 @@ import numpy as np
 
 from femubench.core.advise.advice import advise
 from femubench.core.case.case import Case
-from femubench.core.diagnosis.budget import Budget, budget_of
+from femubench.core.diagnosis.budget import Budget, advise_modes, budget_of
 from femubench.core.diagnosis.faults import correct_case, fault_causes, with_faults
 from femubench.core.diagnosis.proof import (
     Unseen,
@@ -144,16 +144,25 @@ def diagnose(
 def _with_budget(case: Case, found: Diagnosis, budget: Budget) -> Diagnosis:
     """Return a diagnosis with a budget, and with its model where no name stands alone.
 
-    That model is provisional: unseen data of every kind must be nearer to it than to the drawing.
+    That model is provisional: unseen data of every kind must be nearer to it than to the drawing
+    and to the best guess.
     """
     lines, hidden = budget.lines, budget.hidden_percent
     found = replace(found, budget=lines, budget_modes=budget.modes, hidden_percent=hidden)
     if found.verdict == "named":
         return found
+    first = advise_modes(budget, case)
+    found = replace(found, advice=(*first, *found.advice)[: settings.advised])
     before, after = (score_model(case, model) for model in (case.model, budget.extended))
     gain = rms_gain_of(before, after, None)
-    unseen = [pair for pair in (gain.held_out_percent, gain.modified_percent) if pair is not None]
-    if not unseen or any(new >= old for old, new in unseen):
+    known = found.gain_rms or gain
+    pairs = (
+        (gain.held_out_percent, known.held_out_percent),
+        (gain.modified_percent, known.modified_percent),
+    )
+    unseen = [(*own, *other) for own, other in pairs if own is not None and other is not None]
+    # Nearer than the drawing, and than the best guess, which may be all that a beam model lacks.
+    if not unseen or any(new >= min(old, *guess) for old, new, *guess in unseen):
         return found
     said = f"{words_of_provisional(gain)} {found.sentence}"
     return replace(found, provisional=gain, sentence=said, extended=budget.extended)
