@@ -215,10 +215,11 @@ def _budget(data: Data, *, page: bool) -> list[Block]:
     )
     size = 3.4 + 0.34 * min(len(modes), MOST_ROWS), 3.6
     title = "What the drawing lacks, mode by mode"
-    drawn = _drawn(partial(error_budget, data), "budget", title, _lead(data)[0], size)
+    draw = partial(error_budget, data)
+    drawn = _drawn(draw, "budget", title, _lead(data)[0], size) if page else ""
     table = Table(columns, rows, folded=f"The {len(modes)} modes in figures" * page)
-    drawing = [Row([Drawing("", said, drawn)]), table] if page else [said, table]
-    return [*drawing, *words.as_drawn(data["budget"], _NOTABLE)]
+    first: Block = Row([Drawing("", said, drawn)]) if page else said
+    return [first, table, *words.as_drawn(data["budget"], _NOTABLE)]
 
 
 def _cards(data: Data, *, faults: bool = False) -> list[Block]:

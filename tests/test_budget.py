@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from msgspec import structs
 import femubench
 from femubench import plot
 from femubench.core.case.case import Case
+from femubench.core.case.writing import write_case
 from femubench.core.diagnosis.budget import (
     Budget,
     advise_modes,
@@ -22,6 +24,7 @@ from femubench.core.diagnosis.budget import (
     log_frequencies,
 )
 from femubench.core.errors import InputError
+from femubench.core.fem.frame import MADE, JointKind
 from femubench.core.fem.model import Model
 from femubench.core.fit.modal_fit import state_at
 from femubench.core.inference.settings import settings
@@ -113,10 +116,35 @@ def test_a_zone_that_gives_about_one_axis_is_expected_to_give_about_the_other() 
     entry = next(e for e in list_entries(cases["suite/portal"].model) if "branch rz" in e.names)
     assert entry.names == ("branch rx", "branch ry", "branch rz")
     cov = entry.root @ entry.root.T
-    wide, _, alike = settings.budget_joints
+    wide, _, alike, _ = settings.budget_joints
     np.testing.assert_allclose(cov / wide**2, [[1, 0, 0], [0, 1, alike], [0, alike, 1]], atol=1e-12)
     one_seen = np.diag([1.0, 0.01, 1.0])
     assert entry.list_seen(one_seen) == [False, True, False]
+
+
+def test_how_a_joint_is_made_sets_its_room(tmp_path: Path) -> None:
+    def written(kind: str, made: str) -> Path:
+        folder = tmp_path / f"{kind}-{made}"
+        shutil.copytree(cases["suite/h-tube"].folder, folder)
+        table = f'\n[[model.joint_kinds]]\ntype = "{kind}"\nmade = "{made}"\n'
+        text = (folder / "case.toml").read_text("utf-8")
+        (folder / "case.toml").write_text(text + table, "utf-8")
+        return folder
+
+    case = femubench.read_case(written("tee", "solid"))
+    (entry,) = [e for e in list_entries(case.model) if "branch ry" in e.names]
+    assert entry.root[0, 0] == settings.budget_made[MADE.index("solid")] < settings.budget_joints[0]
+    copy = tmp_path / "again"
+    write_case(copy, case, case.model)
+    assert femubench.read_case(copy).model.frame_structure.frame.joint_kinds == (
+        JointKind("tee", "solid"),
+    )
+    for kind, made, said in (
+        ("tea", "solid", "there is no joint type 'tea'"),
+        ("tee", "cast", "made"),
+    ):
+        with pytest.raises(InputError, match=said):
+            femubench.read_case(written(kind, made))
 
 
 def test_there_is_no_budget_of_matrices(drawn: Case) -> None:

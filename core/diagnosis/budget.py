@@ -29,7 +29,7 @@ from femubench.core.change.terms import ElementOperator, Term
 from femubench.core.effect.attachments import mass_term
 from femubench.core.effect.textbook import textbook_values
 from femubench.core.fem.beam import BEND_XY, BEND_XZ, TWIST, mass_matrices, stiffness_matrices
-from femubench.core.fem.frame import ACTIVE, Factor, Frame, Place, PointMass
+from femubench.core.fem.frame import ACTIVE, MADE, Factor, Frame, Place, PointMass
 from femubench.core.fem.joints import half_depth, joint_groups
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
@@ -218,7 +218,9 @@ def list_entries(model: Model) -> list[Entry]:
     structure = model.frame_structure
     frame = structure.frame
     stiff, heavy = (f(structure.properties) for f in (stiffness_matrices, mass_matrices))
-    found, (ending, passing, correlation) = [], settings.budget_joints
+    found, (unknown, passing, correlation, _) = [], settings.budget_joints
+    widths = dict(zip(MADE, settings.budget_made, strict=True))
+    made = {kind.type: widths[kind.made] for kind in frame.joint_kinds}
     for (place, role), ends in _ends_of_joints(frame).items():
         rows = np.unique(np.concatenate([_zone(structure, end) for end in ends]))
         labels = tuple(structure.labels[row] for row in rows)
@@ -234,7 +236,8 @@ def list_entries(model: Model) -> list[Entry]:
             bends = np.array([axis != "rx" for axis in terms])
             alike = np.where(np.outer(bends, bends), correlation, 0.0)
             np.fill_diagonal(alike, 1.0)
-            root = (passing if role == "through" else ending) * np.linalg.cholesky(alike)
+            std = passing if role == "through" else made.get(place, unknown)
+            root = std * np.linalg.cholesky(alike)
             names = tuple(axis if role == "end" else f"{role} {axis}" for axis in terms)
             factors = tuple(_AXES[axis][1] for axis in terms)
             found.append(Entry(place, _JOINTS, names, tuple(terms.values()), root, factors, labels))
@@ -304,7 +307,7 @@ def _zone(structure: Structure, end: str) -> IntArray:
     section, length = frame.members[number].section, structure.properties.length[own]
     crossing = half_depth(frame, end) if len(frame.ends_at(joint)) > 1 else 0.0
     reach = crossing + max(section.height or 0.0, section.width or 0.0)
-    reach = min(reach, settings.budget_zone * float(length.sum()))
+    reach = min(reach, settings.budget_joints[3] * float(length.sum()))
     inside = np.cumsum(length) - 0.5 * length < reach
     inside[0] = True
     return np.asarray(own[inside])

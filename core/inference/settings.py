@@ -28,7 +28,6 @@ T = TypeVar(
     int,
     tuple[float, ...],
     tuple[float, float],
-    tuple[float, float, float],
     tuple[float, float, float, float],
     tuple[int, int],
 )
@@ -189,13 +188,15 @@ class Settings:
     budget_handbook: float = _prior(
         0.1, "of what it changes", "shear coefficients and rotary inertia by handbooks are so sure"
     )
-    budget_joints: tuple[float, float, float] = _prior(
-        (0.7, 0.3, 0.5),
-        "of ln(stiffness) of a zone that ends, that passes; correlation of two axes",
-        "an end is rigid or gives like a wall, what passes goes on, and bending is alike",
+    budget_joints: tuple[float, float, float, float] = _prior(
+        (0.7, 0.3, 0.5, 1.0 / 3.0),
+        "of ln(stiffness) of a zone that ends, that passes; correlation of axes; part of a member",
+        "an end is rigid or gives like a wall, bending is alike; no joint reaches farther",
     )
-    budget_zone: float = _prior(
-        1.0 / 3.0, "of a member", "a joint reaches no farther, however deep what meets there"
+    budget_made: tuple[float, ...] = _prior(
+        (0.7, 0.7, 0.7, 0.4, 0.5),
+        "the first of these by `made`",
+        "a solid corner has little but its arm, a glued one no weld; all others as not known",
     )
     budget_known: tuple[float, float, float, float] = _prior(
         (0.02, 0.05, 0.01, 0.01),
