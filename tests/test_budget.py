@@ -97,8 +97,8 @@ def test_lines_add_up_and_the_extended_model_gives_what_the_fit_does(real: Budge
 def test_what_the_modes_do_not_see_stays_near_the_drawing_with_its_room(real: Budget) -> None:
     names = [n.name for p in real.state.parts for n in p.hypothesis.parameters]
     blind = names.index("through rx")
-    assert abs(real.state.x[blind]) < 0.5
-    assert real.covariance[blind, blind] > 0.8
+    assert abs(real.state.x[blind]) < 1.0  # a prior deviation
+    assert real.covariance[blind, blind] > 1.0 - settings.budget_seen
     (tee,) = [line for line in real.lines if (line.place, line.name) == ("tee", "joint stiffness")]
     assert tee.unseen == ("through rx",)
 

@@ -30,7 +30,7 @@ from femubench.core.effect.attachments import mass_term
 from femubench.core.effect.textbook import textbook_values
 from femubench.core.fem.beam import BEND_XY, BEND_XZ, TWIST, mass_matrices, stiffness_matrices
 from femubench.core.fem.frame import ACTIVE, MADE, Factor, Frame, Place, PointMass
-from femubench.core.fem.joints import half_depth, joint_groups
+from femubench.core.fem.joints import half_depth, joint_groups, whole_members
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.mesh_error import mesh_bias
@@ -161,7 +161,9 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
     whole = fit(problem, parts, np.zeros(sum(len(entry.names) for entry in entries)))
     if whole is None:
         return None
-    x, covariance = whole.state.x, whole.covariance
+    # What is left beyond the noise makes all of it less sure (Birge 1932).
+    x, excess = whole.state.x, whole.state.chi2 / len(problem.data)
+    covariance = whole.covariance * max(1.0, excess)
     wide, places = _pose(model, every, hypotheses, every)
     state = state_at(wide, places, x)
     slopes, found = frequency_slopes(state), log_frequencies(state)
@@ -280,8 +282,17 @@ def _split(entries: Sequence[Entry]) -> list[slice]:
 
 
 def _ends_of_joints(frame: Frame) -> dict[tuple[str, str], list[str]]:
-    """Return ``member@joint`` by joint type and role; a foot is an end that is held alone."""
-    found = {(group.type, group.role): list(group.ends) for group in joint_groups(frame)}
+    """Return ``member@joint`` by joint type and role; a foot is an end that is held alone.
+
+    Where a member only goes on there is no joint.
+    """
+    found: dict[tuple[str, str], list[str]] = {}
+    within = {name: pieces for pieces in whole_members(frame) for name in pieces}
+    for group in joint_groups(frame):
+        for end in group.ends:
+            ends = frame.ends_at(end.rpartition("@")[2])
+            if len(ends) > 2 or len({within[name] for name in ends}) > 1:
+                found.setdefault((group.type, group.role), []).append(end)
     held = {str(s.at) for s in frame.supports} | {str(s.at) for s in frame.springs}
     for joint in frame.joints:
         ends = frame.ends_at(joint.name)
@@ -413,7 +424,10 @@ def _share_out(entries: Sequence[Entry], state: State, covariance: FloatArray) -
             for name, seen in zip(entry.names, entry.list_seen(covariance[one, one]), strict=True)
         }
         unseen = tuple(name for name, seen in sees.items() if not seen)
-        line = _line(place, kind, each[:, own].sum(axis=1), spread, "data", unseen)
+        share = each[:, own].sum(axis=1)
+        # A zone, or a point mass, is an idealisation of what is there.
+        spread = spread + np.outer(share, share) * settings.own_error_of_change**2
+        line = _line(place, kind, share, spread, "data", unseen)
         moved = len(unseen) < len(sees) or abs(line.rms_percent) > line.rms_std
         found.append(line if moved else structs.replace(line, source="drawing"))
     return found
