@@ -151,8 +151,13 @@ def _with_budget(case: Case, found: Diagnosis, budget: Budget) -> Diagnosis:
     found = replace(found, budget=lines, budget_modes=budget.modes, hidden_percent=hidden)
     if found.verdict == "named":
         return found
-    first = advise_modes(budget, case)
-    found = replace(found, advice=(*first, *found.advice)[: settings.advised])
+    modes, names = advise_modes(budget, case), found.advice
+    # Where unseen data do not bear the budget out, what parts the names comes first.
+    first = replace(found, advice=(*modes, *names)[: settings.advised])
+    if found.verdict == "ambiguous":
+        found = replace(found, advice=(*names, *modes)[: settings.advised])
+    else:
+        found = first
     before, after = (score_model(case, model) for model in (case.model, budget.extended))
     gain = rms_gain_of(before, after, None)
     known = found.gain_rms or gain
@@ -165,7 +170,7 @@ def _with_budget(case: Case, found: Diagnosis, budget: Budget) -> Diagnosis:
     if not unseen or any(new >= min(old, *guess) for old, new, *guess in unseen):
         return found
     said = f"{words_of_provisional(gain)} {found.sentence}"
-    return replace(found, provisional=gain, sentence=said, extended=budget.extended)
+    return replace(first, provisional=gain, sentence=said, extended=budget.extended)
 
 
 def _expected(case: Case) -> dict[Kind, Number]:
