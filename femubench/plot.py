@@ -12,6 +12,7 @@ from femubench.core.plot.diagnosis import (
     MOST_ROWS as MOST_ROWS,
     ResidualDot as ResidualDot,
     Spot as Spot,
+    error_budget as error_budget,
     evidence as evidence,
     residual_dots as residual_dots,
     residuals as residuals,

@@ -13,6 +13,7 @@ from typing import Any
 from femubench import InputError
 from femubench.plot import (
     MOST_ROWS,
+    error_budget,
     evidence,
     residual_dots,
     residuals,
@@ -40,6 +41,12 @@ from femubench.reports.terminal import to_terminal
 
 _MOST_RESIDUALS = 2000
 _LEAST = 0.005  # what two decimals show
+_SUMS = {
+    "unexplained": "left_percent",
+    "drawing's error": "error_percent",
+    "predicted to ±": "std_percent",
+}
+_NOTABLE = 0.1  # % of a frequency, rms, that a line of a budget is worth
 _WHEN = ("before", "after")
 _KINDS = {"frequency": "Frequencies", "shape": "Mode shapes, rms over the sensors"}
 _MAP, _SMALL = (4.8, 3.7), (3.4, 2.4)  # inch
@@ -87,8 +94,10 @@ def _heading(data: Data) -> str:
 
 
 def _lead(data: Data) -> list[str]:
-    """Return what the two measurements alone say; nothing without a reference."""
-    return [words.states(data["states"])] if data.get("states") else []
+    """Return what comes before any name: of two measurements, or of the drawing by itself."""
+    if data.get("states"):
+        return [words.states(data["states"])]
+    return [words.budget(data)] if data.get("budget_modes") else []
 
 
 def _sections(data: Data, *, page: bool = False) -> list[Passage]:
@@ -109,6 +118,7 @@ def _sections(data: Data, *, page: bool = False) -> list[Passage]:
     found = (
         Passage("", [said], area="first"),
         Passage("The two measurements", _states(data, page=page), area="first"),
+        Passage("What the drawing lacks", _budget(data, page=page), area="first"),
         Passage(words.CAUSES.get(verdict, ""), [*_cards(data), *textbook], area="first"),
         Passage("", [Items(_tiles(data), look="tiles"), *_error(data)], area="first"),
         Passage("", [_map(data)] if page else [], area="aside"),
@@ -175,6 +185,41 @@ def _states(data: Data, *, page: bool) -> list[Block]:
     drawn = _drawn(partial(state_changes, states), "states", title, _lead(data)[0], size)
     table = Table([*columns.values()], rows, folded=f"The {len(rows)} modes in figures")
     return [*([Row([Drawing("", _ARROWS, drawn)])] * page), table]
+
+
+def _budget(data: Data, *, page: bool) -> list[Block]:
+    """Return what the drawing lacks, by class and mode."""
+    modes = data.get("budget_modes") or []
+    if not modes:
+        return []
+    say = partial(format_signed, decimals=1)
+    columns = [
+        *(Column("class", 19, left=True), Column("at", 12, left=True)),
+        *(Column("rms, %", 7, say=say), Column("±", 5, digits=1)),
+        Column("source", 8, left=True),
+        *(Column(f"{m['mode']}" if m["used"] else f"({m['mode']})", 6, say=say) for m in modes),
+        Column("not seen", 30, left=True, wrap=True),
+    ]
+    rows: list[list[Cell]] = [
+        [row["class"], words.place(row["place"]), row["rms_percent"], row["rms_std"], row["source"],
+         *row["percent"], ", ".join(row["unseen"])]
+        for row in data["budget"]
+        if abs(row["rms_percent"]) >= _NOTABLE
+    ]  # fmt: skip
+    for name, key in _SUMS.items():
+        own = [m[key] for m in modes]
+        rows.append([name, "", figure(words.root_mean_square(own), 2), None, "", *own, ""])
+    said = (
+        "In % of the frequencies (ln measured / predicted), mode by mode; + where the drawing is "
+        "too soft or too heavy. Modes in brackets had no part in it: their lines are predictions."
+    )
+    size = 3.4 + 0.34 * min(len(modes), MOST_ROWS), 3.6
+    title = "What the drawing lacks, mode by mode"
+    draw = partial(error_budget, data)
+    drawn = _drawn(draw, "budget", title, _lead(data)[0], size) if page else ""
+    table = Table(columns, rows, folded=f"The {len(modes)} modes in figures" * page)
+    first: Block = Row([Drawing("", said, drawn)]) if page else said
+    return [first, table, *words.as_drawn(data["budget"], _NOTABLE)]
 
 
 def _cards(data: Data, *, faults: bool = False) -> list[Block]:

@@ -49,6 +49,8 @@ INDICATORS = {
     "ecomac": "difference of measured and predicted shapes at every sensor",
 }
 _MOST_CHANGES, _MOST_PLACES = 8, 5
+_FAR = 3.0  # times its error is what a drawing hides at least
+_MOST_LINES, _LEAST_SHARE, _SURE = 4, 0.1, 2.0  # of a budget; of its largest; deviations
 _NOISE, _LIMIT = 0.05, 1e-3
 _NOTABLE, _MOST_MOVED = 3.0, 3  # deviations; modes
 _LARGEST_ODDS = 1e6
@@ -73,6 +75,64 @@ def states(found: Data) -> str:
     rest = "the other agrees" if len(modes) == len(changed) + 1 else "the others agree"
     parts += [rest] if 0 < len(changed) < len(modes) else []
     return f"The two measurements differ: {'; '.join(parts)}."
+
+
+def budget(data: Data) -> str:
+    """Return in a few sentences how far the drawing is off, why, and what that hides."""
+    modes, lines = data["budget_modes"], data["budget"]
+    used, others = ([m for m in modes if m["used"] is known] for known in (True, False))
+
+    def off(key: str) -> str:
+        named = (("the used modes", used), ("the others", others))
+        return " and ".join(
+            f"{figure(root_mean_square(row[key] for row in rows), 2)} % in {name}"
+            for name, rows in named
+            if rows
+        )
+
+    least = _LEAST_SHARE * max((abs(line["rms_percent"]) for line in lines), default=0.0)
+    sure = (x for x in lines if abs(x["rms_percent"]) >= max(least, _SURE * x["rms_std"]))
+    said = [budget_line(line) for line in sure]
+    parts = [f"The drawing is off by {off('error_percent')} (rms)."]
+    # Lines of a drawing that is as near as any may cancel each other.
+    off_by = root_mean_square(row["error_percent"] for row in used)
+    if said and _FAR * off_by >= (data["hidden_percent"] or 0.0):
+        parts.append(f"It lacks {first_of(said, _MOST_LINES)}.")
+    parts.append(f"This leaves {off('left_percent')}.")
+    vague = max(others, key=lambda m: m["std_percent"], default=None)
+    if vague is not None and vague["std_percent"] >= _SURE * root_mean_square(
+        m["std_percent"] for m in used
+    ):
+        size = figure(vague["std_percent"], 2)
+        parts.append(f"Mode {vague['mode']} is predicted to ± {size} % only.")
+    hidden = figure(data["hidden_percent"], 2)
+    parts.append(f"Next to that no defect shows that moves frequencies by less than {hidden} %.")
+    return " ".join(parts)
+
+
+def budget_line(line: Data) -> str:
+    """Return a class of a budget with its place and size."""
+    where = "" if line["place"] == "all" else f" at {line['place']}"
+    size = estimate(abs(line["rms_percent"]), line["rms_std"])
+    sign = "-" if line["rms_percent"] < 0.0 else "+"
+    return f"{line['class']}{where} ({sign}{size} %)"
+
+
+def as_drawn(lines: Iterable[Data], least: float) -> list[str]:
+    """Return which lines of a budget stay as drawn, and how far off the drawing may be there."""
+    small = [x for x in lines if abs(x["rms_percent"]) < least <= x["rms_std"]]
+    places: dict[str, list[str]] = {}
+    for x in sorted(small, key=lambda x: -x["rms_std"]):
+        said = place(x["place"]) if x["place"] == "all" else f"at {x['place']}"
+        places.setdefault(x["class"], []).append(f"{said} ± {figure(x['rms_std'], 2)} %")
+    found = [f"{kind} {first_of(said, _MOST_LINES)}" for kind, said in places.items()]
+    return [f"As drawn, for these modes do not say otherwise: {'; '.join(found)}."] * bool(found)
+
+
+def root_mean_square(values: Iterable[float]) -> float:
+    """Return the root mean square of some numbers, 0 of none."""
+    found = [*values]
+    return math.sqrt(sum(value**2 for value in found) / max(len(found), 1))
 
 
 def _changed(row: Data) -> str:

@@ -30,6 +30,7 @@ from femubench.core.fem.frame import (
     Factor,
     Frame,
     GroundSpring,
+    JointKind,
     JointSpring,
     Link,
     MemberSet,
@@ -203,6 +204,7 @@ def full_frames(ladder: Case, portal: Case, bracket: Case) -> Iterator[tuple[str
             eccentricities=(Eccentricity("front-left", y=0.004),),
             couplings=(Coupling("front-left", -0.1),),
             oscillators=(Oscillator(point, "z", 0.05, 300.0),),
+            joint_kinds=(JointKind("L", "bolted"),),
             sets=(MemberSet("side", ("front-left", "rung-left")),),
         ),
     )

@@ -252,7 +252,7 @@ def advise(
     first explanation from the one that the measurement tells least from it. Where it tells the
     first from some only, the text says from which, and it gives way to all that tell the first
     from every other by three standard deviations where there is no room for all. A second level of
-    excitation tells a softer structure from one that softens: it always has a place.
+    excitation tells a softer structure from one that softens: it always has a place, the last.
 
     Arguments:
         model: the nominal model.
@@ -298,8 +298,8 @@ def _ranked(
     level_advice: list[Advice] = []
     if level is not None and min(level.distances) >= settings.worth_measuring:
         level_advice.append(Advice(level.text, min(level.distances)))
-    kept = [*chosen[: settings.advised - len(level_advice)], *level_advice]
-    return tuple(in_order(kept, lambda advice: -advice.separation))
+    kept = in_order(chosen[: settings.advised - len(level_advice)], lambda a: -a.separation)
+    return (*kept, *level_advice)
 
 
 def _describe(option: Option, labels: Sequence[str]) -> tuple[str, float]:

@@ -75,6 +75,10 @@ def check_frame(model: FrameSpec) -> None:
     for key in ("preloads", "eccentricities", "couplings"):
         for i, item in enumerate(getattr(model, key)):
             _check_known("member", item.member, members, (key, i, "member"))
+    check_unique((("joint_kinds", i, "type"), k.type) for i, k in enumerate(model.joint_kinds))
+    kinds = {joint.type or joint.name for joint in model.joints}
+    for i, kind in enumerate(model.joint_kinds):
+        _check_known("joint type", kind.type, kinds, ("joint_kinds", i, "type"))
     check_unique((("sets", i, "name"), group.name) for i, group in enumerate(model.sets))
     for i, group in enumerate(model.sets):
         path = ("sets", i, "members")

@@ -34,6 +34,7 @@ from femubench.core.fem.frame import (
     Frame,
     GroundSpring,
     Joint,
+    JointKind,
     JointSpring,
     Link,
     Material,
@@ -172,6 +173,7 @@ _PARTS: dict[str, type] = {
     "couplings": Coupling,
     "braces": Brace,
     "sets": MemberSet,
+    "joint_kinds": JointKind,
 }
 _ATTACHED: dict[str, type] = {
     "masses": PointMass,

@@ -12,7 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, InstanceOf, 
 from pydantic_core import PydanticCustomError
 
 from femubench.core.case.case import BEAM_SHARE, SCATTER, TOLERANCE
-from femubench.core.fem.frame import BeamTheory, BendingMass, Place, Plane
+from femubench.core.fem.frame import MADE, BeamTheory, BendingMass, Made, Place, Plane
 
 T = TypeVar("T")
 LengthUnit = Literal["m", "cm", "mm", "in", "ft"]
@@ -106,7 +106,9 @@ def _places(value: object) -> tuple[str, ...]:
 
 
 Share = Annotated[bool | float, PlainValidator(_share)]
-Quantity = Literal["EA", "EI", "GJ", "E", "rhoA", "rhoJp", "density", "shear", "rotary"]
+Quantity = Literal[
+    "EA", "EI", "GJ", "bending ry", "bending rz", "E", "rhoA", "rhoJp", "density", "shear", "rotary"
+]  # fmt: skip
 
 
 class FactorSpec(TomlTable):
@@ -282,6 +284,13 @@ class SetSpec(TomlTable):
     members: Many[Name] = Field(min_length=1, description="a list of names of members")
 
 
+class JointKindSpec(TomlTable):
+    """`[[model.joint_kinds]]`: how the joints of a type are made."""
+
+    type: Name = Field(description="a type of [[model.joints]]")
+    made: Made = Field(description=f"one of {', '.join(MADE)}")
+
+
 class FrameSpec(TomlTable):
     """`[model]` with ``kind = "frame"``."""
 
@@ -315,6 +324,7 @@ class FrameSpec(TomlTable):
     braces: Many[BraceSpec] = _tables("model.braces")
     oscillators: Many[OscillatorSpec] = _tables("model.oscillators")
     sets: Many[SetSpec] = _tables("model.sets")
+    joint_kinds: Many[JointKindSpec] = _tables("model.joint_kinds")
 
 
 class GroupSpec(TomlTable):

@@ -10,6 +10,7 @@ import numpy as np
 
 from femubench.core.advise.advice import advise
 from femubench.core.case.case import Case
+from femubench.core.diagnosis.budget import Budget, advise_modes, budget_of
 from femubench.core.diagnosis.faults import correct_case, fault_causes, with_faults
 from femubench.core.diagnosis.proof import (
     Unseen,
@@ -36,7 +37,7 @@ from femubench.core.diagnosis.tables import (
     smallest_visible,
 )
 from femubench.core.diagnosis.verdict import Decision, Sufficiency, decide, elsewhere
-from femubench.core.diagnosis.words import sentence_of
+from femubench.core.diagnosis.words import sentence_of, words_of_provisional
 from femubench.core.fem.model import Model
 from femubench.core.fit.extended_model import departure
 from femubench.core.fit.static_response import LargeProblem
@@ -131,9 +132,45 @@ def diagnose(
             differs = None if states is None else states.differs
             decision = decide(posterior, leader, proof.test, differs)
             found = _written(repaired, inquiry, decision, proof, looks, begin)
+        # With a reference both states have what the drawing lacks.
+        budget = budget_of(repaired, registered) if states is None else None
+        if budget is not None:
+            found = _with_budget(repaired, found, budget)
     left_out = list_left_out(repaired.model, known, reference)
     notes = (*case.notes, *found.notes, *notes_left_out(left_out), *_conditions(effort))
     return replace(found, states=states, left_out=left_out, notes=notes)
+
+
+def _with_budget(case: Case, found: Diagnosis, budget: Budget) -> Diagnosis:
+    """Return a diagnosis with a budget, and with its model where no name stands alone.
+
+    That model is provisional: unseen data of every kind must be nearer to it than to the drawing
+    and to the best guess.
+    """
+    lines, hidden = budget.lines, budget.hidden_percent
+    found = replace(found, budget=lines, budget_modes=budget.modes, hidden_percent=hidden)
+    if found.verdict == "named":
+        return found
+    modes, names = advise_modes(budget, case), found.advice
+    # Where unseen data do not bear the budget out, what parts the names comes first.
+    first = replace(found, advice=(*modes, *names)[: settings.advised])
+    if found.verdict == "ambiguous":
+        found = replace(found, advice=(*names, *modes)[: settings.advised])
+    else:
+        found = first
+    before, after = (score_model(case, model) for model in (case.model, budget.extended))
+    gain = rms_gain_of(before, after, None)
+    known = found.gain_rms or gain
+    pairs = (
+        (gain.held_out_percent, known.held_out_percent),
+        (gain.modified_percent, known.modified_percent),
+    )
+    unseen = [(*own, *other) for own, other in pairs if own is not None and other is not None]
+    # Nearer than the drawing, and than the best guess, which may be all that a beam model lacks.
+    if not unseen or any(new >= min(old, *guess) for old, new, *guess in unseen):
+        return found
+    said = f"{words_of_provisional(gain)} {found.sentence}"
+    return replace(first, provisional=gain, sentence=said, extended=budget.extended)
 
 
 def _expected(case: Case) -> dict[Kind, Number]:

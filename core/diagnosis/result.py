@@ -13,6 +13,8 @@ from femubench.core.inference.examine import Examination
 from femubench.core.inference.settings import settings
 from femubench.core.schema.diagnosis import (
     Advice,
+    BudgetLine,
+    BudgetMode,
     Cause,
     DiagnosisReport,
     ErrorScale,
@@ -67,7 +69,8 @@ class Diagnosis(DiagnosisReport, Shown):
 
         Arguments:
             table: ``causes``, ``rivals``, ``evidence``, ``model_error``, ``advice``,
-                ``smallest_visible``, ``residuals``, ``scatter``, ``looks`` or ``locations``.
+                ``smallest_visible``, ``residuals``, ``scatter``, ``looks``, ``locations``,
+                ``budget`` or ``budget_modes``.
 
         Raises:
             KeyError: when there is no such table.
@@ -92,6 +95,8 @@ _TABLES: dict[str, Any] = {
     "scatter": Scatter,
     "looks": LookWarning,
     "locations": LocationRow,
+    "budget": BudgetLine,
+    "budget_modes": BudgetMode,
 }
 _CAUSE_COLUMNS = ["effect", "place", "probability", "parameter", "value", "std", "unit", "textbook"]
 

@@ -101,7 +101,7 @@ def sentence_of(
         sure = f" (probability {percent(decision.nothing)})" if decision.nothing > 0.5 else ""
         if not (reference or beam):
             off = f"The model is {gain.used_percent[0]:.2g} % off in the used modes (rms)"
-            return f"{off}, and no defect shows beyond what models of its kind get wrong{sure}."
+            return f"{off}, and no hidden defect shows beyond what drawings of its kind lack{sure}."
         return f"The data show {nothing}{sure}."
     if decision.verdict == "named":
         lacks = _DIFFERS if reference else _LACKS
@@ -149,6 +149,13 @@ def _either(options: Sequence[Sequence[Cause]], reference: bool) -> str:
         return f"{stated}; these data cannot tell whether it is {open_}."
     something = "Something differs from the reference" if reference else f"{_LACKS} something"
     return f"{something}, and these data cannot tell which: {open_}."
+
+
+def words_of_provisional(gain: Gain) -> str:
+    """Return what a model gains that has all that its drawing lacks, while no name is sure."""
+    return f"Provisional, with all that the drawing lacks in the model{_gain(gain)}.".replace(
+        "model; ", "model: "
+    )
 
 
 def _gain(gain: Gain) -> str:

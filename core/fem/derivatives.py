@@ -16,8 +16,8 @@ from femubench.core.fem.meshed_frame import MeshedFrame
 from femubench.core.fem.parameters import QUANTITIES, Property
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
-# Young's modulus is in GA too, which the elements know by its inverse.
-_DIVIDED = {"E": ("flex_y", "flex_z")}
+# GA, which the elements know by its inverse, goes with Young's modulus and with a plane of bending.
+_DIVIDED = dict.fromkeys(("E", "bending ry", "bending rz"), ("flex_y", "flex_z"))
 _STEP = 1e-30
 _SPRING, _RIGID, _KEPT = "spring", "rigid", "touched"
 _MASS = ("rhoA", "rhoJp", "density", "rotary")

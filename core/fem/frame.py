@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,6 +13,8 @@ from scipy.spatial import cKDTree
 from femubench.core.fem.sections import Section
 from femubench.core.typing import FloatArray, IntArray
 
+Made = Literal["welded-tubes", "gusset", "bolted", "solid", "glued"]
+MADE = get_args(Made)
 Plane = Literal["in-plane", "out-of-plane", "3d"]
 BeamTheory = Literal["euler-bernoulli", "timoshenko"]
 BendingMass = Literal["cubic", "shear-consistent"]
@@ -252,6 +254,14 @@ class MemberSet:
 
 
 @dataclass(frozen=True)
+class JointKind:
+    """How the joints of a type are made, which says by how much their stiffness may be off."""
+
+    type: str
+    made: Made
+
+
+@dataclass(frozen=True)
 class Frame:
     """A frame of beams with everything that is attached to it.
 
@@ -289,6 +299,7 @@ class Frame:
     oscillators: tuple[Oscillator, ...] = ()
     sets: tuple[MemberSet, ...] = ()
     families: tuple[MemberSet, ...] = field(default=(), compare=False)
+    joint_kinds: tuple[JointKind, ...] = ()
 
     @property
     def rotary_share(self) -> float:

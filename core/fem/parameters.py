@@ -11,6 +11,8 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "EA": ("EA",),
     "EI": ("EIy", "EIz"),
     "GJ": ("GJ",),
+    "bending ry": ("EIy", "flex_z"),
+    "bending rz": ("EIz", "flex_y"),
     "E": ("EA", "EIy", "EIz", "GJ", "flex_y", "flex_z"),
     "rhoA": ("rhoA",),
     "rhoJp": ("rhoJp",),

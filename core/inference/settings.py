@@ -22,7 +22,15 @@ from femubench.core.modal.group_prior import KINDS
 
 Kind = Literal["prior", "cost", "decision"]
 Value = float | tuple[float, ...]
-T = TypeVar("T", float, int, tuple[float, ...], tuple[float, float], tuple[int, int])
+T = TypeVar(
+    "T",
+    float,
+    int,
+    tuple[float, ...],
+    tuple[float, float],
+    tuple[float, float, float, float],
+    tuple[int, int],
+)
 
 
 @dataclass(frozen=True)
@@ -176,6 +184,31 @@ class Settings:
         KINDS["joint"].most, "factor", "a joint is drawn whole and stiffens by a fillet at most"
     )
 
+    # What the drawing itself lacks, where there is no reference.
+    budget_handbook: float = _prior(
+        0.1, "of what it changes", "shear coefficients and rotary inertia by handbooks are so sure"
+    )
+    budget_joints: tuple[float, float, float, float] = _prior(
+        (1.0, 0.5, 0.5, 1.0 / 3.0),
+        "of ln(stiffness) of a zone that ends, that passes; correlation of axes; part of a member",
+        "an end is rigid or gives like a wall, bending is alike; no joint reaches farther",
+    )
+    budget_made: tuple[float, ...] = _prior(
+        (1.0, 1.0, 1.0, 0.6, 0.7),
+        "the first of these by `made`",
+        "a solid corner has little but its arm, a glued one no weld; all others as not known",
+    )
+    budget_known: tuple[float, float, float, float] = _prior(
+        (0.02, 0.05, 0.01, 0.01),
+        "of E, of GJ, of density, of the structure",
+        "masses at the joints of a type likewise: all of them are apt to take what is not theirs",
+    )
+    budget_rest: tuple[float, float] = _prior(
+        (0.01, 0.03),
+        "of a frequency, of a shape's largest reading",
+        "what no class of a budget is: 0.9 to 1.3 % of four solids",
+    )
+
     # Where a verdict begins.
     nothing_missing: float = _decision(
         0.5, "probability", "from here on the verdict is that nothing is missing"
@@ -287,6 +320,10 @@ class Settings:
     )
     same_antiresonance: float = _decision(
         1.25, "ratio of frequencies", "within which two explanations mean the same one"
+    )
+
+    budget_seen: float = _decision(
+        0.5, "of the prior variance", "which data must take away to see an entry of a budget"
     )
 
     # How much work is spent: the search.

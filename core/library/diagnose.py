@@ -132,7 +132,8 @@ def _effects(given: object, plugins: Plugins, others: Sequence[str]) -> list[Eff
 
 def has_model(found: Diagnosis) -> bool:
     """Tell whether a diagnosis has an extended model."""
-    return found.verdict not in _NO_MODEL and bool(found.causes)
+    named = found.verdict not in _NO_MODEL and bool(found.causes)
+    return named or found.provisional is not None
 
 
 def write_extended(found: Diagnosis, folder: Path) -> None:

@@ -31,6 +31,7 @@ from femubench.core.plot.style import (
     BEFORE,
     COLOURS,
     PAGE,
+    SERIES,
     SOFT,
     name_of,
     own_axes,
@@ -232,6 +233,65 @@ def state_changes(states: Data, *, ax: Axes | None = None) -> Axes:
     _two_sided(ax, left, right)
     ax.set_xlabel("change of the frequency, %")
     return ax
+
+
+def error_budget(diagnosis: Diagnosis | Data, *, ax: Axes | None = None) -> Axes:
+    """Draw what the drawing lacks: of every mode a bar of classes that reaches its error.
+
+    What makes a mode higher than drawn is stacked up, what makes it lower down; what stays
+    unexplained is hatched, and the error of the drawing a line across. Modes that had no part in
+    the budget stand apart on the right. At most 60 modes are drawn.
+
+    Arguments:
+        diagnosis: or its JSON as plain data.
+        ax: to draw on; None for axes of a new figure.
+
+    Raises:
+        InputError: when it has no budget.
+
+    Examples:
+        >>> plot.error_budget(found).get_ylabel()
+        'ln(measured / drawn), %'
+    """
+    data = _data(diagnosis)
+    modes = sorted(data.get("budget_modes") or (), key=lambda m: not m["used"])[:MOST_ROWS]
+    if not modes:
+        raise InputError("the diagnosis has no budget of what the drawing lacks to draw")
+    order = [data["budget_modes"].index(mode) for mode in modes]
+    lines = [(f"{row['class']}{_at(row['place'])}", row["percent"]) for row in data["budget"]]
+    shown, rest = lines[: len(SERIES)], lines[len(SERIES) :]
+    shares = [(name, np.array(share)[order], colour, "") for (name, share), colour in
+              zip(shown, SERIES, strict=False)]  # fmt: skip
+    if rest:
+        others = np.sum([share for _, share in rest], axis=0)[order]
+        shares.append(("all others", others, COLOURS["grid"], ""))
+    left = np.array([mode["left_percent"] for mode in modes])
+    shares.append(("unexplained", left, PAGE, "////"))
+    count = sum(mode["used"] for mode in modes)
+    at = np.arange(len(modes)) + (np.arange(len(modes)) >= count) * 0.8
+    ax = own_axes(ax, (6.4, 3.8))
+    ends = {sign: np.zeros(len(modes)) for sign in (1.0, -1.0)}
+    for name, share, colour, hatch in shares:
+        for sign, end in ends.items():
+            own = np.where(sign * share > 0.0, share, 0.0)
+            ax.bar(at, own, 0.72, end, color=colour, hatch=hatch, edgecolor=SOFT, linewidth=0.4,
+                   label=name if sign > 0.0 else None)  # fmt: skip
+            end += own
+    error = [mode["error_percent"] for mode in modes]
+    ax.hlines(error, at - 0.42, at + 0.42, color=COLOURS["ink"], linewidth=2.2,
+              label="error of the drawing")  # fmt: skip
+    ax.axhline(0.0, color=SOFT, linewidth=0.9)
+    ax.set_xticks(at, [str(mode["mode"]) for mode in modes])
+    held = ", on the right held out" * (count < len(modes))
+    ax.set_xlabel(f"mode{held}")
+    ax.set_ylabel("ln(measured / drawn), %")
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=8.5)
+    return ax
+
+
+def _at(place: str) -> str:
+    return "" if place == "all" else f" at {name_of(place, 16)}"
 
 
 def _two_sided(ax: Axes, left: Sequence[str], right: Sequence[str]) -> None:

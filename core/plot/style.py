@@ -38,7 +38,7 @@ STYLES: dict[str, dict[str, Any]] = {
     "other": {"color": GREEN, "linewidth": 1.4, "linestyle": (0, (6, 1.5, 1, 1.5))},
 }
 # Further curves of one role take the next colour and a marker.
-_COLOURS = (VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLUE)
+SERIES = (VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLUE)
 _MARKERS = ("", "o", "s", "^", "D", "v")
 _SETTINGS: dict[str, Any] = {
     **dict.fromkeys(("font.size", "axes.labelsize"), 10.0),
@@ -117,7 +117,7 @@ def curve_style(role: str, rank: int, points: int) -> dict[str, Any]:
     """
     style = dict(STYLES[role])
     if rank:
-        style["color"] = _COLOURS[rank % len(_COLOURS)]
+        style["color"] = SERIES[rank % len(SERIES)]
         style["marker"], style["markersize"] = _MARKERS[rank % len(_MARKERS)], 4.5
         style["markevery"] = max(1, points // 12)
     return style

@@ -159,6 +159,47 @@ class ErrorScale(Struct, frozen=True):
     unit: str
 
 
+class BudgetLine(Struct, frozen=True):
+    """What a drawing lacks of one class at one place, in % of the frequencies, as ln ratios.
+
+    Arguments:
+        place: joint type, joint or ``all``.
+        name: of the class; ``class`` in JSON.
+        percent, std: by mode, in the order of `budget_modes`; positive where the drawing is too
+            soft or too heavy there.
+        rms_percent, rms_std: over the modes, with the sign of their sum.
+        source: ``handbook``, ``data``, or ``drawing`` where the used modes see nothing of it.
+        unseen: what the used modes do not see of it, which stays as drawn.
+    """
+
+    place: str
+    name: str = field(name="class")
+    percent: tuple[Number, ...]
+    std: tuple[Number, ...]
+    rms_percent: Number
+    rms_std: Number
+    source: Literal["handbook", "data", "drawing"]
+    unseen: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class BudgetMode:
+    """A measured mode in the budget of what a drawing lacks.
+
+    Arguments:
+        used: whether the budget was fitted to it.
+        error_percent: of the drawing, 100 ln(measured / predicted).
+        left_percent: what the budget leaves of it.
+        std_percent: deviation of the prediction by all that data and drawing leave open.
+    """
+
+    mode: int
+    used: bool
+    error_percent: Number
+    left_percent: Number
+    std_percent: Number
+
+
 @dataclass(frozen=True, slots=True)
 class ResidualRow:
     """One datum before and after, in standard deviations of the measurement.
@@ -343,6 +384,12 @@ class DiagnosisReport:
         scatter: whether what is left is as much as the stated deviations let expect.
         states: how the measurement differs from the reference; None without one.
         left_out: effects that were no candidates, and why.
+        budget: what the drawing lacks by place and class, largest first; empty with a reference
+            and for a model from matrices.
+        budget_modes: every measured mode in it.
+        provisional: rms before and after with all that the drawing lacks in the model, which is
+            then the extended one; None where a name stands alone or unseen data do not confirm it.
+        hidden_percent: rms change of the frequencies below which no defect shows next to it.
     """
 
     case: str = ""
@@ -371,3 +418,7 @@ class DiagnosisReport:
     scatter: tuple[Scatter, ...] = ()
     states: States | None = None
     left_out: tuple[LeftOut, ...] = ()
+    budget: tuple[BudgetLine, ...] = ()
+    budget_modes: tuple[BudgetMode, ...] = ()
+    hidden_percent: Number = math.nan
+    provisional: Gain | None = None

@@ -1,0 +1,452 @@
+"""What a drawing gets wrong of the structure that it stands for: a budget of its frequency errors.
+
+The handbook says what it knows. Then all that drawings of real structures lack is fitted at once to
+the used modes, each with the room that the drawing leaves it. A joint zone may be stiffer or softer
+about every axis, with the drawing in the middle: the arm of half a depth, a wall that gives and a
+gusset are one net number, for data cannot tell them apart. Modulus, density and masses have little
+room, for they take what is not theirs. What the data do not see stays as drawn.
+
+Source: Tarantola (2005), section 3.2, the most probable point of an iterated linear-Gaussian model;
+Aumann & Shapley (1974) for the shares of what is fitted together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import Literal, cast
+
+import numpy as np
+from msgspec import structs
+
+from femubench.core.case.case import Case
+from femubench.core.change.change import Change
+from femubench.core.change.hypothesis import Hypothesis
+from femubench.core.change.parameter import Parameter
+from femubench.core.change.terms import ElementOperator, Term
+from femubench.core.effect.attachments import mass_term
+from femubench.core.effect.textbook import textbook_values
+from femubench.core.fem.beam import BEND_XY, BEND_XZ, TWIST, mass_matrices, stiffness_matrices
+from femubench.core.fem.frame import ACTIVE, MADE, Factor, Frame, Place, PointMass
+from femubench.core.fem.joints import half_depth, joint_groups, whole_members
+from femubench.core.fem.model import Model
+from femubench.core.fem.structure import Structure
+from femubench.core.fit.mesh_error import mesh_bias
+from femubench.core.fit.modal_fit import Problem, State, fit, state_at
+from femubench.core.fit.noise import Noise
+from femubench.core.fit.projection import Projection
+from femubench.core.fit.residuals import Data
+from femubench.core.fit.static_response import (
+    Basis,
+    LargeProblem,
+    enrich_problem,
+    place_data,
+)
+from femubench.core.inference.settings import settings
+from femubench.core.modal.eigen import zero_tolerance
+from femubench.core.modal.measurement import Measurement
+from femubench.core.roles import Effect
+from femubench.core.schema.diagnosis import Advice, BudgetLine, BudgetMode
+from femubench.core.ties import in_order
+from femubench.core.typing import FloatArray, IntArray
+
+# Of every axis of a joint zone the displacements of an element, and what a factor multiplies.
+_JOINTS = "joint stiffness"
+_AXES = {"rx": (TWIST, "GJ"), "ry": (BEND_XZ, "bending ry"), "rz": (BEND_XY, "bending rz")}
+Source = Literal["handbook", "data", "drawing"]
+_Parts = Sequence[Projection]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What a drawing leaves open of one class at one place: some numbers with a common prior.
+
+    Arguments:
+        place, kind: of the line of the budget that it belongs to.
+        names: of the numbers, (q,).
+        terms: what each changes.
+        root: of their prior covariance, of ln(factor) or in kg, (q, q).
+        quantities: the factor of a frame that each is; of masses none.
+        at: elements with these factors, ``all``, or joints with the mass.
+    """
+
+    place: str
+    kind: str
+    names: tuple[str, ...]
+    terms: tuple[Term, ...]
+    root: FloatArray
+    quantities: tuple[str, ...]
+    at: tuple[str, ...]
+
+    def grow(self, x: FloatArray) -> FloatArray:
+        """Return the factors of the terms at coordinates, (g, q) both."""
+        moved = x @ self.root.T
+        return np.asarray(np.expm1(moved) if self.quantities else moved)
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        """Return it as what a fit takes; a mass cannot be negative."""
+        lower = -np.inf if self.quantities else 0.0
+        reach = settings.widest_coordinate
+        own = tuple(Parameter(n, "", 1.0, lower=lower, reach=reach) for n in self.names)
+        change = Change(self.terms, self.grow, name=self.kind, places=(self.place,), parameters=own)
+        return Hypothesis(cast(Effect, SimpleNamespace(name=self.kind)), change, 1)
+
+    def list_seen(self, covariance: FloatArray) -> list[bool]:
+        """Tell of which numbers the data take away enough of the prior variance.
+
+        Arguments:
+            covariance: of the coordinates by data and prior, (q, q).
+        """
+        left = np.einsum("qk,kl,ql->q", self.root, covariance, self.root)
+        prior = np.square(self.root).sum(axis=1)
+        return [bool(share >= settings.budget_seen) for share in 1.0 - left / prior]
+
+
+@dataclass(frozen=True)
+class Budget:
+    """A budget of errors, and the model that it leads to.
+
+    Arguments:
+        lines: by place and class, largest first.
+        modes: those of the measurement.
+        extended: the drawing with the handbook, and with all that the data see.
+        state: of `extended`, on all measured modes; its parts are all that the drawing leaves open.
+        covariance: of their coordinates, (k, k).
+    """
+
+    lines: tuple[BudgetLine, ...]
+    modes: tuple[BudgetMode, ...]
+    extended: Model
+    state: State
+    covariance: FloatArray
+
+    @property
+    def hidden_percent(self) -> float:
+        """Return the rms change of the frequencies below which no defect shows next to it."""
+        left = [mode.left_percent for mode in self.modes if mode.used]
+        least = float(np.sqrt(np.mean(np.square(left))))
+        return settings.visible_deviations * max(least, 100.0 * settings.budget_rest[0])
+
+
+def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
+    """Return what the drawing of a case lacks; None for a model that came as matrices.
+
+    Arguments:
+        case: only its used modes are fitted; the others are predicted.
+        effects: whose handbook values come first.
+
+    Raises:
+        NotApplicable: when a frequency has no standard deviation.
+        ModelError: when the model has no modes.
+    """
+    model, every = case.model, case.measurement
+    if model.structure is None:
+        return None
+    start = _as_it_is(model, every)
+    last, drawn = log_frequencies(start), np.log(np.abs(start.frequencies[start.partner]))
+    lines = [_line("all", "mesh", last - drawn, np.zeros((len(every),) * 2), "handbook")]
+    for effect in effects:
+        for place, values in textbook_values(effect, model).items():
+            model = cast(Model, effect.extend(model, place, values))
+            now = log_frequencies(_as_it_is(model, every))
+            std = settings.budget_handbook * np.abs(now - last)
+            lines.append(_line(place, effect.name, now - last, np.outer(std, std), "handbook"))
+            last = now
+    entries = list_entries(model)
+    hypotheses = [entry.hypothesis for entry in entries]
+    problem, parts = _pose(model, every.select(case.used), hypotheses, every)
+    whole = fit(problem, parts, np.zeros(sum(len(entry.names) for entry in entries)))
+    if whole is None:
+        return None
+    # What is left beyond the noise makes all of it less sure (Birge 1932).
+    x, excess = whole.state.x, whole.state.chi2 / len(problem.data)
+    covariance = whole.covariance * max(1.0, excess)
+    wide, places = _pose(model, every, hypotheses, every)
+    state = state_at(wide, places, x)
+    slopes, found = frequency_slopes(state), log_frequencies(state)
+    lines += _share_out(entries, state, covariance)
+    deviation = np.sqrt(np.einsum("mk,kl,ml->m", slopes, covariance, slopes))
+    measured = np.log(every.frequencies)
+    figures = 100.0 * np.column_stack([measured - drawn, measured - found, deviation])
+    numbers = zip(every.numbers, figures.tolist(), strict=True)
+    modes = tuple(BudgetMode(number, number in case.used, *row) for number, row in numbers)
+    frame = extend_frame(model.frame_structure.frame, entries, x)
+    extended = Model.of(model.frame_structure.rebuilt(frame))
+    lines.sort(key=lambda line: -abs(line.rms_percent))
+    return Budget(tuple(lines), modes, extended, state, covariance)
+
+
+def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame:
+    """Return a frame with some entries at coordinates, (k,), as factors and masses.
+
+    Changes of the matrices add up, as in the fit, where factors of a frame multiply.
+    """
+    everywhere: dict[str, float] = {}
+    zones: dict[tuple[str, str], float] = {}
+    masses = []
+    for entry, own in zip(entries, _split(entries), strict=True):
+        values = entry.grow(x[None, own])[0].tolist()
+        for quantity, value in zip(entry.quantities, values, strict=False):
+            if entry.kind != _JOINTS:
+                everywhere[quantity] = value
+            else:
+                for label in entry.at:
+                    zones[quantity, label] = zones.get((quantity, label), 0.0) + value
+        if not entry.quantities:
+            masses += [PointMass(Place(joint=name), values[0]) for name in entry.at if values[0]]
+    stiffer = 1.0 + everywhere.get("E", 0.0)
+    twisted = stiffer + everywhere.get("GJ", 0.0)
+    factors = [
+        Factor("E", ("all",), stiffer),
+        Factor("GJ", ("all",), twisted / stiffer),
+        Factor("density", ("all",), 1.0 + everywhere.get("density", 0.0)),
+    ]
+    alike: dict[tuple[str, float], list[str]] = {}
+    for (quantity, label), value in zones.items():
+        whole = twisted if quantity == "GJ" else stiffer
+        alike.setdefault((quantity, max(1.0 + value / whole, settings.quiet_share)), []).append(
+            label
+        )
+    factors += [Factor(name, tuple(labels), factor) for (name, factor), labels in alike.items()]
+    wanted = tuple(factor for factor in factors if factor.factor != 1.0)
+    return replace(frame, factors=(*frame.factors, *wanted), masses=(*frame.masses, *masses))
+
+
+def list_entries(model: Model) -> list[Entry]:
+    """Return all that the drawing of a frame leaves open: joint zones, E, density, masses."""
+    structure = model.frame_structure
+    frame = structure.frame
+    stiff, heavy = (f(structure.properties) for f in (stiffness_matrices, mass_matrices))
+    found, (unknown, passing, correlation, _) = [], settings.budget_joints
+    widths = dict(zip(MADE, settings.budget_made, strict=True))
+    made = {kind.type: widths[kind.made] for kind in frame.joint_kinds}
+    for (place, role), ends in _ends_of_joints(frame).items():
+        rows = np.unique(np.concatenate([_zone(structure, end) for end in ends]))
+        labels = tuple(structure.labels[row] for row in rows)
+        terms = {}
+        for axis in (axis for axis in ACTIVE[frame.plane] if axis in _AXES):
+            own = _AXES[axis][0]
+            index = slice(None), own[:, None], own
+            blocks = np.zeros((len(rows), 12, 12))
+            blocks[index] = stiff[rows][index]
+            if np.abs(blocks).max():
+                terms[axis] = Term("stiffness", ElementOperator(structure, rows, blocks))
+        if terms:
+            bends = np.array([axis != "rx" for axis in terms])
+            alike = np.where(np.outer(bends, bends), correlation, 0.0)
+            np.fill_diagonal(alike, 1.0)
+            std = passing if role == "through" else made.get(place, unknown)
+            root = std * np.linalg.cholesky(alike)
+            names = tuple(axis if role == "end" else f"{role} {axis}" for axis in terms)
+            factors = tuple(_AXES[axis][1] for axis in terms)
+            found.append(Entry(place, _JOINTS, names, tuple(terms.values()), root, factors, labels))
+    every = np.arange(len(structure.properties))
+    twist = np.zeros_like(stiff)
+    index = slice(None), TWIST[:, None], TWIST
+    twist[index] = stiff[index]
+    *wholes, mass = settings.budget_known
+    for quantity, matrix, blocks, std in (
+        ("E", "stiffness", stiff, wholes[0]),
+        ("GJ", "stiffness", twist, wholes[1]),
+        ("density", "mass", heavy, wholes[2]),
+    ):
+        if blocks.any():
+            operator = ElementOperator(structure, every, blocks)
+            term = Term("mass" if matrix == "mass" else "stiffness", operator)
+            found.append(_alone("all", quantity, term, std, (quantity,), ("all",)))
+    kinds: dict[str, list[str]] = {}
+    for joint in frame.joints:
+        kinds.setdefault(joint.type or joint.name, []).append(joint.name)
+    for place, alike_joints in kinds.items():
+        std = mass * model.total_mass / np.sqrt(len(alike_joints))
+        for name in alike_joints:
+            term = mass_term(model, [Place(joint=name)])
+            found.append(_alone(place, "joint mass", term, std, (), (name,)))
+    return found
+
+
+def _alone(
+    place: str, kind: str, term: Term, std: float, quantities: tuple[str, ...], at: tuple[str, ...]
+) -> Entry:
+    """Return an entry of one number, in the name of what it is at."""
+    return Entry(place, kind, (*quantities, *at)[:1], (term,), np.array([[std]]), quantities, at)
+
+
+def _split(entries: Sequence[Entry]) -> list[slice]:
+    """Return which coordinates belong to each entry."""
+    ends = np.cumsum([0, *(len(entry.names) for entry in entries)]).tolist()
+    return [slice(start, end) for start, end in pairwise(ends)]
+
+
+def _ends_of_joints(frame: Frame) -> dict[tuple[str, str], list[str]]:
+    """Return ``member@joint`` by joint type and role; a foot is an end that is held alone.
+
+    Where a member only goes on there is no joint.
+    """
+    found: dict[tuple[str, str], list[str]] = {}
+    within = {name: pieces for pieces in whole_members(frame) for name in pieces}
+    for group in joint_groups(frame):
+        for end in group.ends:
+            ends = frame.ends_at(end.rpartition("@")[2])
+            if len(ends) > 2 or len({within[name] for name in ends}) > 1:
+                found.setdefault((group.type, group.role), []).append(end)
+    held = {str(s.at) for s in frame.supports} | {str(s.at) for s in frame.springs}
+    for joint in frame.joints:
+        ends = frame.ends_at(joint.name)
+        if joint.name in held and len(ends) == 1:
+            own = found.setdefault((joint.type or joint.name, "foot"), [])
+            own.append(f"{next(iter(ends))}@{joint.name}")
+    return found
+
+
+def _zone(structure: Structure, end: str) -> IntArray:
+    """Return the elements of a joint at a member end, one at least, (k,).
+
+    They reach half the depth of what crosses, and once the own depth, from the centre of the joint.
+    """
+    frame, mesh = structure.frame, structure.mesh
+    name, _, joint = end.rpartition("@")
+    number = frame.member_index[name]
+    own = np.flatnonzero(mesh.member == number)
+    own = own[np.argsort(mesh.stations[own, 0])]
+    own = own[[bool(structure.labels[row]) for row in own]]
+    if structure.element_ends[end][1] == 1:
+        own = own[::-1]
+    section, length = frame.members[number].section, structure.properties.length[own]
+    crossing = half_depth(frame, end) if len(frame.ends_at(joint)) > 1 else 0.0
+    reach = crossing + max(section.height or 0.0, section.width or 0.0)
+    reach = min(reach, settings.budget_joints[3] * float(length.sum()))
+    inside = np.cumsum(length) - 0.5 * length < reach
+    inside[0] = True
+    return np.asarray(own[inside])
+
+
+def _pose(
+    model: Model, measurement: Measurement, hypotheses: Sequence[Hypothesis], every: Measurement
+) -> tuple[Problem, _Parts]:
+    """Return some modes in the coordinates of a model, with what no class of a budget is as noise.
+
+    Arguments:
+        every: all measured modes, which the coordinates serve.
+    """
+    basis, bias = Basis.of(model, every), mesh_bias(model, 2 * len(every) + settings.spare_modes)
+    still = basis.modes.rigid | (basis.modes.eigenvalues <= zero_tolerance(basis.modes))
+    data = Data(measurement, np.zeros(0) if bias is None else bias, int(still.sum()))
+    mode, _ = data.shape_rows
+    largest = np.abs(data.shapes).max(axis=0, initial=0.0)
+    rest_f, rest_s = settings.budget_rest
+    rest = np.zeros(len(data))
+    rest[: len(measurement)] = rest_f * measurement.frequencies
+    rest[len(measurement) :][: len(mode)] = rest_s * largest[mode]
+    noise = Noise(np.diag(np.hypot(1.0, rest / data.std)))
+    problem = place_data(basis, data, noise, hypotheses)
+    if isinstance(problem, LargeProblem):
+        return enrich_problem(problem, [problem.common.projector(h) for h in hypotheses])
+    return problem, problem.space.projections
+
+
+def _as_it_is(model: Model, every: Measurement) -> State:
+    return state_at(_pose(model, every, (), every)[0], (), np.zeros(0))
+
+
+def log_frequencies(state: State) -> FloatArray:
+    """Return ln of the frequency of the partner of every measured mode, (m,)."""
+    hertz, _ = state.predicted
+    return np.asarray(np.log(np.abs(hertz[0, state.partner])))
+
+
+def advise_modes(budget: Budget, case: Case) -> tuple[Advice, ...]:
+    """Return the modes that say most of what the drawing lacks, if they were used too.
+
+    Of as many further modes as are used; the separation is the variance of a mode's prediction in
+    those of what no class of a budget is.
+    """
+    state, count = budget.state, len(case.used)
+    numbers = np.array(case.measurement.numbers)
+    used = state.partner[np.isin(numbers, case.used)]
+    moving = np.flatnonzero(~state.problem.space.still(state.eigenvalues))
+    further = np.setdiff1d(moving, used)[:count]
+    slopes = frequency_slopes(state, further)
+    variance = np.einsum("mk,kl,ml->m", slopes, budget.covariance, slopes)
+    separation = variance / settings.budget_rest[0] ** 2
+    space, labels = state.problem.space, case.measurement.sensors.labels
+    seen = np.abs(space.pad_readings(len(state.vectors)) @ state.vectors[:, further])
+    found = []
+    for mode, size, std, reading in zip(
+        further, separation, np.sqrt(variance), seen.T, strict=True
+    ):
+        if size < settings.visible_deviations:  # hardly more than is not known anyhow
+            continue
+        hertz = state.frequencies[mode]
+        low, high = hertz * (1.0 - std), hertz * (1.0 + std)
+        where = " and ".join(labels[i] for i in np.argsort(-reading)[: settings.least_modes])
+        held = numbers[state.partner == mode].tolist()
+        what = f"use mode {held[0]}" if held else "measure and use the mode"
+        text = f"{what} between {low:.4g} and {high:.4g} Hz, where {where} move most"
+        found.append(Advice(text, float(size)))
+    return tuple(in_order(found, lambda advice: -advice.separation))[: settings.of_a_kind]
+
+
+def frequency_slopes(state: State, modes: IntArray | None = None) -> FloatArray:
+    """Return d ln f / d x of the partner of every measured mode, or of other modes, (m, k)."""
+    modes = state.partner if modes is None else modes
+    values, near = state.eigenvalues[modes], state.vectors[:, modes]
+    forces, _ = state.problem.space.forces(state.parts, state.x, near, values)
+    return np.asarray(np.einsum("nm,nmk->mk", near, forces) / (2.0 * values[:, None]))
+
+
+def _share_out(entries: Sequence[Entry], state: State, covariance: FloatArray) -> list[BudgetLine]:
+    """Return the lines of what was fitted, which add up to all that it changes.
+
+    Each entry has the integral of its slope on the straight way from the drawing (Aumann & Shapley
+    1974), by Simpson's rule; what that misses goes to the lines by their size.
+    """
+    x, problem, parts = state.x, state.problem, state.parts
+    way = [state_at(problem, parts, t * x) for t in (0.0, 0.5)] + [state]
+    first, middle, slopes = map(frequency_slopes, way)
+    each = (first + 4.0 * middle + slopes) / 6.0 * x
+    missing = log_frequencies(state) - log_frequencies(way[0]) - each.sum(axis=1)
+    total = np.abs(each).sum(axis=1)
+    each += np.abs(each) * (missing / np.where(total > 0.0, total, 1.0))[:, None]
+    lines: dict[tuple[str, str], list[tuple[Entry, slice]]] = {}
+    for entry, one in zip(entries, _split(entries), strict=True):
+        lines.setdefault((entry.place, entry.kind), []).append((entry, one))
+    found = []
+    for (place, kind), owners in lines.items():
+        own = np.concatenate([np.arange(len(x))[one] for _, one in owners])
+        spread = slopes[:, own] @ covariance[np.ix_(own, own)] @ slopes[:, own].T
+        sees = {
+            name: seen
+            for entry, one in owners
+            for name, seen in zip(entry.names, entry.list_seen(covariance[one, one]), strict=True)
+        }
+        unseen = tuple(name for name, seen in sees.items() if not seen)
+        share = each[:, own].sum(axis=1)
+        # A zone, or a point mass, is an idealisation of what is there.
+        spread = spread + np.outer(share, share) * settings.own_error_of_change**2
+        line = _line(place, kind, share, spread, "data", unseen)
+        moved = len(unseen) < len(sees) or abs(line.rms_percent) > line.rms_std
+        found.append(line if moved else structs.replace(line, source="drawing"))
+    return found
+
+
+def _line(
+    place: str,
+    kind: str,
+    share: FloatArray,
+    covariance: FloatArray,
+    source: Source,
+    unseen: tuple[str, ...] = (),
+) -> BudgetLine:
+    """Return a line from its share in ln f of every mode, and the covariance of that."""
+    rms = float(np.sqrt(np.mean(np.square(share))))
+    std = np.sqrt(np.maximum(covariance.diagonal(), 0.0))
+    # Of the root mean square: along the share itself; of no share, that of one drawn at random.
+    along = share / np.sqrt(len(share)) / rms if rms > 0.0 else np.zeros(len(share))
+    spread = np.sqrt(along @ covariance @ along / len(share)) if rms else np.sqrt(np.mean(std**2))
+    rms = -rms if share.sum() < 0.0 else rms
+    percent = tuple((100.0 * share).tolist()), tuple((100.0 * std).tolist())
+    return BudgetLine(place, kind, *percent, 100.0 * rms, 100.0 * float(spread), source, unseen)
