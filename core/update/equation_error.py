@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import log
 
 import numpy as np
 import scipy.linalg as la
@@ -22,11 +21,8 @@ from femubench.core.update.strategy import ParameterEstimate, UpdateResult
 
 FLOOR = 0.01  # what an element keeps at least of its nominal stiffness, in every strain motion
 _GAP = 1e-9  # of the squared size of the equations
-_CENTRED = 0.1  # of the last barrier, how far the path may be
-_BALANCED = 1e-5  # of the slope, what the elements at the edge do not hold
-_SHRINK = 0.1  # of the gap, which a step aims at
-_OFF_THE_EDGE = 0.95  # of the way to where a matrix is positive definite no more
-_MOST_STEPS = 100
+_SHRINK = 0.2
+_MOST_STEPS = 400
 _RIDGE = 1e-14  # decides motions of x that no equation sees
 
 
@@ -38,8 +34,8 @@ def smallest_core_eigenvalue(family: Family, x: FloatArray) -> float:
 def nearest_positive(family: Family, normal: FloatArray, best: FloatArray) -> FloatArray:
     """Return the least-squares solution among cores with eigenvalues of at least `FLOOR`.
 
-    The problem is convex; primal-dual steps of an interior point method from the nominal model
-    solve it. Where the unbounded solution `best` qualifies, it is the answer.
+    The problem is convex; a logarithmic barrier with Newton steps from the nominal model solves
+    it. Where the unbounded solution `best` qualifies, it is the answer.
 
     Arguments:
         family: elements with cores, linear in the unknowns.
@@ -49,53 +45,73 @@ def nearest_positive(family: Family, normal: FloatArray, best: FloatArray) -> Fl
     Raises:
         StrategyFailure: when the steps do not converge.
 
-    Source: Helmberg, Rendl, Vanderbei & Wolkowicz (1996), SIAM J. Optim. 6, 342-361, for the step.
+    Source: Boyd & Vandenberghe (2004), sections 11.3 and 11.6 (log-determinant barrier).
     """
     if smallest_core_eigenvalue(family, best) >= FLOOR:
         return best
-    assert family.cores is not None
-    n, size = len(best), max(float(np.abs(np.diagonal(normal)).max()), 1e-300)
-    hessian = normal / size + _RIDGE * np.eye(n)
+    size = max(float(np.abs(np.diagonal(normal)).max()), 1e-300)
+    hessian = normal / size + _RIDGE * np.eye(len(best))
     objective = float(best @ hessian @ best)
-    x, unit = np.zeros(n), family.relative_cores(np.zeros(n))
-    room, count = (1.0 - FLOOR) * unit, len(unit) * unit.shape[-1]
-    dual, last = objective / count * unit, objective * 0.2 ** np.ceil(log(_GAP / count) / log(0.2))
-    row = np.where(family.columns < 0, n, family.columns)  # row n collects what is no unknown
-    pairs = (row[:, :, None] * (n + 1) + row[:, None, :]).ravel()
+    x, barrier = np.zeros_like(best), objective
+    count = family.cores.shape[0] * family.cores.shape[-1] if family.cores is not None else 1
     for _ in range(_MOST_STEPS):
-        gap = float(np.einsum("eij,eij->", room, dual))
-        slope = hessian @ (x - best)
-        pull = np.einsum("eaij,eij->ea", family.cores, dual)
-        unbalanced = slope - np.bincount(row.ravel(), pull.ravel(), n + 1)[:n]
-        apart = np.abs(room @ dual - last * unit).max()
-        if apart <= _CENTRED * last and la.norm(unbalanced) <= _BALANCED * la.norm(slope):
-            return x
-        inverse = np.linalg.inv(room)
-        tilted = inverse[:, None] @ family.cores  # e, a, q, q
-        bend = np.einsum("eaij,ebji->eab", tilted, dual[:, None] @ family.cores)
-        second = np.bincount(pairs, bend.ravel(), (n + 1) ** 2).reshape(n + 1, n + 1)[:n, :n]
-        aim = max(_SHRINK * gap / count, last)
-        push = np.bincount(row.ravel(), aim * np.einsum("eaqq->ea", tilted).ravel(), n + 1)[:n]
-        curvature, right = hessian + 0.5 * (second + second.T), push - slope
-        try:
-            step = la.cho_solve(la.cho_factor(curvature, check_finite=False), right)
-        except la.LinAlgError:  # singular to roundoff: the shortest step will do
-            step = la.lstsq(curvature, right)[0]
-        wider = family.relative_cores(step) - unit
-        turned = inverse @ wider @ dual
-        other = aim * inverse - dual - 0.5 * (turned + np.swapaxes(turned, 1, 2))
-        along, across = _longest(room, wider), _longest(dual, other)
-        x, room, dual = x + along * step, room + along * wider, dual + across * other
+        slope, step, size_of_step = _newton(family, hessian, best, x, barrier)
+        moved = x
+        if size_of_step > 0.1 * barrier:
+            moved = _line_search(family, hessian, best, x, slope, step, barrier)
+        if moved is x:
+            if barrier * count <= _GAP * objective:
+                return x
+            barrier *= _SHRINK
+        x = moved
     raise StrategyFailure(
         f"no element stiffness without negative values found in {_MOST_STEPS} steps"
     )
 
 
-def _longest(matrices: FloatArray, changes: FloatArray) -> float:
-    """Return the share of some changes, 1 at most, that leaves all matrices positive definite."""
-    inverse = np.linalg.inv(np.linalg.cholesky(matrices))
-    lowest = float(np.linalg.eigvalsh(inverse @ changes @ np.swapaxes(inverse, 1, 2)).min())
-    return min(1.0, -_OFF_THE_EDGE / lowest) if lowest < 0.0 else 1.0
+def _newton(
+    family: Family, hessian: FloatArray, best: FloatArray, x: FloatArray, barrier: float
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return gradient, Newton step and Newton decrement squared."""
+    assert family.cores is not None
+    room = family.relative_cores(x) - FLOOR * np.eye(family.cores.shape[-1])
+    tilted = np.linalg.solve(room[:, None], family.cores)  # e, a, q, q
+    pull = np.einsum("eaqq->ea", tilted)
+    bend = np.einsum("eaij,ebji->eab", tilted, tilted)
+    n = len(x)
+    row = np.where(family.columns < 0, n, family.columns)  # row n collects what is no unknown
+    gradient = np.zeros(n + 1)
+    np.add.at(gradient, row, -pull)
+    second = np.zeros((n + 1, n + 1))
+    np.add.at(second, (row[:, :, None], row[:, None, :]), bend)
+    total = hessian @ (x - best) + barrier * gradient[:n]
+    curvature = hessian + barrier * second[:n, :n]
+    try:
+        step = -la.cho_solve(la.cho_factor(curvature), total)
+    except la.LinAlgError:  # singular to roundoff: the shortest step will do
+        step = -la.lstsq(curvature, total)[0]
+    return total, step, float(-total @ step)
+
+
+def _line_search(
+    family: Family, hessian: FloatArray, best: FloatArray, x: FloatArray,
+    slope: FloatArray, step: FloatArray, barrier: float,
+) -> FloatArray:  # fmt: skip
+    """Return the next point, inside the cone and lower by Armijo's rule; x itself if none is."""
+
+    def value(point: FloatArray) -> float:
+        room = np.linalg.eigvalsh(family.relative_cores(point)) - FLOOR
+        if room.min() <= 0.0:
+            return np.inf
+        apart = point - best
+        return float(0.5 * apart @ hessian @ apart - barrier * np.log(room).sum())
+
+    start, gain, length = value(x), float(slope @ step), 1.0
+    while length > 1e-10:
+        if value(x + length * step) <= start + 0.1 * length * gain:
+            return np.asarray(x + length * step)
+        length *= 0.5
+    return x
 
 
 MOST_UNKNOWNS = 2000  # dense, so that rank is decidable: about 20 s for five iterations
