@@ -5,7 +5,9 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
-_LONGEST = 600  # characters of one part of a message, which may quote what a third party wrote
+# Characters of one part of a message, which may quote what a third party wrote; a command that
+# helps may have five paths.
+_LONGEST = 1000
 
 
 def _clipped(text: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import random
 import re
@@ -205,7 +206,7 @@ def test_the_lock_of_an_interrupted_run_is_removed(tmp_path: Path) -> None:
 def test_the_lock_of_a_file_that_was_removed_keeps_nobody_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path, flock = tmp_path / "lock", locks.fcntl.flock
+    path, flock = tmp_path / "lock", fcntl.flock
     removed = iter([True, False])
 
     def late(descriptor: int, how: int) -> None:
@@ -213,7 +214,7 @@ def test_the_lock_of_a_file_that_was_removed_keeps_nobody_out(
         if next(removed):
             path.unlink()
 
-    monkeypatch.setattr(locks.fcntl, "flock", late)
+    monkeypatch.setattr(fcntl, "flock", late)
     descriptor = locks.hold_lock(path)
     assert os.path.samestat(os.fstat(descriptor), path.stat())
     os.close(descriptor)

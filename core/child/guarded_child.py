@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import math
 import os
 import select
@@ -379,6 +378,8 @@ def _held_open(process: int, seen: set[tuple[int, int]]) -> Iterator[tuple[bool,
     Arguments:
         seen: files that were counted; takes those that are.
     """
+    import fcntl  # which Windows lacks
+
     # A thread may have a table of open files of its own.
     for task in sorted(map(int, os.listdir(f"/proc/{process}/task")), key=process.__ne__):
         for name in os.listdir(f"/proc/{process}/task/{task}/fd"):

@@ -54,6 +54,7 @@ from femubench.core.typing import FloatArray, IntArray
 
 # Of every axis of a joint zone the displacements of an element, and what a factor multiplies.
 _JOINTS = "joint stiffness"
+_WHOLES = ("E", "GJ", "density")  # of everything
 _AXES = {"rx": (TWIST, "GJ"), "ry": (BEND_XZ, "bending ry"), "rz": (BEND_XY, "bending rz")}
 Source = Literal["handbook", "data", "drawing"]
 _Parts = Sequence[Projection]
@@ -146,6 +147,14 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
     if model.structure is None:
         return None
     start = _as_it_is(model, every)
+    # What the drawing has as a rigid motion has no ratio of frequencies.
+    still = start.problem.space.still(start.eigenvalues[start.partner])
+    every = every.select([n for n, rigid in zip(every.numbers, still, strict=True) if not rigid])
+    used = [number for number in case.used if number in every.numbers]
+    if not used:
+        return None
+    if still.any():
+        start = _as_it_is(model, every)
     last, drawn = log_frequencies(start), np.log(np.abs(start.frequencies[start.partner]))
     lines = [_line("all", "mesh", last - drawn, np.zeros((len(every),) * 2), "handbook")]
     for effect in effects:
@@ -157,7 +166,7 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
             last = now
     entries = list_entries(model)
     hypotheses = [entry.hypothesis for entry in entries]
-    problem, parts = _pose(model, every.select(case.used), hypotheses, every)
+    problem, parts = _pose(model, every.select(used), hypotheses, every)
     whole = fit(problem, parts, np.zeros(sum(len(entry.names) for entry in entries)))
     if whole is None:
         return None
@@ -197,12 +206,11 @@ def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame
                     zones[quantity, label] = zones.get((quantity, label), 0.0) + value
         if not entry.quantities:
             masses += [PointMass(Place(joint=name), values[0]) for name in entry.at if values[0]]
-    stiffer = 1.0 + everywhere.get("E", 0.0)
-    twisted = stiffer + everywhere.get("GJ", 0.0)
+    stiffer, twist, heavier = (everywhere.get(quantity, 0.0) for quantity in _WHOLES)
+    stiffer, twisted = 1.0 + stiffer, 1.0 + stiffer + twist
+    values = (stiffer, twisted / stiffer, 1.0 + heavier)
     factors = [
-        Factor("E", ("all",), stiffer),
-        Factor("GJ", ("all",), twisted / stiffer),
-        Factor("density", ("all",), 1.0 + everywhere.get("density", 0.0)),
+        Factor(quantity, ("all",), value) for quantity, value in zip(_WHOLES, values, strict=True)
     ]
     alike: dict[tuple[str, float], list[str]] = {}
     for (quantity, label), value in zones.items():
@@ -248,14 +256,10 @@ def list_entries(model: Model) -> list[Entry]:
     index = slice(None), TWIST[:, None], TWIST
     twist[index] = stiff[index]
     *wholes, mass = settings.budget_known
-    for quantity, matrix, blocks, std in (
-        ("E", "stiffness", stiff, wholes[0]),
-        ("GJ", "stiffness", twist, wholes[1]),
-        ("density", "mass", heavy, wholes[2]),
-    ):
+    for quantity, blocks, std in zip(_WHOLES, (stiff, twist, heavy), wholes, strict=True):
         if blocks.any():
             operator = ElementOperator(structure, every, blocks)
-            term = Term("mass" if matrix == "mass" else "stiffness", operator)
+            term = Term("mass" if blocks is heavy else "stiffness", operator)
             found.append(_alone("all", quantity, term, std, (quantity,), ("all",)))
     kinds: dict[str, list[str]] = {}
     for joint in frame.joints:
