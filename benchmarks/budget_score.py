@@ -1,0 +1,195 @@
+"""Compare budgets of errors with what drawings lack; write docs/diagnosis-accuracy.md.
+
+    python benchmarks/budget_score.py           # both halves: a figure a structure, and the means
+    python benchmarks/budget_score.py portal    # one structure, class by class
+
+The truths are those of `make truths ARGS="--only lacks"`; half a minute.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # the truths are not installed
+
+from sweep_data import PAGE, as_markdown, filled
+
+import femubench
+from femubench.core.diagnosis.budget import budget_of
+from femubench.core.plugin.loader import list_effects
+from truths.lacks_file import LACKS, Lacks, read_lacks
+
+Array = npt.NDArray[np.float64]
+Class = tuple[str, str]
+MARK = "budget-score"
+CLEAR = 1.645  # deviations of a 90 % interval
+OWN = 0.25  # of its size, by which definitions of a truth differ (five, twenty, 200 times as stiff)
+LEAST = 0.05  # % of frequency; smaller in truth and budget says nothing
+KINDS = {
+    **dict.fromkeys(("support", "joint-stiffness", "joint stiffness"), "joint"),
+    **dict.fromkeys(("joint-mass", "joint mass", "added-mass"), "mass"),
+    **dict.fromkeys(("shear-deformation", "rotary-inertia"), "shear"),
+}
+
+
+def rms(values: Array) -> float:
+    """Return the root of the mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def signed(values: Array) -> float:
+    """Return the rms with the sign of the sum."""
+    return float(np.copysign(rms(values), values.sum()))
+
+
+@dataclass(frozen=True)
+class BudgetScore:
+    """Hold a truth and the budget of its case in the same classes, in % of frequency.
+
+    Arguments:
+        truth: what the drawing lacks.
+    """
+
+    truth: Lacks
+
+    @cached_property
+    def budget(self) -> femubench.diagnosis.Budget:
+        """Return the budget by the used modes."""
+        found = budget_of(femubench.cases[f"suite/{self.truth.structure}"], list_effects())
+        assert found is not None
+        return found
+
+    @cached_property
+    def used(self) -> npt.NDArray[np.bool_]:
+        """Tell which modes were used, (m,)."""
+        return np.array([mode.used for mode in self.budget.modes])
+
+    def name(self, kind: str, place: str) -> Class:
+        """Return what data cannot tell apart under one name: feet, joints, masses, shear."""
+        frame = femubench.cases[f"suite/{self.truth.structure}"].model.structure.frame
+        types = {joint.name: joint.type or joint.name for joint in frame.joints}
+        place, own = place.removeprefix("type:"), KINDS.get(kind, kind)
+        if own == "joint":
+            held = {types.get(str(one.at)) for one in (*frame.supports, *frame.springs)}
+            if types.get(place, place) in held or (kind, place) == ("support", "all"):
+                return "foot", "all"
+        return own, types.get(place, place) if own in ("joint", "mass") else "all"
+
+    @cached_property
+    def true(self) -> dict[Class, Array]:
+        """Return the contribution of every class, (m,)."""
+        found: dict[Class, Array] = {}
+        for part in self.truth.net:
+            key = self.name(part.kind, part.place)
+            found[key] = found.get(key, 0.0) + 100.0 * np.array(part.contribution)
+        return found
+
+    @cached_property
+    def stated(self) -> dict[Class, tuple[Array, float]]:
+        """Return the same of the budget, with the deviation of its rms."""
+        found: dict[Class, tuple[Array, float]] = {}
+        for line in self.budget.lines:
+            key = self.name(line.name, line.place)
+            was, std = found.get(key, (np.zeros(len(self.used)), 0.0))
+            found[key] = was + np.array(line.percent), float(np.hypot(std, line.rms_std))
+        return found
+
+    def both(self, key: Class) -> tuple[Array, Array, float]:
+        """Return truth, budget and deviation of a class, zero where it has none."""
+        none = np.zeros(len(self.used))
+        return self.true.get(key, none), *self.stated.get(key, (none, 0.0))
+
+    @property
+    def classes(self) -> list[Class]:
+        """Return all that either has, the largest first."""
+        every = {*self.true, *self.stated}
+        return sorted(every, key=lambda key: -max(map(rms, self.both(key)[:2])))
+
+    def first(self, count: int) -> tuple[list[Class], list[Class]]:
+        """Return the largest classes of truth and budget."""
+        true = sorted(self.true, key=lambda key: -rms(self.true[key]))
+        stated = sorted(self.stated, key=lambda key: -rms(self.stated[key][0]))
+        return true[:count], stated[:count]
+
+    def error(self, among: npt.NDArray[np.bool_]) -> float:
+        """Return the norm of budget minus truth relative to the truth; 1 for an empty budget."""
+        pairs = [self.both(key)[:2] for key in self.classes]
+        off = np.array([(ours - true)[among] for true, ours in pairs])
+        return float(np.linalg.norm(off) / np.linalg.norm([true[among] for true, _ in pairs]))
+
+    @property
+    def ratio(self) -> float:
+        """Return the error of held-out modes left by the extended model, of the handbook's."""
+        error, left = (
+            np.array([getattr(mode, name) for mode in self.budget.modes])
+            for name in ("error_percent", "left_percent")
+        )
+        book = sum(np.array(n.percent) for n in self.budget.lines if n.source == "handbook")
+        return rms(left[~self.used]) / rms((error - book)[~self.used])
+
+    def intervals(self) -> tuple[list[bool], list[Class]]:
+        """Tell of every class whether its interval has the truth, and which signs are wrong."""
+        inside, wrong = [], []
+        for key in self.classes:
+            true, ours, std = self.both(key)
+            if max(rms(true), rms(ours)) < LEAST:
+                continue
+            reach = CLEAR * float(np.hypot(std, OWN * rms(true)))
+            inside.append(abs(signed(true) - signed(ours)) <= reach)
+            if (
+                rms(ours) > CLEAR * std
+                and rms(true) > 2 * LEAST
+                and signed(true) * signed(ours) < 0
+            ):
+                wrong.append(key)
+        return inside, wrong
+
+
+def row(name: str, scores: list[BudgetScore]) -> dict[str, str]:
+    """Return the figures of some structures."""
+    firsts = [(one.first(1), one.first(2)) for one in scores]
+    found = [key in stated for _, (true, stated) in firsts for key in true]
+    inside = [one for score in scores for one in score.intervals()[0]]
+    ratios = [score.ratio for score in scores]
+    return {
+        "structures": name,
+        "top class right": f"{sum(t == s for (t, s), _ in firsts)} of {len(scores)}",
+        "of two largest": f"{sum(found)} of {len(found)}",
+        "vector error, used": f"{np.mean([one.error(one.used) for one in scores]):.2f}",
+        "held out": f"{np.mean([one.error(~one.used) for one in scores]):.2f}",
+        "in the 90 % interval": f"{sum(inside)} of {len(inside)}",
+        "wrong signs": str(sum(len(one.intervals()[1]) for one in scores)),
+        "unseen error, of the handbook's": f"{np.exp(np.mean(np.log(ratios))):.2f}",
+        "worst": f"{max(ratios):.2f}",
+    }
+
+
+def main() -> None:
+    """Write the table, or show one structure."""
+    truths = [read_lacks(file) for file in sorted(LACKS.glob("*.toml"))]
+    scores = [BudgetScore(truth) for truth in truths if not truth.refused]
+    for score in scores:
+        if score.truth.structure in sys.argv[1:]:
+            for key in score.classes:
+                true, ours, std = score.both(key)
+                print(*key, "truth", true.round(1), "budget", ours.round(1), f"± {std:.2f}")
+    if sys.argv[1:]:
+        return
+    halves = {half: [s for s in scores if s.truth.held == (half == "held")] for half in HALVES}
+    rows = [row(f"{half} ({len(own)})", own) for half, own in halves.items()]
+    rows += [row(f"`{one.truth.structure}`", [one]) for own in halves.values() for one in own]
+    text = filled(PAGE.read_text(encoding="utf-8"), as_markdown(rows), MARK)
+    PAGE.write_text(text, encoding="utf-8")
+    print(as_markdown(rows))
+
+
+HALVES = ("held", "development")
+
+if __name__ == "__main__":
+    main()
