@@ -23,7 +23,7 @@ from sweep_data import PAGE, as_markdown, filled
 import femubench
 from femubench.core.diagnosis.budget import budget_of
 from femubench.core.plugin.loader import list_effects
-from truths.lacks_file import LACKS, Lacks, read_lacks
+from truths.lacks_file import LACKS, Lacks, read_lacks, rms
 
 Array = npt.NDArray[np.float64]
 Class = tuple[str, str]
@@ -36,11 +36,6 @@ KINDS = {
     **dict.fromkeys(("joint-mass", "joint mass", "added-mass"), "mass"),
     **dict.fromkeys(("shear-deformation", "rotary-inertia"), "shear"),
 }
-
-
-def rms(values: Array) -> float:
-    """Return the root of the mean square."""
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def signed(values: Array) -> float:
@@ -73,7 +68,7 @@ class BudgetScore:
     def name(self, kind: str, place: str) -> Class:
         """Return what data cannot tell apart under one name: feet, joints, masses, shear."""
         frame = femubench.cases[f"suite/{self.truth.structure}"].model.structure.frame
-        types = {joint.name: joint.type or joint.name for joint in frame.joints}
+        types = {joint.name: joint.family for joint in frame.joints}
         place, own = place.removeprefix("type:"), KINDS.get(kind, kind)
         if own == "joint":
             held = {types.get(str(one.at)) for one in (*frame.supports, *frame.springs)}

@@ -84,7 +84,7 @@ class Lacks:
     net: tuple[Part, ...]
 
 
-def rms(values: tuple[float, ...]) -> float:
+def rms(values: npt.ArrayLike) -> float:
     """Return the root of the mean square."""
     return float(np.sqrt(np.mean(np.square(values))))
 

@@ -124,14 +124,13 @@ def _of_table(file: Path) -> Responses:
             raise row.error(first, "not a number", "a number")
         rows.append([_number(cell) for cell in cells])
     numbers = np.array(rows, dtype=complex).reshape(-1, len(table.columns))
-    nowhere = np.full((len(columns), 3), np.nan)
     if axis[1].lower().startswith("t"):
         step = np.diff(numbers[:, 0].real)
         if not len(step) or step.min() <= 0.0 or np.ptp(step) > 0.01 * step.mean():
             expected = "even steps in s, two rows or more"
             raise InputError("uneven steps", file=file, key="time", expected=expected)
-        sensors = Sensors(tuple(columns), nowhere, ("",) * len(columns))
-        return TimeSignals(sensors, float(1.0 / step.mean()), np.asarray(numbers[:, 1:].real))
+        rate, values = float(1.0 / step.mean()), np.asarray(numbers[:, 1:].real)
+        return TimeSignals(Sensors.unplaced(columns), rate, values)
     pairs = [column.partition("/") for column in columns]
     for column, (response, slash, reference) in zip(columns, pairs, strict=True):
         if not (response and slash and reference):
@@ -142,9 +141,7 @@ def _of_table(file: Path) -> Responses:
     channels = np.full((len(numbers), len(outputs), len(inputs)), np.nan, dtype=complex)
     for k, (response, _, reference) in enumerate(pairs):
         channels[:, outputs.index(response), inputs.index(reference)] = numbers[:, 1 + k]
-    sensors, forces = (
-        Sensors(tuple(side), nowhere[: len(side)], ("",) * len(side)) for side in (outputs, inputs)
-    )
+    sensors, forces = Sensors.unplaced(outputs), Sensors.unplaced(inputs)
     return FrequencyResponses(sensors, forces, np.asarray(numbers[:, 0].real), channels, _QUANTITY)
 
 
@@ -163,9 +160,7 @@ def _of_arrays(file: Path) -> FrequencyResponses:
             np.load(stream, allow_pickle=False) as held,
         ):
             names = [tuple(held[side].tolist()) for side in ("responses", "references")]
-            first, second = (
-                Sensors(n, np.full((len(n), 3), np.nan), ("",) * len(n)) for n in names
-            )
+            first, second = map(Sensors.unplaced, names)
             hz, values, quantity = (held[key] for key in ("frequencies", "values", "quantity"))
             return FrequencyResponses(first, second, hz, values, str(quantity[0]))  # type: ignore[arg-type]
     except Exception as error:  # whatever a broken file makes of this reader
@@ -188,11 +183,10 @@ def _labelled(file: Path, found: Responses, known: Sensors | None) -> Responses:
     values = found.values * [factor for _, factor, _ in named]
     labels = [label or f"?{k}" for k, (_, _, label) in enumerate(named)]
     motions, forces = ([labels[k] for k in np.flatnonzero(some)] for some in (~acting, acting))
-    nowhere = np.full((len(labels), 3), np.nan)
     ways = tuple(np.array(found.sensors.directions)[~acting].tolist())
     sensors, own = Sensors(tuple(motions), found.sensors.xyz[~acting], ways), found.forces
     if acting.any():
-        own = Sensors(tuple(forces), nowhere[acting], ("",) * len(forces))
+        own = Sensors.unplaced(forces)
         found = replace(found, force_values=values[:, acting])
     sensors, own = _both_sides(file, (sensors, own), known)
     quantity: Any = quantities.pop()

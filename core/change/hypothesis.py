@@ -68,6 +68,11 @@ class Hypothesis:
         return getattr(self.effect, "refines", None)
 
     @property
+    def cause(self) -> tuple[str, str, int]:
+        """Return what it is the same by in other explanations: effect, place, number of values."""
+        return self.effect.name, self.place, len(self.parameters)
+
+    @property
     def textbook(self) -> FloatArray | None:
         """Return the coordinates of the textbook values, None where one has none."""
         values = [p.textbook for p in self.parameters]

@@ -176,7 +176,7 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
     wide, places = _pose(model, every, hypotheses, every)
     state = state_at(wide, places, x)
     slopes, found = frequency_slopes(state), log_frequencies(state)
-    lines += _share_out(entries, state, covariance)
+    lines += _share_out(entries, state, slopes, covariance)
     deviation = np.sqrt(np.einsum("mk,kl,ml->m", slopes, covariance, slopes))
     measured = np.log(every.frequencies)
     figures = 100.0 * np.column_stack([measured - drawn, measured - found, deviation])
@@ -263,7 +263,7 @@ def list_entries(model: Model) -> list[Entry]:
             found.append(_alone("all", quantity, term, std, (quantity,), ("all",)))
     kinds: dict[str, list[str]] = {}
     for joint in frame.joints:
-        kinds.setdefault(joint.type or joint.name, []).append(joint.name)
+        kinds.setdefault(joint.family, []).append(joint.name)
     for place, alike_joints in kinds.items():
         std = mass * model.total_mass / np.sqrt(len(alike_joints))
         for name in alike_joints:
@@ -301,7 +301,7 @@ def _ends_of_joints(frame: Frame) -> dict[tuple[str, str], list[str]]:
     for joint in frame.joints:
         ends = frame.ends_at(joint.name)
         if joint.name in held and len(ends) == 1:
-            own = found.setdefault((joint.type or joint.name, "foot"), [])
+            own = found.setdefault((joint.family, "foot"), [])
             own.append(f"{next(iter(ends))}@{joint.name}")
     return found
 
@@ -402,17 +402,19 @@ def frequency_slopes(state: State, modes: IntArray | None = None) -> FloatArray:
     return np.asarray(np.einsum("nm,nmk->mk", near, forces) / (2.0 * values[:, None]))
 
 
-def _share_out(entries: Sequence[Entry], state: State, covariance: FloatArray) -> list[BudgetLine]:
+def _share_out(
+    entries: Sequence[Entry], state: State, slopes: FloatArray, covariance: FloatArray
+) -> list[BudgetLine]:
     """Return the lines of what was fitted, which add up to all that it changes.
 
     Each entry has the integral of its slope on the straight way from the drawing (Aumann & Shapley
     1974), by Simpson's rule; what that misses goes to the lines by their size.
     """
     x, problem, parts = state.x, state.problem, state.parts
-    way = [state_at(problem, parts, t * x) for t in (0.0, 0.5)] + [state]
-    first, middle, slopes = map(frequency_slopes, way)
+    start, half = (state_at(problem, parts, t * x) for t in (0.0, 0.5))
+    first, middle = frequency_slopes(start), frequency_slopes(half)
     each = (first + 4.0 * middle + slopes) / 6.0 * x
-    missing = log_frequencies(state) - log_frequencies(way[0]) - each.sum(axis=1)
+    missing = log_frequencies(state) - log_frequencies(start) - each.sum(axis=1)
     total = np.abs(each).sum(axis=1)
     each += np.abs(each) * (missing / np.where(total > 0.0, total, 1.0))[:, None]
     lines: dict[tuple[str, str], list[tuple[Entry, slice]]] = {}

@@ -145,12 +145,8 @@ def _coordinates(
     """Return the coordinates of a hypothesis and their variances; None where it is no part."""
     start = 0
     for part in explanation.parts:
-        h, width = part.hypothesis, len(part.hypothesis.parameters)
-        if (h.effect.name, h.place, width) == (
-            hypothesis.effect.name,
-            hypothesis.place,
-            len(hypothesis.parameters),
-        ):
+        width = len(part.hypothesis.parameters)
+        if part.hypothesis.cause == hypothesis.cause:
             own = slice(start, start + width)
             return explanation.fit.state.x[own], explanation.fit.covariance.diagonal()[own]
         start += width

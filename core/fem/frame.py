@@ -50,6 +50,11 @@ class Joint:
     xyz: Vector
     type: str = ""
 
+    @property
+    def family(self) -> str:
+        """Return its type; a joint without one is a type of its own."""
+        return self.type or self.name
+
 
 @dataclass(frozen=True)
 class Member:

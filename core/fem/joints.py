@@ -105,7 +105,7 @@ def joint_groups(frame: Frame, *, merged: bool = False) -> tuple[JointGroup, ...
     for joint in frame.joints:
         roles = _roles(frame, joint.name)
         if len(roles) > 1:
-            kind = "all" if merged else (joint.type or joint.name)
+            kind = "all" if merged else joint.family
             for member, role in roles.items():
                 found.setdefault((kind, role), []).append(f"{member}@{joint.name}")
     return tuple(JointGroup(kind, role, tuple(ends)) for (kind, role), ends in found.items())

@@ -212,9 +212,8 @@ class MeshedFrame:
         for joint in self.frame.joints:
             members = self.frame.ends_at(joint.name)
             if len(members) > 1:
-                key = joint.type or joint.name
                 ends = tuple(f"{member}@{joint.name}" for member in members)
-                groups[key] = groups.get(key, ()) + ends
+                groups[joint.family] = groups.get(joint.family, ()) + ends
         return groups
 
     @property

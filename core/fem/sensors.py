@@ -86,6 +86,12 @@ class Sensors:
     directions: tuple[str, ...]
 
     @classmethod
+    def unplaced(cls, labels: Iterable[str], direction: str = "") -> Sensors:
+        """Return sensors of which the names are known, and perhaps one direction of all."""
+        names = tuple(labels)
+        return cls(names, np.full((len(names), 3), np.nan), (direction,) * len(names))
+
+    @classmethod
     def along(cls, labels: Iterable[str], xyz: FloatArray, axes: FloatArray) -> Sensors:
         """Return sensors along any axes.
 

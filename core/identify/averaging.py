@@ -213,8 +213,7 @@ def _of_decays(measured: TimeSignals, values: AnyArray, hz: FloatArray) -> Frequ
         count = min(values.shape[2], len(measured.sensors), _MOST_DECAYS)
         flat = values.reshape(-1, values.shape[2])
         values = values @ np.linalg.svd(flat, full_matrices=False)[2][:count].conj().T
-    labels = tuple(f"decay {k + 1}" for k in range(values.shape[2]))
-    references = Sensors(labels, np.full((len(labels), 3), np.nan), ("x",) * len(labels))
+    references = Sensors.unplaced((f"decay {k + 1}" for k in range(values.shape[2])), "x")
     return FrequencyResponses(measured.sensors, references, hz, values, "free decay")
 
 

@@ -354,11 +354,7 @@ def search_explanations(
 
 def _causes(explanation: Explanation) -> tuple[object, ...]:
     """Return what is the same of explanations that differ in their scales alone."""
-    places = (
-        (p.hypothesis.effect.name, p.hypothesis.place, len(p.hypothesis.parameters))
-        for p in explanation.parts
-    )
-    return (explanation.base.names, *sorted(places))
+    return (explanation.base.names, *sorted(p.hypothesis.cause for p in explanation.parts))
 
 
 def with_scales(

@@ -239,7 +239,7 @@ def _end_moments(
     """
     frame, mesh = structure.frame, structure.mesh
     matrices = stiffness_matrices(structure.properties), mass_matrices(structure.properties)
-    kind = {joint.name: joint.type or joint.name for joint in frame.joints}
+    kind = {joint.name: joint.family for joint in frame.joints}
     active = [d for d, word in enumerate(("rx", "ry", "rz")) if word in ACTIVE[frame.plane]]
     moments: tuple[list[FloatArray], list[FloatArray]] = [], []
     labels = []

@@ -161,10 +161,10 @@ class Search:
             np.split(explanation.fit.state.x, np.cumsum(counts)[:-1]),
             strict=True,
         )
-        kept = [(_cause_at(h), x) for h, x in pairs if h.name not in book] if counts else []
+        kept = [(h.cause, x) for h, x in pairs if h.name not in book] if counts else []
         result = []
         for item in found:
-            known = {_cause_at(p.hypothesis): p for p in item.problem.space.projections}
+            known = {p.hypothesis.cause: p for p in item.problem.space.projections}
             if item.base.names == book or not kept or any(key not in known for key, _ in kept):
                 continue
             problem, parts = enrich_problem(item.problem, [known[key] for key, _ in kept])
@@ -371,11 +371,6 @@ class Search:
                 seed = Explanation(found.base, alone, self.names)
                 result += self.grow(found, seed, tried)
         return result
-
-
-def _cause_at(hypothesis: Hypothesis) -> tuple[str, str, int]:
-    """Return what a cause is called, where it sits and how many values it has."""
-    return hypothesis.name, hypothesis.place, len(hypothesis.parameters)
 
 
 def _first_of_a_name(screened: Sequence[Screened]) -> list[Screened]:

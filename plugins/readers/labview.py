@@ -54,13 +54,12 @@ def _segments(path: Path) -> Iterator[TimeSignals]:
                 break  # the header of the next segment
             rows.append([float(cell or "nan") for cell in cells])
         units = [*head.get("Y_Unit_Label", []), *[""] * wide]
-        labels = tuple(
+        labels = (
             f"{name.strip()} [{unit.strip() or '-'}]"
             for name, unit in zip(names[first:wide:step], units, strict=False)
         )
-        sensors = Sensors(labels, np.full((len(labels), 3), np.nan), ("",) * len(labels))
         seconds = float(head["Delta_X"][0].replace(point.strip(), "."))
-        yield TimeSignals(sensors, 1.0 / seconds, np.array(rows)[:, first::step])
+        yield TimeSignals(Sensors.unplaced(labels), 1.0 / seconds, np.array(rows)[:, first::step])
 
 
 def _header(lines: list[str], mark: str) -> dict[str, list[str]]:

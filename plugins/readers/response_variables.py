@@ -109,7 +109,7 @@ def _side(found: Mapping[str, Any], key: str, count: int, path: Path) -> Sensors
     if len(labels) != count:
         what = f"{len(labels)} labels of {count} channels"
         raise InputError(what, file=path, key=key, expected=f"--variables {key}=NAME of as many")
-    return Sensors(tuple(labels), np.full((count, 3), np.nan), ("",) * count)
+    return Sensors.unplaced(labels)
 
 
 def _quantity(found: Mapping[str, Any], key: str, path: Path) -> Quantity:
