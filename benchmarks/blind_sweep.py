@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, astuple, dataclass
@@ -154,13 +155,23 @@ def _fits(diagnosis: Diagnosis, truth: Truth) -> Record:
     return fits_of(diagnosis.examination, causes, registered_effects(), partial(match, frame))
 
 
+# How a diagnosis names the sensors that a truth has wrong, and the numbers of their points.
+_SENSORS = {
+    "sensors-swapped": re.compile(r"sensors (\d+) and (\d+) are swapped"),
+    "sensor-gain": re.compile(r"sensor (\d+) has a gain of"),
+}
+
+
 def _stated_of(answer: Answer, truth: Truth) -> list[Statement]:
     frame = structure_named(truth.structure).frame
+    wrong = {name: words.match(truth.outside) for name, words in _SENSORS.items()}
 
     def is_named(effect: str) -> bool:
-        return any(effect == cause.effect for cause in truth.causes)
+        return bool(wrong.get(effect)) or any(effect == cause.effect for cause in truth.causes)
 
     def is_placed(effect: str, place: str) -> bool:
+        if sensors := wrong.get(effect):
+            return sorted(re.findall(r"\d+", place)) == sorted(sensors.groups())
         return any(effect == c.effect and match(frame, place, c.place) for c in truth.causes)
 
     return statements(answer, is_named, is_placed)

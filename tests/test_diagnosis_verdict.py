@@ -28,7 +28,9 @@ from femubench.core.diagnosis.verdict import (
 )
 from femubench.core.fit.residuals import Data
 from femubench.core.inference.posterior import Posterior
+from femubench.core.inference.prior import outside_odds
 from femubench.core.inference.search import adequacy
+from femubench.core.inference.settings import overridden, settings
 from femubench.fem import Frame, Joint, Material, Member, Place, Section, Support
 
 FRAME = structure_named("ladder").frame
@@ -217,6 +219,24 @@ def test_a_guess_is_believed_no_more_than_the_data_allow() -> None:
     clean = posterior(explained((), 0.999), explained(("a",), 0.001))
     assert decided(clean, 0.5, True).nothing == pytest.approx(0.999)
     assert decided(clean, 1e-9, True).nothing < 1e-6
+
+
+def test_what_several_causes_imitate_lowers_what_is_stated_and_not_what_is_preferred() -> None:
+    """A cause outside the catalogue that they imitate is weighed with each, by its prior."""
+    by_one, by_more = settings.prior_imitated
+    one, two, nothing = explained(("a",), 0.3), explained(("a", "b"), 0.6), explained((), 0.1)
+    for e in (one, two, nothing):
+        e.outside = outside_odds(len(e.parts), settings.prior_of_causes)
+    _, first, second, *_ = settings.prior_of_causes
+    unknown = 0.3 * by_one / first + 0.6 * by_more / second
+    found = posterior(one, two, nothing)
+    assert found.known == pytest.approx(1.0 / (1.0 + unknown))
+    assert found.names == pytest.approx({("a", "b"): 0.6, ("a",): 0.3, (): 0.1})
+    assert posterior(nothing).known == 1.0
+    assert 0.99 < posterior(one).known < 1.0
+    with overridden({"prior_imitated": (5e-5, 5e-5)}):
+        two.outside = outside_odds(2, settings.prior_of_causes)
+        assert posterior(two).known > 0.999
 
 
 def test_what_its_own_error_makes_up_for_is_no_cause() -> None:

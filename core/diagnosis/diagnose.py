@@ -37,7 +37,7 @@ from femubench.core.diagnosis.tables import (
     smallest_visible,
 )
 from femubench.core.diagnosis.verdict import Decision, Sufficiency, decide, elsewhere
-from femubench.core.diagnosis.words import sentence_of, words_of_provisional
+from femubench.core.diagnosis.words import percent, sentence_of, words_of_provisional
 from femubench.core.fem.model import Model
 from femubench.core.fit.extended_model import departure
 from femubench.core.fit.static_response import LargeProblem
@@ -251,6 +251,7 @@ def _written(
     if decision.shared:
         causes = [cause for cause in causes if cause.effect in decision.shared]
         top = sum(p for key, p in posterior.names.items() if set(decision.shared) <= set(key))
+    top *= posterior.known if decision.group else 1.0
     stated = decision, causes, options, top, proof.gain_rms
     bare = posterior.best(()).fit.state.problem.noise
     said = sentence_of(*stated, reference=case.reference is not None, beam=bare.beam)
@@ -367,6 +368,12 @@ def _notes(
         names = " + ".join(examination.posterior.key(first))
         notes.append(
             f"{names} at {first.place} is likelier by the used data, but unseen data refute it."
+        )
+    known = examination.posterior.known
+    if shown and known < settings.nearly_all:
+        notes.append(
+            "Several effects together may imitate a cause that no effect describes: "
+            f"probability {percent(1.0 - known)}."
         )
     unearned = [name for name in best.base.names if name not in examination.posterior.earned]
     if unearned:

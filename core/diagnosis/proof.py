@@ -41,7 +41,7 @@ def _log_likelihood(errors: FloatArray, std: FloatArray) -> float:
     """
     widest = settings.widest_coordinate
     z = np.linspace(-widest, widest, 2 * settings.grid_points - 1)
-    own = Discrepancy(settings.unseen_error_median, settings.unseen_error_spread)
+    own = Discrepancy(*settings.unseen_error)
     sizes = own.std(z)
     weights = np.exp(-0.5 * np.square(z))
     sizes, weights = np.append(sizes, 0.0), np.append(0.5 * weights / weights.sum(), 0.5)

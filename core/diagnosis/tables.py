@@ -187,7 +187,7 @@ def list_causes(
         found.append(
             replace(
                 cause,
-                probability=held * posterior.inclusion(name),
+                probability=held * posterior.known * posterior.inclusion(name),
                 place_probability=shares[cause.place],
                 places=credible(shares),
                 mirrors=mirror_places(examination.model, cause.place, others) if others else (),
@@ -286,7 +286,7 @@ def rivals_of(
         Rival(
             *label,
             delta_chi2=2.0 * (first[label].log_likelihood - nothing.log_likelihood),
-            probability=totals[label],
+            probability=posterior.known * totals[label],
             angle=angle_between(best, first[label]) if best is not None else float("nan"),
         )
         for label in ranked

@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 
 from femubench.core.fit.modal_fit import Fit, State, state_at
 from femubench.core.fit.projection import Projection
-from femubench.core.inference.prior import Base, log_prior
+from femubench.core.inference.prior import Base, log_prior, outside_odds
 from femubench.core.inference.settings import settings
 from femubench.core.ties import by_probability, in_order
 
@@ -72,11 +72,19 @@ class Explanation:
     @cached_property
     def log_prior(self) -> float:
         """Return ln of the prior, and of what is improbable whatever the readings are."""
-        further = settings.prior_of_further_causes
-        counts = further if self.base.parts else settings.prior_of_causes
         missed = self.missed * log(settings.prior_missed_mode)
-        prior = log_prior(self.parts, self.names, counts) + missed
+        prior = log_prior(self.parts, self.names, self._counts) + missed
         return self.base.log_prior + prior
+
+    @property
+    def _counts(self) -> tuple[float, ...]:
+        further = settings.prior_of_further_causes
+        return further if self.base.parts else settings.prior_of_causes
+
+    @property
+    def outside(self) -> float:
+        """Return the odds that its causes only imitate one that no effect describes."""
+        return outside_odds(len(self.parts), self._counts)
 
     @property
     def log_joint(self) -> float:
@@ -200,6 +208,15 @@ class Posterior:
         for key, p in zip(self.keys, self.probabilities, strict=True):
             totals[key] = totals.get(key, 0.0) + p
         return {key: totals[key] for key in by_probability(totals)}
+
+    @cached_property
+    def known(self) -> float:
+        """Return the probability that what is missing is in the catalogue.
+
+        A cause that no effect describes is weighed with every explanation that would imitate it.
+        """
+        pairs = zip(self.explanations, self.probabilities, strict=True)
+        return 1.0 / (1.0 + sum(p * e.outside for e, p in pairs))
 
     def inclusion(self, name: str) -> float:
         """Return the probability that an effect is part of the name."""

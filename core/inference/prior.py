@@ -69,6 +69,19 @@ def log_prior(parts: Sequence[Projection], names: int, counts: Sequence[float]) 
     return result
 
 
+def outside_odds(count: int, counts: Sequence[float]) -> float:
+    """Return the odds that so many causes together imitate one outside the catalogue.
+
+    Arguments:
+        count: of the causes; nothing imitates nothing.
+        counts: prior probability of so many causes.
+    """
+    if not count:
+        return 0.0
+    imitated = settings.prior_imitated[count > 1]
+    return imitated / counts[min(count, len(counts) - 1)]
+
+
 def selection_cost(names: int, places: float) -> float:
     """Return by how much chi-square must fall for one more cause to be worth its prior."""
     _, one, two, *_ = settings.prior_of_causes

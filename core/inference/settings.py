@@ -86,6 +86,11 @@ class Settings:
     prior_whole_textbook: float = _prior(
         0.8, "probability", "it lacks all of it, since every beam has it; other sets share the rest"
     )
+    prior_imitated: tuple[float, float] = _prior(
+        (0.002, 0.022),
+        "probability",
+        "no effect describes it (0.05), one or several imitate it (1 and 11 of 25 own beams)",
+    )
     damage_of_part: float = _prior(
         0.4,
         "of ln(factor)",
@@ -149,11 +154,10 @@ class Settings:
     shape_label: float = _prior(
         0.1, "of a shape's largest reading", "as far off it labels an unseen mode no better"
     )
-    unseen_error_median: float = _prior(
-        0.003, "of a frequency", "what a beam model gets wrong of an unseen mode, where anything"
-    )
-    unseen_error_spread: float = _prior(
-        1.5, "of the logarithm", "the size of that error is hardly known"
+    unseen_error: tuple[float, float] = _prior(
+        (0.003, 1.5),
+        "of a frequency, of the logarithm",
+        "what a beam model gets wrong of an unseen mode, where anything; how well that is known",
     )
     widest_coordinate: float = _prior(
         3.0, "prior deviations", "beyond this a parameter or a size is not believed"
