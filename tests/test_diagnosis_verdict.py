@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
@@ -14,7 +15,7 @@ from diagnosis_problems import case_of, catalogue, effects_named, measured
 from femubench import Case, Diagnosis, InputError, Measurement, Model, diagnose
 from femubench.core.case.modes import NO_SENSORS
 from femubench.core.challenge.structures import structure_named
-from femubench.core.change.hypothesis import by_themselves
+from femubench.core.change.hypothesis import Hypothesis, by_themselves
 from femubench.core.diagnosis import proof
 from femubench.core.diagnosis.scatter import scatter_rows
 from femubench.core.diagnosis.verdict import (
@@ -27,10 +28,11 @@ from femubench.core.diagnosis.verdict import (
     most_believed,
 )
 from femubench.core.fit.residuals import Data
-from femubench.core.inference.posterior import Posterior
+from femubench.core.inference.posterior import Explanation, Posterior
 from femubench.core.inference.prior import outside_odds
 from femubench.core.inference.search import adequacy
 from femubench.core.inference.settings import overridden, settings
+from femubench.core.plugin.loader import load_plugins
 from femubench.fem import Frame, Joint, Material, Member, Place, Section, Support
 
 FRAME = structure_named("ladder").frame
@@ -602,3 +604,15 @@ def test_there_must_be_a_used_mode() -> None:
     case = trial("density", "all", 0.08)
     with pytest.raises(InputError, match="no used mode"):
         diagnosed(replace(case, used=()))
+
+
+def test_a_diagnosis_leaves_nothing_behind_but_the_last() -> None:
+    """A model keeps what was made of it, and each look for plugins makes effects anew."""
+    case = case_of(MODEL, measured(MODEL, FRAME), 6)
+    counts = []
+    for _ in range(3):
+        effects = load_plugins().effects
+        assert diagnose(case, [effects["added-mass"], effects["member-stiffness"]]).examination
+        gc.collect()
+        counts.append(sum(type(kept) in (Hypothesis, Explanation) for kept in gc.get_objects()))
+    assert counts[2] == counts[1]

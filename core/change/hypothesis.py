@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
@@ -241,18 +241,19 @@ def _offered(
     model: Model, effects: Iterable[Effect], damage: float
 ) -> list[tuple[Hypothesis, bool]]:
     """Return every effect at every place, and whether it holds what is known to hang free."""
+    kept: dict[str, tuple[Effect, list[tuple[Hypothesis, bool]]]]
+    kept = once_for(model, ("hypotheses", damage), dict)
     found: list[tuple[Hypothesis, bool]] = []
     for effect in effects:
-        # Kept with the effect, so that no other one has its address meanwhile.
-        make = partial(_placed, model, effect, damage)
-        found += once_for(model, ("hypotheses", damage, id(effect)), make)[1]
+        # One of a name: every look for plugins makes effects anew.
+        if effect.name not in kept or kept[effect.name][0] is not effect:
+            kept[effect.name] = effect, _placed(model, effect, damage)
+        found += kept[effect.name][1]
     return found
 
 
-def _placed(
-    model: Model, effect: Effect, damage: float
-) -> tuple[Effect, list[tuple[Hypothesis, bool]]]:
-    """Return an effect with its hypotheses, each with whether it holds what hangs free."""
+def _placed(model: Model, effect: Effect, damage: float) -> list[tuple[Hypothesis, bool]]:
+    """Return the hypotheses of an effect, each with whether it holds what hangs free."""
     each = {p: tuple(effect.parameters(model, p)) for p in dict.fromkeys(effect.places(model))}
     if damage:  # what is true of the whole is a matter of the material, or of the weather
         parts = [p for p in each if p != "all"]
@@ -266,7 +267,7 @@ def _placed(
     held = [model.free and _holds(model, one) for one in own]
     count = held.count(False)
     pairs = zip(own, held, strict=True)
-    return effect, [(replace(one, places=count or len(own)), h) for one, h in pairs]
+    return [(replace(one, places=count or len(own)), h) for one, h in pairs]
 
 
 def _holds(model: Model, hypothesis: Hypothesis) -> bool:

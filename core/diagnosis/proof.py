@@ -365,10 +365,11 @@ def extend_by(model: Model, explanation: Explanation, x: FloatArray | None = Non
     """
     if x is not None:
         return _extended(model, explanation, np.clip(x, *bounds_of(explanation.parts)))
-    # With the explanation, so that nothing else has its number as long as this is kept.
-    key = "extended by", id(explanation)
-    found = explanation, explanation.fit.state.x
-    return once_for(model, key, lambda: (explanation, _extended(model, *found)))[1]
+    # The last one alone: an explanation holds all that it was fitted with.
+    kept: dict[str, tuple[Explanation, Model]] = once_for(model, "extended by", dict)
+    if "last" not in kept or kept["last"][0] is not explanation:
+        kept["last"] = explanation, _extended(model, explanation, explanation.fit.state.x)
+    return kept["last"][1]
 
 
 def _extended(model: Model, explanation: Explanation, x: FloatArray) -> Model:
