@@ -6,6 +6,7 @@ from femubench.core.change.interpolation import (
     chebyshev_nodes as chebyshev_nodes,
 )
 from femubench.core.change.parameter import Parameter as Parameter
+from femubench.core.change.tabulated import tabulate_change as tabulate_change
 from femubench.core.change.terms import (
     ElementOperator as ElementOperator,
     MatrixOperator as MatrixOperator,

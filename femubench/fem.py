@@ -33,6 +33,7 @@ from femubench.core.fem.frame import (
     Preload as Preload,
     RigidEnd as RigidEnd,
     Support as Support,
+    halves_of as halves_of,
 )
 from femubench.core.fem.group_factors import (
     GROUP as GROUP,

@@ -23,7 +23,7 @@ CASES = Path(__file__).parent / "cases"
 LINES = """
 [[model.factors]]
 quantity = "E"
-at = ["post/1", "post"]
+at = ["post/1", "post/2:first", "post"]
 factor = 0.7
 [[model.factors]]
 quantity = "shear"
@@ -82,7 +82,7 @@ class TestReading:
         frame = read_case(path).model.frame_structure.frame
         assert frame.rotary_inertia == 1.4
         assert frame.factors == (
-            Factor("E", ("post/1", "post"), 0.7),
+            Factor("E", ("post/1", "post/2:first", "post"), 0.7),
             Factor("shear", ("all",), 0.0),
         )
         assert frame.eccentricities == (Eccentricity("post", 0.004, 0.0),)
@@ -96,6 +96,8 @@ class TestReading:
         [
             ('"E"', '"G"', "factors[0].quantity", "'G'", "EA, EI"),
             ('/1"', '/99"', "factors[0].at", "element '99'", "1 to"),
+            ('/2:first"', '/99:first"', "factors[0].at", "element '99'", "1 to"),
+            ('/2:first"', '/2:last"', "factors[0].at", "element '2:last'", "1 to"),
             ('"all"', '"everything"', "factors[1].at", "no member 'everything'", "member/k"),
             ('"all"', "3", "factors[1].at", "places", "member/k"),
             ("factor = 0.7", "factor = 0.0", "factors[0].factor", "leaves no E", "> 0"),

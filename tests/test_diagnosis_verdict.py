@@ -15,6 +15,7 @@ from diagnosis_problems import case_of, catalogue, effects_named, measured
 from femubench import Case, Diagnosis, InputError, Measurement, Model, diagnose
 from femubench.core.case.modes import NO_SENSORS
 from femubench.core.challenge.structures import structure_named
+from femubench.core.challenge.truth import finer
 from femubench.core.change.hypothesis import Hypothesis, by_themselves
 from femubench.core.diagnosis import proof
 from femubench.core.diagnosis.scatter import scatter_rows
@@ -33,7 +34,7 @@ from femubench.core.inference.prior import outside_odds
 from femubench.core.inference.search import adequacy
 from femubench.core.inference.settings import overridden, settings
 from femubench.core.plugin.loader import load_plugins
-from femubench.fem import Frame, Joint, Material, Member, Place, Section, Support
+from femubench.fem import Factor, Frame, Joint, Material, Member, Place, Section, Support
 
 FRAME = structure_named("ladder").frame
 MODEL = Model.of(FRAME)
@@ -604,6 +605,19 @@ def test_there_must_be_a_used_mode() -> None:
     case = trial("density", "all", 0.08)
     with pytest.raises(InputError, match="no used mode"):
         diagnosed(replace(case, used=()))
+
+
+def test_what_half_an_element_has_lost_is_named_there() -> None:
+    lost = 0.75
+    frame = replace(finer(FRAME), factors=(Factor("E", ("front-left/6",), 1.0 - lost),))
+    test = measured(Model.of(frame), frame, rng=np.random.default_rng(3))
+    found = diagnose(case_of(MODEL, test, 6), effects_named("local-stiffness-loss", "added-mass"))
+    (cause,) = found.causes
+    assert (found.verdict, cause.place) == ("named", "front-left/3:second")
+    (parameter,) = cause.parameters
+    assert abs(parameter.value - lost) < 2.0 * (parameter.std or 0.0)
+    written = found.extended.frame_structure.frame.factors[-1]
+    assert written.at == ("front-left/3:second",)
 
 
 def test_a_diagnosis_leaves_nothing_behind_but_the_last() -> None:

@@ -305,6 +305,10 @@ def test_loss_takes_split_elements_whole(ladder: FrameBuilder) -> None:
     assert len(elements_of(model.frame_structure, "AB")) == 5
     assert len(elements_of(model.frame_structure, "all")) == 29
     check_exact(LocalStiffnessLoss(), model, "AB/2", [0.4])
+    for half in LocalStiffnessLoss().finer(model, "AB/2"):  # tabulated
+        found = compare(LocalStiffnessLoss(), model, half, [0.4])
+        assert max(found.frequency, found.reading) < 1e-3 < found.effect
+    assert not LocalStiffnessLoss().finer(model, "AB/2:first")
     for wrong in ("AB/9", "AB/x", "XY", "XY/1"):
         with pytest.raises(ModelError, match="there is no place"):
             elements_of(model.frame_structure, wrong)

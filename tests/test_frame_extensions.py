@@ -116,11 +116,34 @@ class TestFactors:
             for one, two in zip(given.matrices(), wanted.matrices(), strict=True):
                 assert abs(one - two).max() < 1e-13 * abs(two).max()
 
+    @pytest.mark.parametrize("half", ["first", "second"])
+    def test_half_an_element_gives_as_beams_do(self, half: str) -> None:
+        """Castigliano: the tip moves by the integral of M^2 / EI under a unit force."""
+        factors = (Factor("E", (f"m/2:{half}",), 0.25), Factor("E", ("m/2",), 0.8))
+        model = Model.of(beam("out-of-plane", 4, CLAMP, factors=factors))
+        tip = next(i for i, n in enumerate(model.dofs.node) if n == 1)
+        force = np.eye(model.size)[tip]
+        motion = float(np.linalg.solve(model.stiffness.toarray(), force)[tip])
+        # From the tip: the arm of the force at the ends of what is soft.
+        whole, end = (
+            (LENGTH / 2, 3 * LENGTH / 4),
+            3 * LENGTH / 4 if half == "first" else 5 * LENGTH / 8,
+        )
+        part = end - LENGTH / 8, end
+
+        def integral(low: float, high: float) -> float:
+            return (high**3 - low**3) / 3.0
+
+        expected = integral(0.0, LENGTH) + 0.25 * integral(*whole) + 1.25 * 3.0 * integral(*part)
+        assert motion == pytest.approx(expected / (STEEL.E * SECTION.Iy), rel=1e-9)
+
     @pytest.mark.parametrize(
         ("factor", "words"),
         [
             (Factor("G", ("all",), 2.0), "no factor on 'G'"),
             (Factor("E", ("m/5",), 2.0), "no place 'm/5'"),
+            (Factor("E", ("m/5:first",), 2.0), "no place 'm/5:first'"),
+            (Factor("E", ("m:first",), 2.0), "no place 'm:first'"),
             (Factor("E", ("m",), 0.0), "not positive"),
             (Factor("E", ("m",), float("nan")), "not positive"),
         ],

@@ -8,7 +8,7 @@ import numpy as np
 
 from femubench.core.case.faults import BadKey, KeyPath
 from femubench.core.case.schema import MOST_ELEMENTS, FrameSpec, JointSpringSpec, RigidEndSpec
-from femubench.core.fem.frame import ACTIVE, Plane
+from femubench.core.fem.frame import ACTIVE, Plane, split_half
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.nominal import MAY_VANISH
 from femubench.core.typing import FloatArray
@@ -21,7 +21,7 @@ _NORMAL: dict[Plane, str] = {"in-plane": "y", "out-of-plane": "z"}
 
 def _check_element(place: str, members: dict[str, int], i: int) -> None:
     path, expected = ("factors", i, "at"), '"all", the name of a member or "member/k"'
-    member, found, number = place.rpartition("/")
+    member, found, number = split_half(place)[0].rpartition("/")
     if not found or member not in members:
         raise BadKey(path, f"there is no member {member if found else place!r}", expected)
     count = members[member]

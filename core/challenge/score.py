@@ -9,7 +9,7 @@ from femubench.core.challenge.answer import Answer, AnswerParameter
 from femubench.core.challenge.structures import structure_named
 from femubench.core.challenge.truth import HiddenCause, Truth
 from femubench.core.effect.places import match
-from femubench.core.fem.frame import Frame
+from femubench.core.fem.frame import Frame, split_half
 
 TOO_SMALL = 12.0  # of chi-square: what lowers it by less cannot be seen
 # More names than this are no answer: among 20 effects, such a group is right by itself.
@@ -164,12 +164,16 @@ def _sit_right(frame: Frame, parts: Parts, causes: Sequence[HiddenCause]) -> boo
 
 
 def _sizes(frame: Frame, answer: Answer, causes: Sequence[HiddenCause]) -> tuple[SizeError, ...]:
-    """Return true and stated sizes wherever effect and place are right."""
+    """Return true and stated sizes wherever effect and place are right.
+
+    What is stated of half an element is no size of the whole one.
+    """
     return tuple(
         SizeError.of(cause.effect, value, unit, parameter)
         for cause in causes
         for said in answer.causes
         if said.effect == cause.effect and match(frame, said.place, cause.place)
+        if not split_half(said.place)[1]
         for name, value, unit in zip(cause.names, cause.values, cause.units, strict=True)
         for parameter in said.parameters
         if parameter.name == name

@@ -16,7 +16,7 @@ import numpy as np
 
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import ModelError
-from femubench.core.fem.frame import ACTIVE, Frame, Member, Place
+from femubench.core.fem.frame import ACTIVE, Frame, Member, Place, split_half
 from femubench.core.fem.group_factors import GROUP
 from femubench.core.fem.joints import joint_groups
 from femubench.core.fem.model import Model
@@ -34,13 +34,13 @@ _FEW = 4
 
 
 def bare_place(place: str) -> str:
-    """Return the place itself of a word with ``:apart`` or ``:free``.
+    """Return the place itself of a word with ``:apart``, ``:free``, ``:first`` or ``:second``.
 
     Examples:
         >>> effect.bare_place("J5:apart")
         'J5'
     """
-    return place.removesuffix(APART).removesuffix(FREE)
+    return split_half(place.removesuffix(APART).removesuffix(FREE))[0]
 
 
 def elements_of(structure: Structure, place: str, *, arms: bool = False) -> IntArray:

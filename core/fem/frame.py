@@ -164,13 +164,28 @@ class Link:
     motions: tuple[str, ...] = ()
 
 
+HALVES = (":first", ":second")
+
+
+def halves_of(place: str) -> tuple[str, ...]:
+    """Return the words of both halves of an element; nothing for what is half of one."""
+    return () if split_half(place)[1] else tuple(f"{place}{word}" for word in HALVES)
+
+
+def split_half(place: str) -> tuple[str, int]:
+    """Return an element, and which half of it a place is, 1 or 2; 0 for all of it."""
+    half = next((k for k, word in enumerate(HALVES, 1) if place.endswith(word)), 0)
+    return (place.removesuffix(HALVES[half - 1]), half) if half else (place, 0)
+
+
 @dataclass(frozen=True)
 class Factor:
     """A multiple of what sections and materials give, at some places of the frame.
 
     Arguments:
         quantity: a key of `femubench.core.fem.parameters.QUANTITIES` that is a factor, e.g. ``E``.
-        at: ``all``, member names or ``member/k`` for one element.
+        at: ``all``, member names, ``member/k`` for one element, ``member/k:first`` and
+            ``member/k:second`` for half of one.
         factor: of the property; several factors on one place multiply.
     """
 

@@ -23,6 +23,7 @@ from femubench.core.fem.frame import (
     Plane,
     PointMass,
     RigidEnd,
+    split_half,
 )
 from femubench.core.typing import BoolArray, FloatArray, IntArray
 
@@ -189,7 +190,7 @@ class _Attached:
         self.held = _places([item.at for item in frame.supports])
         attached: tuple[PointMass | GroundSpring | Oscillator, ...]
         attached = (*frame.masses, *frame.springs, *frame.oscillators)
-        self.splits = _places([item.at for item in attached])
+        self.splits = _places([*(item.at for item in attached), *_middles(frame)])
         self.xyz: list[FloatArray] = []
         self.rows: list[tuple[int, int, int, float, float, float]] = []
         self.connections: list[Connection] = []
@@ -352,6 +353,17 @@ def _places(places: Sequence[Place]) -> dict[str, list[float]]:
         if place.member is not None and place.s is not None:
             stations.setdefault(place.member, []).append(place.s)
     return stations
+
+
+def _middles(frame: Frame) -> list[Place]:
+    """Return the middles of elements of which one half has a factor of its own."""
+    found = []
+    for element, half in (split_half(place) for factor in frame.factors for place in factor.at):
+        member, _, number = element.rpartition("/")
+        if half and member in frame.member_index and number.isdecimal():
+            elements = frame.members[frame.member_index[member]].elements
+            found.append(Place(member=member, s=(int(number) - 0.5) / elements))
+    return found
 
 
 def _stations(grid: Sequence[float] | FloatArray, new: list[float], apart: float) -> FloatArray:

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from femubench.core.errors import ModelError
 from femubench.core.fem.assembly import AssemblyPlan, narrow_indices, plan_assembly
 from femubench.core.fem.beam import BeamProperties
-from femubench.core.fem.frame import Frame, GroundSpring, Place, PointMass
+from femubench.core.fem.frame import Frame, GroundSpring, Place, PointMass, split_half
 from femubench.core.fem.kinematics import Kinematics, point_block, spring_rows
 from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.mesh import Mesh
@@ -141,6 +141,19 @@ class MeshedFrame:
     def label_index(self) -> dict[str, IntArray]:
         """Return the elements of every ``member/k``; a split element has several."""
         return _positions(self.labels)
+
+    @cached_property
+    def half_index(self) -> dict[str, IntArray]:
+        """Return the elements of every half of a ``member/k`` that a factor of the frame is on."""
+        found = {}
+        for place in (place for factor in self.frame.factors for place in factor.at):
+            element, half = split_half(place)
+            if half and element in self.label_index:
+                rows = self.label_index[element]
+                bounds = self.mesh.stations[rows]
+                middle = 0.5 * (bounds[0, 0] + bounds[-1, 1])
+                found[place] = rows[(bounds.mean(axis=1) > middle) == (half == 2)]
+        return found
 
     @cached_property
     def member_labels(self) -> dict[str, tuple[str, ...]]:

@@ -20,8 +20,9 @@ from femubench.effect import (
     elements_of,
     once_for,
     proportional,
+    tabulate_change,
 )
-from femubench.fem import Factor, Frame, stiffness_matrices
+from femubench.fem import Factor, Frame, halves_of, stiffness_matrices
 
 _LOSS = Parameter("loss", "", 0.3, lower=0.0, upper=0.95, one_sided=True, wording="share")
 
@@ -36,6 +37,10 @@ class LocalStiffnessLoss(FrameEffect):
     def places(self, model: Model) -> Sequence[str]:
         """Return every element."""
         return () if model.structure is None else element_labels(model.structure.frame)
+
+    def finer(self, model: Model, place: str) -> Sequence[str]:
+        """Return the halves of the element: damage ends where it likes, not at a node."""
+        return halves_of(place)
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the fraction that is lost."""
@@ -55,6 +60,8 @@ class LocalStiffnessLoss(FrameEffect):
 
     def change(self, model: Model, place: str) -> Change:
         """Return the stiffness of the element with a minus sign."""
+        if not halves_of(place):
+            return tabulate_change(self, model, place, self.parameters(model, place))
         structure = model.frame_structure
         rows = elements_of(structure, place)
         whole = once_for(
