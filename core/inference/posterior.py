@@ -175,20 +175,19 @@ class Posterior:
         best = next((e for e in self.explanations if names <= set(e.base.names)), None)
         if best is None:
             return False
-        rest, fitted = best.effects - names, tuple(n for n in best.searched if n not in names)
-        without = self._first(rest, fitted)
+        without = self._first(best.effects - names)
         if without is None:
             physics = frozenset(best.base.names)
-            bare, without = self._first(physics, ()), self._first(physics - names, ())
+            bare, without = self._first(physics, bare=True), self._first(physics - names, bare=True)
             best = bare or best
         if without is None:
             return True
         gains = best.fit.log_evidence - without.fit.log_evidence, fits_better(best, without)
         return min(gains) > log(settings.earned_factor)
 
-    def _first(self, effects: frozenset[str], searched: Key) -> Explanation | None:
-        """Return the best explanation with these effects in all and these of them fitted."""
-        found = (e for e in self.explanations if (e.effects, e.searched) == (effects, searched))
+    def _first(self, effects: frozenset[str], *, bare: bool = False) -> Explanation | None:
+        """Return the best explanation with these effects in all; `bare`, with none fitted."""
+        found = (e for e in self.explanations if e.effects == effects and not (bare and e.parts))
         return next(found, None)
 
     def key(self, explanation: Explanation) -> Key:
