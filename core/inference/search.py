@@ -257,16 +257,24 @@ class Search:
             chances = []
         fits: list[Fit] = []
         best = start.state.cost
-        for number, item in enumerate((*near, *chances)):
+        queue = [(item, item.x) for item in (*near, *chances)]
+        for number, (item, x) in enumerate(queue, 1):
             if fits and self.effort.stops():
                 break
-            self.effort.step(number, len(near) + len(chances))
+            self.effort.step(number - 1, len(queue))
             own, parts = enrich_problem(problem, (item.projection,))
             give_up = best + settings.given_up if id(item) in known else np.inf
-            result = fit(own, parts, item.x, give_up=give_up)
+            result = fit(own, parts, x, give_up=give_up)
             if result is not None:
                 fits.append(result)
                 best = min(best, result.state.cost)
+            if number == len(near) + len(chances) and best < 2.0 * lowest - limit:
+                # The grid missed it by more than it may: the same effect elsewhere, of this size.
+                first = min(fits, key=lambda found: found.state.cost)
+                tried = {id(other) for other, _ in queue}
+                more = (s for s in screened if id(s) not in tried and _are_alike(s, first))
+                queue += [(s, first.state.x) for s in more]
+                known |= {id(other) for other, _ in queue}
         return fits
 
     def combine(self, found: Sequence[Found]) -> list[Explanation]:
@@ -379,6 +387,13 @@ def _first_of_a_name(screened: Sequence[Screened]) -> list[Screened]:
     for item in in_order(screened, lambda s: s.cost):
         found.setdefault(item.projection.hypothesis.name, []).append(item)
     return [item for own in found.values() for item in own[: settings.candidates]]
+
+
+def _are_alike(item: Screened, fitted: Fit) -> bool:
+    """Tell whether a hypothesis is the effect that was fitted alone, with as many values."""
+    (part,) = fitted.parts
+    one, other = item.projection.hypothesis.cause, part.hypothesis.cause
+    return (one[0], one[2]) == (other[0], other[2])
 
 
 def _fit_from_grid(
