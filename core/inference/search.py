@@ -268,13 +268,14 @@ class Search:
             if result is not None:
                 fits.append(result)
                 best = min(best, result.state.cost)
-            if number == len(near) + len(chances) and best < 2.0 * lowest - limit:
-                # The grid missed it by more than it may: the same effect elsewhere, of this size.
+            if fits and number == len(near) + len(chances):
                 first = min(fits, key=lambda found: found.state.cost)
-                tried = {id(other) for other, _ in queue}
-                more = (s for s in screened if id(s) not in tried and _are_alike(s, first))
-                queue += [(s, first.state.x) for s in more]
-                known |= {id(other) for other, _ in queue}
+                # The grid missed it by more than it may: the same effect elsewhere, of this size.
+                if first.state.cost < 2.0 * lowest - limit:
+                    tried = {id(other) for other, _ in queue}
+                    more = (s for s in screened if id(s) not in tried and _are_alike(s, first))
+                    queue += [(s, first.state.x) for s in more]
+                    known |= {id(other) for other, _ in queue}
         return fits
 
     def combine(self, found: Sequence[Found]) -> list[Explanation]:
