@@ -146,7 +146,7 @@ def test_two_hidden_effects_are_both_found(seed: int) -> None:
 
 @pytest.mark.slow(20)
 def test_an_oscillator_whose_frequency_no_grid_has_is_found_at_its_place() -> None:
-    """It sits at R1 and resonates between two points of the grid, where five places promise more."""
+    """It sits at R1 and resonates between two points of the grid, where others promise more."""
     verdict, answer, _ = judged(Blind(10_019, structure="table", hidden="pair"))
     assert verdict.right, verdict.reason
     assert ("attached-oscillator", "R1:y") in {(c.effect, c.place) for c in answer.causes}
