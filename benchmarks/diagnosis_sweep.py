@@ -80,11 +80,7 @@ def run(path: Path, wanted: Sequence[SweepCase], jobs: int) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     print(f"{len(wanted) - len(rest)} of {len(wanted)} cases are in {path}", file=sys.stderr)
     context = multiprocessing.get_context("spawn")
-    with (
-        # What is known of a drawn structure stays with it: some 15 MB a diagnosis.
-        ProcessPoolExecutor(jobs, mp_context=context, max_tasks_per_child=40) as pool,
-        path.open("a") as stream,
-    ):
+    with ProcessPoolExecutor(jobs, mp_context=context) as pool, path.open("a") as stream:
         futures = [pool.submit(diagnosed, task) for task in rest]
         for i, future in enumerate(as_completed(futures), 1):
             record = future.result()
