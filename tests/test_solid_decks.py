@@ -17,6 +17,8 @@ from femubench.core.case.faults import BadKey
 from femubench.core.case.files import CaseFiles
 from femubench.core.case.matrices import with_groups
 from femubench.core.case.schema import GroupSpec
+from femubench.core.fit.mesh_error import mesh_bias
+from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.fem import FloatArray, MatrixGeometry
 from femubench.plugins.readers.solid_elements import KINDS
 
@@ -54,6 +56,9 @@ COLUMN = """*NODE
 *BOUNDARY
 foot, 1, 3
 """
+
+
+CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
 
 
 def element_of(kind: str, places: FloatArray) -> str:
@@ -224,6 +229,41 @@ def test_a_model_that_no_factor_makes_is_written_as_matrices(tmp_path: Path) -> 
     other = fem.matrix_model(model.mass, changed, *zip(*rows_of(model), strict=True))
     femubench.write_model(other, tmp_path / "new", like=tmp_path / "job.inp")
     assert {file.suffix for file in (tmp_path / "new").iterdir()} == {".sti", ".mas", ".dof"}
+
+
+def cantilever(kind: str, along: int, across: int) -> str:
+    """Return a deck of a bar of 1 x 0.08 x 0.1 m of bricks, held at one end."""
+    x, y, z = np.meshgrid(*(np.arange(n + 1) for n in (along, across, across)), indexing="ij")
+    number = 1 + np.arange(x.size).reshape(x.shape)
+    places = zip(
+        x.ravel() / along, 0.08 * y.ravel() / across, 0.1 * z.ravel() / across, strict=True
+    )
+    rows = [f"{i},{a!r},{b!r},{c!r}" for i, (a, b, c) in enumerate(np.array([*places]).tolist(), 1)]
+    corners = [number[i : along + i, j : across + j, k : across + k].ravel() for i, j, k in CORNERS]
+    cells = [
+        f"{e},{','.join(map(str, own))}" for e, own in enumerate(zip(*corners, strict=True), 1)
+    ]
+    held = ",".join(map(str, number[0].ravel()))
+    blocks = ["*NODE", *rows, f"*ELEMENT, TYPE={kind}, ELSET=all", *cells, "*NSET, NSET=foot", held]
+    return "\n".join([*blocks, "*BOUNDARY", "foot, 1, 3", SECTION])
+
+
+@pytest.mark.parametrize(("kind", "along"), [("C3D8", 5), ("C3D8I", 10)])
+def test_a_coarse_mesh_knows_by_how_much_it_is_off(kind: str, along: int, tmp_path: Path) -> None:
+    """Bending, the fifth mode is torsion: its warping needs more than one layer of any element."""
+    model = read(tmp_path, cantilever(kind, along, 1))
+    fine = read(tmp_path, cantilever("C3D8I", 40, 4))
+    coarse, true = (elastic_modes(m, 8).natural_frequencies for m in (model, fine))
+    if kind == "C3D8":  # locked, so that the modes come in another order
+        coarse, true = coarse[:2], true[:2]
+    bias = mesh_bias(model, len(coarse))
+    assert bias is not None
+    off, left = (
+        np.abs(f / true - 1.0)[[0, 1, 2, 3, 5][: len(true)]]
+        for f in (coarse, coarse * (1.0 + bias))
+    )
+    assert np.abs(off).max() > 0.05
+    assert np.abs(left).max() < 0.35 * np.abs(off).max()
 
 
 @pytest.mark.nightly

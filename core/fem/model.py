@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
@@ -141,6 +141,8 @@ class Model(Shown):
             each.
         group_priors: by name of a group, a factor of so much up or down is as likely as not.
         group_kinds: by name of a group, what it is: a word of `modal.group_prior.KINDS`.
+        finer: of a model from files, gives the whole of it and the same with better elements, whose
+            rows begin with those of the whole; None where nobody knows better ones.
     """
 
     mass: SparseArray
@@ -155,6 +157,7 @@ class Model(Shown):
     mass_groups: Mapping[str, SparseArray] = field(default_factory=dict)
     group_priors: Mapping[str, float] = field(default_factory=dict)
     group_kinds: Mapping[str, str] = field(default_factory=dict)
+    finer: Callable[[], tuple[Model, Model]] | None = None
 
     @classmethod
     def of(cls, source: Frame | Structure) -> Model:

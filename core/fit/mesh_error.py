@@ -1,7 +1,8 @@
-"""By how much the frequencies of a mesh are off: every element cut in two."""
+"""By how much the frequencies of a mesh are off: every element cut in two, or a better one."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -40,8 +41,8 @@ def refine_mesh(structure: Structure) -> Frame:
 def mesh_bias(model: Model, count: int, modes: Modes | None = None) -> FloatArray | None:
     """Return f_fine / f - 1 of the first elastic modes on a mesh twice as fine, (k,), k <= count.
 
-    Modes are paired by shape. None without a frame, beyond 5000 dofs, and where the finer mesh
-    cannot be built or solved.
+    Modes are paired by shape. None without a frame or better elements, for a frame beyond 5000
+    dofs, and where the finer mesh cannot be built or solved.
 
     Arguments:
         model: any model.
@@ -49,6 +50,11 @@ def mesh_bias(model: Model, count: int, modes: Modes | None = None) -> FloatArra
         modes: elastic modes of the model where they are at hand, at least `count`.
     """
     structure = model.structure
+    if structure is None and model.finer is not None:
+        with suppress(ModelError):
+            whole, better = model.finer()
+            rows, known = slice(whole.size), elastic_modes(whole, count + _MARGIN)
+            return frequency_changes(whole, known, better, count, lambda shapes: shapes[rows])
     if structure is None or model.size > SOLVED_LIMIT:
         return None
     try:

@@ -46,9 +46,9 @@ def look(
         own = getattr(effect, "look", None)
         found += own(seen) if callable(own) else ()
     if model.structure is not None:
-        for part in (look_at_slenderness, look_at_mesh, look_at_materials):
+        for part in (look_at_slenderness, look_at_materials):
             found += part(seen)
-    for part in (look_at_freedom, look_at_units, look_at_deviations, look_at_sensors):
+    for part in (look_at_mesh, look_at_freedom, look_at_units, look_at_deviations, look_at_sensors):
         found += part(seen)
     if band is not None:
         found += look_at_band(seen, band)

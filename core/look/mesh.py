@@ -13,14 +13,16 @@ from femubench.core.schema.diagnosis import LookWarning
 
 def look_at_mesh(seen: Seen) -> list[LookWarning]:
     """Return what a finer mesh changes, and elements that do not fit their neighbours."""
-    found = _unequal(seen.model.frame_structure)
+    structure = seen.model.structure
+    found = [] if structure is None else _unequal(structure)
     changes = mesh_bias(seen.model, seen.count, seen.modes)
     if changes is None or len(changes) == 0:
         return found
     if seen.exceeds(changes, settings.notable_mesh, settings.telling_deviations):
         worst = int(np.abs(changes).argmax())
+        finer = "every element cut in two" if structure else "elements that bend along their edges"
         what = (
-            f"The mesh is coarse: with every element cut in two, mode {worst + 1} changes by "
+            f"The mesh is coarse: with {finer}, mode {worst + 1} changes by "
             f"{100.0 * changes[worst]:+.2g} %."
         )
         found.append(LookWarning(what, "all", "", percent(changes)))

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ import scipy.sparse as sp
 from femubench import InputError, Model
 from femubench.fem import FloatArray, SparseArray, matrix_model
 from femubench.plugins.readers import nodes, solid_elements
+from femubench.plugins.readers.nodes import Point
 from femubench.plugins.readers.reading import DIRECTIONS, needs
 
 INSTEAD = "solid elements alone, or the matrices of *FREQUENCY, SOLVER=MATRIXSTORAGE next to it"
@@ -24,6 +27,7 @@ _IGNORED = re.compile(
     "DAMPING|EXPANSION|CONDUCTIVITY|SPECIFICHEAT|INITIALCONDITIONS|PHYSICALCONSTANTS|TIMEPOINTS"
 )
 _SAME = 1e-9  # of the largest entry: what rounding leaves of a factor
+_SOLVED = 10_000  # degrees of freedom up to which better elements are tried: four times as many
 _HELD = {"ENCASTRE": (0, 1, 2), "PINNED": (0, 1, 2), "XSYMM": (0,), "YSYMM": (1,), "ZSYMM": (2,)}
 
 
@@ -68,6 +72,48 @@ class SolidDeck:
         return found if len(found) > 1 else {}
 
 
+@dataclass(frozen=True)
+class BetterElements:
+    """The model of a deck with linear elements, and the same with a node amid every edge of these.
+
+    Arguments:
+        deck: with linear elements.
+        places: of its nodes.
+        whole: its model.
+    """
+
+    deck: SolidDeck
+    places: Mapping[str, Point]
+    whole: Model
+
+    def __call__(self) -> tuple[Model, Model]:
+        """Return both models; the rows of the second begin with those of the first."""
+        return self.whole, self._better
+
+    @cached_property
+    def _better(self) -> Model:
+        deck, places = self.deck, dict(self.places)
+        better = replace(deck, elements={}, held=set(deck.held))
+        amid: dict[tuple[int, ...], int] = {}
+        first = max(map(int, places)) + 1
+        for number, (kind, own) in deck.elements.items():
+            found = solid_elements.BETTER.get(kind)
+            if found is None:
+                better.elements[number] = kind, own
+                continue
+            pairs = (
+                pair for chain in solid_elements.KINDS[found].edges for pair in pairwise(chain)
+            )
+            edges = [tuple(sorted((own[a], own[b]))) for a, b in pairs]
+            new = [amid.setdefault(edge, first + len(amid)) for edge in edges]
+            better.elements[number] = found, (*own, *new)
+        for (a, b), node in amid.items():
+            x, y, z = 0.5 * (np.array(places[str(a)]) + np.array(places[str(b)]))
+            places[str(node)] = float(x), float(y), float(z)
+            better.held.update((node, d) for d in range(3) if {(a, d), (b, d)} <= deck.held)
+        return _model_of(better, _materials(deck), places, first)
+
+
 def read_deck(path: Path) -> SolidDeck:
     """Return what an input file says.
 
@@ -86,16 +132,31 @@ def read_solids(path: Path) -> Model:
     Raises:
         InputError: as `read_deck`, and for elements without material, density or volume.
     """
-    deck = read_deck(path)
-    return _model_of(deck, _materials(deck))
+    deck, places = read_deck(path), nodes.read_nodes(path)
+    model = _model_of(deck, _materials(deck), places)
+    linear = any(kind in solid_elements.BETTER for kind, _ in deck.elements.values())
+    if not linear or model.size > _SOLVED:
+        return model
+    return replace(model, finer=BetterElements(deck, places, model))
 
 
-def _model_of(deck: SolidDeck, material: Mapping[int, str]) -> Model:
-    """Return the model of a deck whose solid elements have these materials."""
+def _model_of(
+    deck: SolidDeck,
+    material: Mapping[int, str],
+    places: Mapping[str, Point],
+    first: float = np.inf,
+) -> Model:
+    """Return the model of a deck whose solid elements have these materials.
+
+    Arguments:
+        places: of its nodes.
+        first: number of a node, from which on they come behind all others.
+    """
     path = deck.path
     needs("skfem", "solids", path)
-    places = nodes.read_nodes(path)
-    used = dict.fromkeys(n for _, own in deck.elements.values() for n in own)
+    used = sorted(
+        dict.fromkeys(n for _, own in deck.elements.values() for n in own), key=lambda n: n >= first
+    )
     if lost := [n for n in used if str(n) not in places]:
         raise InputError(f"node {lost[0]} of an element has no place", file=path, expected="*NODE")
     row, xyz = {n: i for i, n in enumerate(used)}, np.array([places[str(n)] for n in used])
@@ -168,7 +229,7 @@ def write_factors(model: Model, path: Path, original: Path) -> bool:
     """
     deck = read_deck(original)
     material = _materials(deck)
-    before = _model_of(deck, material)
+    before = _model_of(deck, material, nodes.read_nodes(original))
     groups = deck.groups() or {REST: list(material)}
     parts = before.groups or {REST: before.stiffness}
     whole = model.groups if before.groups else {REST: model.stiffness}

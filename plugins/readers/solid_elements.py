@@ -62,6 +62,10 @@ KINDS = {
 }
 
 
+# Elements with the same corners that bend along their edges.
+BETTER = {"C3D4": "C3D10", "C3D8": "C3D20", "C3D8I": "C3D20"}
+
+
 @cache
 def _tabulate(kind: str) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return values (n, q), slopes (n, 3, q) of the functions, points (3, q), weights (q,)."""
