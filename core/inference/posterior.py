@@ -168,27 +168,28 @@ class Posterior:
     def _missed(self, names: frozenset[str]) -> bool:
         """Tell whether the best explanation with textbook effects is much better than without.
 
-        Better by the evidence and by the data alone. Textbook physics is weighed against the model
-        without it, not against another effect that is fitted to stand for it; where nobody tried
-        the same causes without it, the two textbook models alone are compared.
+        Better by the evidence and by the data alone. Textbook physics is weighed against the same
+        effects without it, of which as many or more are fitted, not against another one that is
+        fitted to stand for it; where nobody tried these, the textbook models alone are compared.
         """
         best = next((e for e in self.explanations if names <= set(e.base.names)), None)
         if best is None:
             return False
-        without = self._first(best.effects - names)
-        if without is None:
+        fitted = set(best.searched) - names
+        without = [e for e in self._with(best.effects - names) if fitted <= set(e.searched)]
+        if not without:
             physics = frozenset(best.base.names)
-            bare, without = self._first(physics, bare=True), self._first(physics - names, bare=True)
-            best = bare or best
-        if without is None:
-            return True
-        gains = best.fit.log_evidence - without.fit.log_evidence, fits_better(best, without)
-        return min(gains) > log(settings.earned_factor)
+            bare = [e for e in self._with(physics) if not e.parts]
+            best = bare[0] if bare else best
+            without = [e for e in self._with(physics - names) if not e.parts]
+        gains = (
+            (best.fit.log_evidence - e.fit.log_evidence, fits_better(best, e)) for e in without
+        )
+        return all(min(gain) > log(settings.earned_factor) for gain in gains)
 
-    def _first(self, effects: frozenset[str], *, bare: bool = False) -> Explanation | None:
-        """Return the best explanation with these effects in all; `bare`, with none fitted."""
-        found = (e for e in self.explanations if e.effects == effects and not (bare and e.parts))
-        return next(found, None)
+    def _with(self, effects: frozenset[str]) -> list[Explanation]:
+        """Return the explanations with these effects in all, most probable first."""
+        return [e for e in self.explanations if e.effects == effects]
 
     def key(self, explanation: Explanation) -> Key:
         """Return the name of an explanation: its causes and the textbook effects that count."""
