@@ -155,23 +155,26 @@ def _fits(diagnosis: Diagnosis, truth: Truth) -> Record:
     return fits_of(diagnosis.examination, causes, registered_effects(), partial(match, frame))
 
 
-# How a diagnosis names the sensors that a truth has wrong, and the numbers of their points.
-_SENSORS = {
+# What a diagnosis can say, and where, of causes that the catalogue did not have when it was drawn.
+_GROUNDED = re.compile(r"a spring of .* to ground about (\w+) at (\w+)")
+_SAYS = {
     "sensors-swapped": re.compile(r"sensors (\d+) and (\d+) are swapped"),
     "sensor-gain": re.compile(r"sensor (\d+) has a gain of"),
+    **dict.fromkeys(("support-missing", "support-flexibility"), _GROUNDED),
 }
 
 
 def _stated_of(answer: Answer, truth: Truth) -> list[Statement]:
     frame = structure_named(truth.structure).frame
-    wrong = {name: words.match(truth.outside) for name, words in _SENSORS.items()}
+    known = {name: words.match(truth.outside) for name, words in _SAYS.items()}
 
     def is_named(effect: str) -> bool:
-        return bool(wrong.get(effect)) or any(effect == cause.effect for cause in truth.causes)
+        return bool(known.get(effect)) or any(effect == cause.effect for cause in truth.causes)
 
     def is_placed(effect: str, place: str) -> bool:
-        if sensors := wrong.get(effect):
-            return sorted(re.findall(r"\d+", place)) == sorted(sensors.groups())
+        if said := known.get(effect):
+            words = place.split(":") if effect.startswith("support") else re.findall(r"\d+", place)
+            return set(said.groups()) <= set(words)
         return any(effect == c.effect and match(frame, place, c.place) for c in truth.causes)
 
     return statements(answer, is_named, is_placed)
