@@ -95,7 +95,7 @@ def inquire(
     model, measurement = _possible(model, measurement, known, repaired)
     if not known:
         return Inquiry(terms.examine(model, measurement))
-    now = _Drawn(model, measurement, terms.reference, terms.width or 1.0)
+    first = now = _Drawn(model, measurement, terms.reference, terms.width or 1.0)
     ranked = _weighed(now, known, effort)
     while len(repaired) < settings.faults_corrected:
         found = _definite(now, ranked, terms)
@@ -107,6 +107,14 @@ def inquire(
     reweighing = [charge for charge, _ in ranked if charge.reweighs]
     with effort.scope({"single": (0.0, float(settings.candidates * bool(reweighing)))}):
         seen = terms.examine(now.model, now.measurement)
+        if any(found.charge.single for found in repaired):
+            # Suspected next to single causes; several may explain such a frequency as well.
+            whole = terms.examine(first.model, first.measurement)
+            prior = sum(first.prior(found.charge) for found in repaired)
+            odds = log_density(seen, measurement) + prior - log_density(whole, measurement)
+            if odds < _sure_odds() and whole.adequacy > settings.noise_p:
+                now, seen, repaired = first, whole, []
+                ranked = _weighed(now, known, effort)
     # Other deviations would excuse whatever is wrong: they are the last resort.
     other = _reweighed(now, reweighing, seen, terms)
     if other is None:
