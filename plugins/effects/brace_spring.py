@@ -20,15 +20,14 @@ from femubench.effect import (
     Site,
     Size,
     Term,
+    elastic_band,
     elongation_row,
-    member_length,
-    once_for,
     pair_of,
     proportional,
 )
 from femubench.fem import ACTIVE, Brace, Frame
 
-_SHARE = 0.01  # of the mean EA / L of the members
+_SHARE = 0.01  # of the squared lowest elastic frequency, as of springs to ground
 _MOST = 300
 _STRAIGHT = np.cos(np.radians(5.0))
 
@@ -69,16 +68,8 @@ class BraceSpring(FrameEffect):
         return [f"{first}-{last}" for first, last in _nearest(frame, pairs)]
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
-        """Return the stiffness along the line of the joints."""
-        frame = model.frame_structure.frame
-
-        def rigidity() -> float:  # of the members along themselves in the mean, N/m
-            each = [
-                m.material.E * m.section.A / member_length(frame, m.name) for m in frame.members
-            ]
-            return _SHARE * float(np.mean(each))
-
-        scale = once_for(model, "stiffness of a brace", rigidity)
+        """Return the stiffness along the line of the joints, by what shows in the lowest mode."""
+        scale = _SHARE * model.total_mass * (2.0 * np.pi * float(elastic_band(model)[0])) ** 2
         return (Parameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
