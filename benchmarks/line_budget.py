@@ -51,7 +51,7 @@ BUDGETS = {
     "papers": 3_290,
     "scenarios": 750,
     "femubench": 577,
-    "tests": 46_000,
+    "tests": 46_001,
     "truths": 13_275,
     "benchmarks": 7_329,
 }
