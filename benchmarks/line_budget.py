@@ -35,7 +35,7 @@ BUDGETS = {
     "core/inference": 3_792,
     "core/library": 2_752,
     "core/look": 1_190,
-    "core/modal": 3_630,
+    "core/modal": 3_585,
     "core/plot": 2_840,
     "core/plugin": 1_980,
     "core/publish": 1_480,

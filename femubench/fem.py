@@ -1,6 +1,5 @@
 """Finite elements: frames and their parts, sections, beam matrices, what a model is made of."""
 
-from femubench.core.case.case import Modification as Modification
 from femubench.core.case.matrix_files import write_matrices as write_matrices
 from femubench.core.case.nodes import MatrixGeometry as MatrixGeometry, matrix_model as matrix_model
 from femubench.core.case.opensees import from_opensees as from_opensees
@@ -47,7 +46,6 @@ from femubench.core.fem.parameters import Property as Property
 from femubench.core.fem.preload import (
     gravity_stiffness as gravity_stiffness,
     preload_forces as preload_forces,
-    preload_stiffness as preload_stiffness,
     redundant_members as redundant_members,
     unit_preload_matrices as unit_preload_matrices,
 )

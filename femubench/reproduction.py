@@ -35,6 +35,5 @@ from femubench.core.reproduction.study import (
     verdict_counts as verdict_counts,
 )
 from femubench.core.reproduction.workbench import Workbench as Workbench
-from femubench.core.roles import Paper as Paper
 
 __all__ = [name for name in dir() if not name.startswith("_")]

@@ -11,10 +11,9 @@ from femubench.core.run.frames import (
     run_from_json as run_from_json,
     run_to_json as run_to_json,
 )
-from femubench.core.run.runner import run_jobs as run_jobs
 from femubench.core.run.store import Store as Store, note_missing_jobs as note_missing_jobs
 from femubench.core.schema.paired_modes import PairedMode as PairedMode
-from femubench.core.schema.results import Block as Block, JobResult as JobResult, Run as Run
+from femubench.core.schema.results import JobResult as JobResult, Run as Run
 from femubench.core.score.bounded_gain import Rule as Rule
 from femubench.core.score.leaderboard import (
     Standings as Standings,
@@ -35,19 +34,14 @@ from femubench.core.score.ranking import (
     rank_results as rank_results,
 )
 from femubench.core.score.repeatability import unsteady as unsteady
-from femubench.core.score.scoring import (
-    frequency_error as frequency_error,
-    predict_block as predict_block,
-    score_model as score_model,
-)
+from femubench.core.score.scoring import predict_block as predict_block
 from femubench.core.score.statistics import (
     FEWEST as FEWEST,
     METHOD as METHOD,
-    flip_signs as flip_signs,
     interval_tail as interval_tail,
     structures_of as structures_of,
 )
-from femubench.core.score.twin_gain import TwinGain as TwinGain, twin_gains as twin_gains
+from femubench.core.score.twin_gain import twin_gains as twin_gains
 from femubench.core.study.axes import StudyAxes as StudyAxes
 from femubench.core.study.gain import gain_by as gain_by
 

@@ -9,7 +9,8 @@ import femubench
 from femubench.core.fit import gauss_newton
 from femubench.core.fit.dual_least_squares import DualPosterior, dual_step
 from femubench.core.update import sensitivity_update as iteration
-from femubench.update import UpdateOptions, scale_parts, sensitivity_update
+from femubench.core.update.change_lists import scale_parts
+from femubench.update import UpdateOptions, sensitivity_update
 
 RNG = np.random.default_rng(5)
 S, RESIDUAL = RNG.standard_normal((4, 30)), RNG.standard_normal(4)

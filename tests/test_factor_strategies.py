@@ -19,6 +19,7 @@ from femubench import (
     read_case,
     solve_modes,
 )
+from femubench.core.update.change_lists import element_sets
 from femubench.core.update.l_curve import l_curve_curvature
 from femubench.fem import (
     Frame,
@@ -42,7 +43,6 @@ from femubench.plugins.strategies.sparse import Sparse
 from femubench.plugins.strategies.strain_energy import StrainEnergy, energy_change_index
 from femubench.scenarios import HERE
 from femubench.update import (
-    element_sets,
     l_curve_corner,
     lasso,
     modal_space,

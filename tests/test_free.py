@@ -16,12 +16,12 @@ import scipy.sparse as sp
 from femubench import InputError, Measurement, Model, Sensors, cases, read_case, solve_modes
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.writing import write_case
-from femubench.core.change.change import Change, proportional
+from femubench.core.change.change import Change
 from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.change.terms import RowOperator, Term
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.diagnosis.serial import diagnosis_to_json
-from femubench.core.effect.attachments import point_motion
+from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.fem.frame import Place
 from femubench.core.fem.model import Dofs
 from femubench.core.inference.examine import examine
@@ -45,9 +45,9 @@ class Tether:
         return (Parameter("stiffness", "N m/rad", 10.0),)
 
     def change(self, model: Model, place: str) -> Change:
-        points = [point_motion(model, Place(joint=name))[[3]] for name in place.split("-")]
+        points = [ModelPlaces(model).motion(Place(joint=name))[[3]] for name in place.split("-")]
         row = points[0] if len(points) == 1 else points[0] - points[1]
-        return proportional(Term("stiffness", RowOperator(row, np.eye(1))))
+        return Change.proportional(Term("stiffness", RowOperator(row, np.eye(1))))
 
 
 TETHER: Any = (Tether(),)

@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from femubench.core.effect.attachments import total_mass
 from femubench.core.fem.frame import (
     Factor,
     Frame,
@@ -68,7 +67,7 @@ def clean(ladder: FrameBuilder) -> Frame:
 
 def test_nothing_is_found_in_a_good_model(clean: Frame) -> None:
     model = Model.of(clean)
-    assert look(model, replace(measured(model), total_mass=(total_mass(model), 0.001))) == ()
+    assert look(model, replace(measured(model), total_mass=(model.total_mass, 0.001))) == ()
 
 
 def test_a_polar_moment_for_a_torsion_constant_is_found(ladder: FrameBuilder) -> None:
@@ -126,7 +125,7 @@ def test_impossible_and_far_off_constants_are_found(
 
 def test_the_weighed_mass_is_compared(clean: Frame) -> None:
     model = Model.of(clean)
-    mass = total_mass(model)
+    mass = model.total_mass
     for weighed, expected in ((mass + 0.029, 0), (mass + 0.1, 1), (mass - 0.1, 1)):
         data = replace(measured(model), total_mass=(weighed, 0.01))
         assert len(texts(look(model, data), "on the scales")) == expected
@@ -135,18 +134,18 @@ def test_the_weighed_mass_is_compared(clean: Frame) -> None:
 def test_what_rests_on_supports_is_weighed_too(clean: Frame) -> None:
     held = Support(Place(joint=clean.joints[0].name), ("z", "rx", "ry"))
     model = Model.of(replace(clean, supports=(held,)))
-    mass = total_mass(Model.of(clean))
+    mass = Model.of(clean).total_mass
     data = replace(measured(model), total_mass=(mass, 1e-4 * mass))
     assert texts(look(model, data), "on the scales") == []
-    assert total_mass(model) == pytest.approx(mass, rel=1e-12)
+    assert model.total_mass == pytest.approx(mass, rel=1e-12)
 
 
 def test_the_mass_warning_scales_members_and_not_lumps(clean: Frame) -> None:
     model = Model.of(clean)
     lump = sum(item.mass for item in clean.masses)
-    data = replace(measured(model), total_mass=(1.1 * total_mass(model), 0.01))
+    data = replace(measured(model), total_mass=(1.1 * model.total_mass, 0.01))
     warning = of_effect(look(model, data), "density")
-    factor = (data.total_mass[0] - lump) / (total_mass(model) - lump)  # type: ignore[index]
+    factor = (data.total_mass[0] - lump) / (model.total_mass - lump)  # type: ignore[index]
     material = replace(clean.members[0].material, rho=factor * clean.members[0].material.rho)
     heavier = replace(clean, members=tuple(replace(m, material=material) for m in clean.members))
     expected = frequencies(heavier, 5) / frequencies(clean, 5) - 1.0
@@ -268,7 +267,7 @@ def test_a_shear_coefficient_above_one(clean: Frame) -> None:
 def test_a_pair_of_matrices_is_weighed_and_nothing_else(clean: Frame) -> None:
     frame = Model.of(clean)
     model = replace(frame, structure=None)
-    mass = total_mass(frame)
+    mass = frame.total_mass
     data = replace(measured(frame), total_mass=(1.21 * mass, 0.01))
     (warning,) = look(model, data)
     assert warning.effect == "density"
@@ -333,7 +332,7 @@ def test_a_finer_mesh_keeps_factors_springs_ends_and_changes(fitted_portal: Fram
         for label, rows in structure.label_index.items():
             values = getattr(finer.properties, name)[finer.label_index[label]]
             np.testing.assert_allclose(values, getattr(structure.properties, name)[rows[0]])
-    assert total_mass(Model.of(finer)) == pytest.approx(total_mass(Model.of(structure)), rel=1e-9)
+    assert Model.of(finer).total_mass == pytest.approx(Model.of(structure).total_mass, rel=1e-9)
     bias = mesh_bias(Model.of(structure), 6)
     assert bias is not None
     assert np.abs(bias).max() < 0.01

@@ -13,6 +13,7 @@ import pytest
 import scored
 from synthetic_run import synthetic_run
 
+from femubench.core.schema.results import Block
 from femubench.papers.printed import read_printed
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.page import data as page
@@ -22,7 +23,6 @@ from femubench.reports.page.papers import papers_of
 from femubench.reports.page.rounding import compact_json
 from femubench.reports.runs import MarkdownReporter
 from femubench.results import (
-    Block,
     JobResult,
     PairedMode,
     Rule,

@@ -16,9 +16,10 @@ from femubench import NotApplicable
 from femubench.core.cli.main import bench
 from femubench.core.plugin.loader import list_effects, load_plugins
 from femubench.core.run.store import Store
+from femubench.core.score.scoring import score_model
 from femubench.effect import textbook_model
 from femubench.fem import bredt
-from femubench.results import run_from_json, run_to_json, score_model
+from femubench.results import run_from_json, run_to_json
 from tests.test_cli import put_distribution
 
 EFFECTS = list_effects()

@@ -26,7 +26,7 @@ from femubench.core.change.change import Change
 from femubench.core.change.hypothesis import Hypothesis
 from femubench.core.change.parameter import Parameter
 from femubench.core.change.terms import ElementOperator, Term
-from femubench.core.effect.attachments import mass_term
+from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.textbook import textbook_values
 from femubench.core.fem.beam import BEND_XY, BEND_XZ, TWIST, mass_matrices, stiffness_matrices
 from femubench.core.fem.frame import ACTIVE, MADE, Factor, Frame, Place, PointMass
@@ -267,7 +267,7 @@ def list_entries(model: Model) -> list[Entry]:
     for place, alike_joints in kinds.items():
         std = mass * model.total_mass / np.sqrt(len(alike_joints))
         for name in alike_joints:
-            term = mass_term(model, [Place(joint=name)])
+            term = ModelPlaces(model).mass_term([Place(joint=name)])
             found.append(_alone(place, "joint mass", term, std, (), (name,)))
     return found
 

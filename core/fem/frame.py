@@ -379,6 +379,11 @@ class Frame:
         """Return the joint of that name; raises KeyError."""
         return self.joints[self.joint_index[name]]
 
+    def member_length(self, name: str) -> float:
+        """Return the distance of a member's two joints in m."""
+        first, last = self.corners[self.member_ends[self.member_index[name]]]
+        return float(np.linalg.norm(last - first))
+
     def ends_at(self, joint: str) -> tuple[str, ...]:
         """Return the names of the members that end at a joint."""
         return self._ends.get(joint, ())

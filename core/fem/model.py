@@ -227,6 +227,14 @@ class Model(Shown):
             raise NotApplicable("the model is a pair of matrices without elements")
         return self.structure
 
+    def dofs_in(self, other: Model) -> IntArray:
+        """Return the position of every dof of a frame among those of the frame meshed anew, (n,).
+
+        Raises:
+            ModelError: when one is not there.
+        """
+        return common_dofs(self.frame_structure, other.frame_structure)
+
     def observe(self, sensors: Sensors) -> SparseArray:
         """Return sensor readings from dofs, sparse (n_sensors, n).
 

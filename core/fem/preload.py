@@ -295,10 +295,6 @@ def preload_stiffness(structure: MeshedFrame, member: str, force: float) -> Spar
 
     Raises:
         ModelError: when the member is unknown or the frame is not redundant there.
-
-    Examples:
-        >>> fem.preload_stiffness(structure, "rung-middle", 100.0).shape
-        (81, 81)
     """
     return force * _stiffness(structure, statics_of(structure).state(member))
 

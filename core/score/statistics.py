@@ -135,10 +135,6 @@ def flip_signs(differences: FloatArray) -> FloatArray:
 
     Source: Romano & Wolf (2005), Econometrica 73, 1237-1282; Westfall & Young (1993), step-down
     maxT.
-
-    Examples:
-        >>> print(results.flip_signs(np.array([[0.2, 0.3, 0.2, 0.1, 0.2, 0.3]]).T))
-        [0.03125]
     """
     found = np.round(differences, _DIGITS)
     n, k = found.shape

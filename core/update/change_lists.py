@@ -45,9 +45,6 @@ def check_changes(words: str, *, parts_alone: bool = False) -> None:
     Arguments:
         words: an option as it was typed: ``own``, or sets of parts and effects joined by ``+``.
         parts_alone: whether effects are none of them.
-
-    Examples:
-        >>> update.check_changes("members")
     """
     known = get_args(PartSet)
     if words == OWN:
@@ -82,10 +79,6 @@ def element_sets(structure: Structure, word: str) -> Mapping[str, tuple[str, ...
 
     Raises:
         NotApplicable: when the frame has no such parts.
-
-    Examples:
-        >>> len(update.element_sets(structure, "members"))
-        7
     """
     frame, labels = structure.frame, all_elements(structure)
     if word == "elements":
@@ -135,10 +128,6 @@ def scale_parts(
 
     Raises:
         NotApplicable: when the model has no such parts.
-
-    Examples:
-        >>> update.scale_parts(structure, "sections")[0].name
-        'E section:tube'
     """
     structure = source.structure if isinstance(source, Model) else source
     if structure is not None and word != "groups":

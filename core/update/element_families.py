@@ -338,11 +338,6 @@ def tie_unknowns(family: ElementFamily, parts: Mapping[str, tuple[str, ...]]) ->
         family: with an unknown a pattern and element, as large as another's at the same relative
             change.
         parts: from a name to labels of elements; no element is in two.
-
-    Examples:
-        >>> parts = update.element_sets(structure, "members")
-        >>> len(update.tie_unknowns(update.physical_family(structure), parts))
-        14
     """
     part_of = {label: name for name, labels in parts.items() for label in labels}
     unknowns: dict[tuple[int, str], tuple[int, int]] = {}

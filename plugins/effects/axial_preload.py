@@ -17,10 +17,7 @@ from femubench.effect import (
     Site,
     Size,
     Term,
-    member_length,
     once_for,
-    proportional,
-    sparse_term,
 )
 from femubench.fem import (
     FloatArray,
@@ -80,8 +77,8 @@ class AxialPreload(FrameEffect):
         operator = ElementOperator(structure, every, units, share=forces, kind=kind)
         terms = [Term("stiffness", operator)]
         if adjacent is not None:
-            terms.append(sparse_term("stiffness", adjacent))
-        return proportional(*terms)
+            terms.append(Term.of("stiffness", adjacent))
+        return Change.proportional(*terms)
 
 
 def _units(structure: Structure) -> tuple[FloatArray, IntArray, IntArray]:
@@ -97,4 +94,4 @@ def euler_load(frame: Frame, name: str) -> float:
     # A frame in one plane needs Iy alone.
     own = (member.section.Iy, member.section.Iz)
     inertia = min((i for i in own if i > 0.0), default=0.0)  # of a rod
-    return float(np.pi**2 * member.material.E * inertia / member_length(frame, name) ** 2)
+    return float(np.pi**2 * member.material.E * inertia / frame.member_length(name) ** 2)

@@ -15,16 +15,14 @@ from femubench import Model
 from femubench.effect import (
     Change,
     FrameEffect,
+    ModelPlaces,
     Parameter,
+    Places,
     RowOperator,
     Site,
     Size,
     Term,
-    elongation_row,
-    member_length,
     once_for,
-    pair_of,
-    proportional,
 )
 from femubench.fem import ACTIVE, Brace, Frame
 
@@ -73,9 +71,7 @@ class BraceSpring(FrameEffect):
         frame = model.frame_structure.frame
 
         def rigidity() -> float:  # of the members along themselves in the mean, N/m
-            each = [
-                m.material.E * m.section.A / member_length(frame, m.name) for m in frame.members
-            ]
+            each = [m.material.E * m.section.A / frame.member_length(m.name) for m in frame.members]
             return _SHARE * float(np.mean(each))
 
         scale = once_for(model, "stiffness of a brace", rigidity)
@@ -85,12 +81,12 @@ class BraceSpring(FrameEffect):
         """Return the frame with the brace."""
         if not values[0]:
             return frame
-        return replace(frame, braces=(*frame.braces, Brace(pair_of(frame, place), values[0])))
+        return replace(frame, braces=(*frame.braces, Brace(Places(frame).pair(place), values[0])))
 
     def change(self, model: Model, place: str) -> Change:
         """Return the stiffness matrix of 1 N/m."""
-        row = elongation_row(model, pair_of(model.frame_structure.frame, place))
-        return proportional(Term("stiffness", RowOperator(row, np.eye(1))))
+        row = ModelPlaces(model).elongation(Places(model.frame_structure.frame).pair(place))
+        return Change.proportional(Term("stiffness", RowOperator(row, np.eye(1))))
 
 
 def _in_line(frame: Frame, body: Mapping[str, int]) -> set[frozenset[int]]:

@@ -13,13 +13,12 @@ from femubench.effect import (
     Change,
     ElementOperator,
     FrameEffect,
+    ModelPlaces,
     Parameter,
+    Places,
     Size,
     Term,
-    element_labels,
-    elements_of,
     once_for,
-    proportional,
     tabulate_change,
 )
 from femubench.fem import Factor, Frame, halves_of, stiffness_matrices
@@ -36,7 +35,7 @@ class LocalStiffnessLoss(FrameEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return every element."""
-        return () if model.structure is None else element_labels(model.structure.frame)
+        return () if model.structure is None else Places(model.structure.frame).elements()
 
     def finer(self, model: Model, place: str) -> Sequence[str]:
         """Return the halves of the element: damage ends where it likes, not at a node."""
@@ -63,9 +62,9 @@ class LocalStiffnessLoss(FrameEffect):
         if not halves_of(place):
             return tabulate_change(self, model, place, self.parameters(model, place))
         structure = model.frame_structure
-        rows = elements_of(structure, place)
+        rows = ModelPlaces(model).elements(place)
         whole = once_for(
             model, "element stiffness", lambda: stiffness_matrices(structure.properties)
         )
         lost = ElementOperator(structure, rows, whole, share=-np.ones(len(rows)), kind=rows)
-        return proportional(Term("stiffness", lost))
+        return Change.proportional(Term("stiffness", lost))

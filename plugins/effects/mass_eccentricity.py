@@ -13,11 +13,11 @@ from femubench.effect import (
     Change,
     ElementOperator,
     FrameEffect,
+    ModelPlaces,
     Parameter,
     Site,
     Size,
     Term,
-    elements_of,
     once_for,
 )
 from femubench.fem import (
@@ -65,7 +65,7 @@ class MassEccentricity(FrameEffect):
         """Return what is linear and what is quadratic in the offset, on top of a known one."""
         structure = model.frame_structure
         axis = axis_of(structure.frame)
-        elements = elements_of(structure, place)
+        elements = ModelPlaces(model).elements(place)
         parts, kind = once_for(model, "eccentric mass", lambda: _parts(structure, axis))
         own, other = structure.properties.ecc_y[elements], structure.properties.ecc_z[elements]
         own, other = (own, other) if axis == "y" else (other, own)

@@ -15,17 +15,13 @@ from femubench.effect import (
     ElementOperator,
     FrameEffect,
     LookWarning,
-    MatrixOperator,
+    ModelPlaces,
     Parameter,
+    Places,
     Seen,
     Size,
     Term,
-    elements_of,
-    member_labels,
-    members_of,
     once_for,
-    proportional,
-    set_places,
 )
 from femubench.fem import (
     GROUP,
@@ -56,7 +52,7 @@ class MaterialEffect(FrameEffect):
     def places(self, model: Model) -> Sequence[str]:
         """Return the whole structure, and the members of every material where there are more."""
         structure = model.structure
-        return ("all", *(() if structure is None else set_places(structure.frame, ("material",))))
+        return ("all", *(() if structure is None else Places(structure.frame).sets(("material",))))
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the relative change; of a group with a prior of its own, that of a factor."""
@@ -71,7 +67,7 @@ class MaterialEffect(FrameEffect):
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with another material in the members."""
-        named = members_of(frame, place)
+        named = Places(frame).members(place)
         members = tuple(
             self._scaled(member, 1.0 + values[0]) if member.name in named else member
             for member in frame.members
@@ -92,15 +88,17 @@ class MaterialEffect(FrameEffect):
         kind: Literal["mass", "stiffness"] = "stiffness" if self.constant == "E" else "mass"
         structure = model.structure
         if structure is not None:
-            rows = elements_of(structure, place, arms=True)
+            rows = ModelPlaces(model).elements(place, arms=True)
             matrices = stiffness_matrices if self.constant == "E" else mass_matrices
             whole = once_for(model, f"element {kind}", partial(matrices, structure.properties))
-            return proportional(Term(kind, ElementOperator(structure, rows, whole, kind=rows)))
+            return Change.proportional(
+                Term(kind, ElementOperator(structure, rows, whole, kind=rows))
+            )
         parts = [group_matrix(model, kind, place)]
         low_rank = model.stiffness_change if self.constant == "E" else model.mass_change
         if low_rank is not None and place == "all":
             parts.append(low_rank)
-        return proportional(*(Term(kind, MatrixOperator(part)) for part in parts))
+        return Change.proportional(*(Term.of(kind, part) for part in parts))
 
 
 class YoungsModulus(MaterialEffect):
@@ -198,4 +196,4 @@ class GroupMass(MaterialEffect):
 
 def _parts(frame: Frame) -> tuple[str, ...]:
     """Return the members, then sets and sections of more than one."""
-    return (*member_labels(frame), *set_places(frame))
+    return (*frame.member_index, *Places(frame).sets())

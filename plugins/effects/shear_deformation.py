@@ -18,8 +18,6 @@ from femubench.effect import (
     Seen,
     Size,
     Term,
-    proportional,
-    rate_nodes,
 )
 from femubench.fem import (
     BeamProperties,
@@ -30,6 +28,7 @@ from femubench.fem import (
     mass_matrices,
     stiffness_matrices,
 )
+from femubench.plugins.effects.flexible_ends import rate_nodes
 
 _KAPPA = 5.0 / 6.0  # of a rectangle, for sections of unknown shape
 _AT_ALL = ("all",)
@@ -119,7 +118,7 @@ class ShearDeformation(FrameEffect):
                         rates.append(float(node))
                         powers.append(power)
         if not terms:
-            return proportional()
+            return Change.proportional()
         rate, power_of = np.array(rates), np.array(powers)
 
         def coefficients(values: FloatArray) -> FloatArray:

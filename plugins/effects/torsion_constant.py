@@ -15,12 +15,11 @@ from femubench.effect import (
     ElementOperator,
     FrameEffect,
     LookWarning,
+    ModelPlaces,
     Parameter,
     Seen,
     Size,
     Term,
-    elements_of,
-    proportional,
 )
 from femubench.fem import (
     Frame,
@@ -97,7 +96,7 @@ class TorsionConstant(FrameEffect):
     def change(self, model: Model, place: str) -> Change:
         """Return the torsional stiffness of the elements."""
         structure = model.frame_structure
-        rows = elements_of(structure, place, arms=True)
+        rows = ModelPlaces(model).elements(place, arms=True)
         own = structure.properties.take(rows)
         plain = own.scale("coupling", np.zeros(len(own)))
         now = stiffness_matrices(plain)
@@ -105,7 +104,7 @@ class TorsionConstant(FrameEffect):
         coupled = stiffness_matrices(own) - now
         terms = [Term("stiffness", ElementOperator(structure, rows, b)) for b in (twist, coupled)]
         if not coupled.any():
-            return proportional(terms[0])
+            return Change.proportional(terms[0])
         # The coupling grows with the root of EI GJ.
         return Change(
             tuple(terms),

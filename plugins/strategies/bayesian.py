@@ -9,10 +9,10 @@ from femubench import Measurement, Model
 from femubench.effect import Change
 from femubench.update import (
     OWN,
+    Joints,
     SensitivityStrategy,
     UpdateOptions,
     all_elements,
-    joint_groups,
     list_changes,
     scale_all_stiffness,
     scale_groups,
@@ -82,7 +82,7 @@ class Bayesian(SensitivityStrategy):
             torsion = [scale_property("GJ all members", "GJ", every, prior_std=self.torsion_std)]
         joints = [
             scale_joint(structure, group, prior_std=self.joint_std)
-            for group in joint_groups(structure.frame)
+            for group in Joints(structure).groups()
         ]
         return model, [stiffness, *torsion, *mass, *joints]
 

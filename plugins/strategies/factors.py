@@ -9,9 +9,9 @@ from typing import ClassVar
 from femubench import Measurement, Model
 from femubench.effect import Change
 from femubench.update import (
+    Joints,
     SensitivityStrategy,
     UpdateOptions,
-    groups_within,
     scale_all_stiffness,
     scale_groups_within,
     scale_joint,
@@ -90,5 +90,5 @@ class Local(SensitivityStrategy):
         structure, count = model.structure, len(measurement)
         if structure is None:
             return model, scale_groups_within(model, count)
-        groups = groups_within(structure.frame, count)
+        groups = Joints(structure).groups_within(count)
         return model, [scale_joint(structure, group) for group in groups]

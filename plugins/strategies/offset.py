@@ -12,14 +12,11 @@ from femubench.effect import Change
 from femubench.fem import Structure
 from femubench.update import (
     JointGroup,
+    Joints,
     SensitivityStrategy,
-    available_length,
-    groups_within,
-    half_depth,
     scale_all_stiffness,
     select_determined,
     set_property,
-    with_rigid_ends,
 )
 
 _SHARE_WITHOUT_DEPTH = 0.1  # of the element
@@ -64,7 +61,7 @@ class Offset(SensitivityStrategy):
         """Return the frame with partly rigid elements at its joints, and what moves them."""
         structure = model.frame_structure
         count = len(measurement)
-        groups = groups_within(structure.frame, count, passing=False)
+        groups = Joints(structure).groups_within(count, passing=False)
         lengths: dict[str, tuple[float, float]] = {}
         own: dict[str, list[Change]] = {"branch": [], "end": [], "through": []}
         for group in groups:
@@ -76,14 +73,14 @@ class Offset(SensitivityStrategy):
             [scale_all_stiffness(structure)],
             own["through"],
         ]
-        return with_rigid_ends(structure, lengths), select_determined(levels, count)
+        return Joints(structure).with_rigid_ends(lengths), select_determined(levels, count)
 
     def _initial(self, structure: Structure, group: JointGroup) -> tuple[float, float]:
         """Return the rigid lengths in the stiffness and in the mass matrix in m."""
         if group.role == "through":
             return _ALMOST_NOTHING, 0.0
-        half = float(np.mean([half_depth(structure.frame, end) for end in group.ends]))
-        room = min(available_length(structure, end) for end in group.ends)
+        half = float(np.mean([Joints(structure).half_depth(end) for end in group.ends]))
+        room = min(Joints(structure).available_length(end) for end in group.ends)
         # A length moves by multiples of its start, so it must have one.
         wanted = self.length or half or _SHARE_WITHOUT_DEPTH * room
         start = min(max(wanted, _ALMOST_NOTHING), room / 2.0)
@@ -91,7 +88,7 @@ class Offset(SensitivityStrategy):
 
 
 def _length(structure: Structure, group: JointGroup, start: float) -> Change:
-    room = min(available_length(structure, end) for end in group.ends)
+    room = min(Joints(structure).available_length(end) for end in group.ends)
     limits = -_LONGEST_EXTENSION * room, room
     name = f"a {group.name}"
     return set_property(name, "rigid", group.ends, start, *limits, unit="m", signed=True)

@@ -11,16 +11,13 @@ from femubench.effect import Change
 from femubench.fem import Structure
 from femubench.update import (
     JointGroup,
+    Joints,
     SensitivityStrategy,
     all_elements,
-    flexible_ends,
-    joint_groups,
     scale_all_stiffness,
     scale_property,
     select_determined,
     set_property,
-    spring_estimates,
-    with_joint_springs,
 )
 
 _BENDING, _TORSION, _TRANSLATION = ("ry", "rz"), ("rx",), ("x", "y", "z")
@@ -77,7 +74,7 @@ class Spring(SensitivityStrategy):
         groups = self._groups(structure, len(measurement))
         values = {name: self._initial(structure, ends) for name, ends in groups.items()}
         placed = {end: values[name] for name, ends in groups.items() for end in ends}
-        sprung = with_joint_springs(structure, placed, arm=self.arm, arm_factor=self.arm_factor)
+        sprung = Joints(structure).with_springs(placed, arm=self.arm, arm_factor=self.arm_factor)
         if self.variant == "global":
             mass = scale_property("rhoA all members", "rhoA", all_elements(sprung), fatal=True)
             return sprung, [scale_all_stiffness(sprung), mass]
@@ -85,14 +82,14 @@ class Spring(SensitivityStrategy):
 
     def _groups(self, structure: Structure, count: int) -> dict[str, tuple[str, ...]]:
         """Return flexible ends by group; one group where bending alone outnumbers the data."""
-        groups = _flexible(structure, joint_groups(structure.frame))
-        directions = spring_estimates(structure.frame, next(iter(groups.values())))
+        groups = _flexible(structure, Joints(structure).groups())
+        directions = Joints(structure).spring_estimates(next(iter(groups.values())))
         if len(groups) * sum(name in _BENDING for name in directions) > count:
             return {"all joints": tuple(end for ends in groups.values() for end in ends)}
         return groups
 
     def _initial(self, structure: Structure, ends: tuple[str, ...]) -> dict[str, float]:
-        estimates = spring_estimates(structure.frame, ends)
+        estimates = Joints(structure).spring_estimates(ends)
         return {name: self.stiffness.get(name, value) for name, value in estimates.items()}
 
     def _springs(
@@ -116,7 +113,7 @@ class Spring(SensitivityStrategy):
 
 
 def _flexible(structure: Structure, groups: tuple[JointGroup, ...]) -> dict[str, tuple[str, ...]]:
-    found = {group.name: flexible_ends(structure.frame, group) for group in groups}
+    found = {group.name: Joints(structure).flexible_ends(group) for group in groups}
     flexible = {name: ends for name, ends in found.items() if ends}
     if not flexible:
         raise NotApplicable("no member end at a joint bends and has no spring yet")
