@@ -16,15 +16,15 @@ from femubench.fem import FloatArray, Frame, Structure, rectangular_tube
 from femubench.modal import rigid_modes_of
 from femubench.scenarios.generate import ladder_sensors
 from femubench.scenarios.structures import HALF_SIDE, RUNG, ladder_truth
-from femubench.update import ElementFamily, generic_family, nobari_family, physical_family
+from femubench.update import ElementFamily
 
 FRAME = Path(femubench.scenarios.__file__).parent / "frame"
 BREDT = 2.9033e-8  # m4
 FAMILIES = {
-    "physical": physical_family,
-    "nobari": nobari_family,
-    "generic-ls": generic_family,
-    "generic-adjusted": lambda structure: generic_family(structure, tied=True),
+    "physical": ElementFamily.physical,
+    "nobari": ElementFamily.nobari,
+    "generic-ls": ElementFamily.generic,
+    "generic-adjusted": lambda structure: ElementFamily.generic(structure, tied=True),
 }
 
 

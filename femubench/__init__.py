@@ -17,7 +17,7 @@ The example of every function starts from these lines:
 >>> modes = femubench.solve_modes(model)
 >>> stiffness = fem.Property("E", "E", update.all_elements(structure))
 >>> joints = update.Joints(structure).groups()
->>> joint = update.scale_joint(structure, joints[0])
+>>> joint = update.Changes(structure).joint(joints[0])
 >>> nominal, scaled = femubench.strategies["unchanged"], femubench.strategies["global"]
 >>> result = scaled.update(model, measurement, None)
 >>> run = femubench.rank(case, [nominal, scaled], nominal="drawn")

@@ -4,7 +4,6 @@ from femubench.core.modal.complex_modes import real_modes as real_modes
 from femubench.core.modal.correlation import mac as mac
 from femubench.core.modal.expansion import (
     expand_by_dynamics as expand_by_dynamics,
-    expand_by_rotation as expand_by_rotation,
     expand_by_serep as expand_by_serep,
 )
 from femubench.core.modal.frf import (

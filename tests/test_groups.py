@@ -43,7 +43,7 @@ from femubench.plugins.strategies.physical import Physical
 from femubench.plugins.strategies.sampling import BayesianSampling
 from femubench.scenarios.matlab_footbridge import TEST, VARIABLE
 from femubench.scenarios.nodes_from_stiffness import label_rows
-from femubench.update import parameterise, scale_groups, scale_groups_within
+from femubench.update import Changes
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
 BAR = Section(4e-4, 1.2e-8, 1.2e-8, 2e-8, 2.4e-8)
@@ -78,7 +78,7 @@ def grouped(frame: Frame) -> Model:
     model = Model.of(frame)
     structure = model.frame_structure
     names = [found.name for found in frame.sets]
-    factors = parameterise(model, "sets").properties
+    factors = Changes(model).parameterise("sets").properties
     twice = [structure.with_values([factor], [2.0]).matrices()[1] for factor in factors]
     parts = {n: m - structure.matrices()[1] for n, m in zip(names, twice, strict=True)}
     for name, springs in (("foot", frame.springs[:2]), ("head", frame.springs[2:])):
@@ -147,7 +147,7 @@ def test_reasons_say_what_would_make_a_strategy_applicable() -> None:
 def test_few_frequencies_merge_groups_into_levels() -> None:
     counts = {}
     for count in (1, 2, 3, 4):
-        changes = scale_groups_within(MODEL, count)
+        changes = Changes(MODEL).groups_within(count)
         counts[count] = [change.name.removeprefix("stiffness ") for change in changes]
     assert counts[4] == [f"group:{name}" for name in TRUTH]
     assert counts[3] == ["group:foot", "group:head", "structure"]
@@ -170,7 +170,7 @@ def test_a_prior_is_a_factor_as_likely_as_not() -> None:
     assert np.mean((draws > 0.5) & (draws < 2.0)) == pytest.approx(0.5, abs=0.005)
     stds = {
         change.name: change.parameters[0].std
-        for change in scale_groups(stated, "stiffness", own_prior=True)
+        for change in Changes(stated).groups("stiffness", own_prior=True)
     }
     assert stds["stiffness group:right"] == 0.1
     assert stds["stiffness group:foot"] == pytest.approx(np.log(5.0) / 0.67449, rel=1e-4)
@@ -227,7 +227,7 @@ def test_what_a_group_is_says_how_far_it_may_change() -> None:
     assert stiffer.value(stiffer.range[0]) < -0.999
     uppers = {
         change.places[0]: change.parameters[0].upper
-        for change in scale_groups(joint, "stiffness", own_prior=True)
+        for change in Changes(joint).groups("stiffness", own_prior=True)
     }
     assert uppers["group:left"] == 2.0
     assert uppers["group:foot"] > 20.0

@@ -45,11 +45,11 @@ from femubench.plugins.strategies.factors import Global, Local
 from femubench.plugins.strategies.offset import Offset
 from femubench.plugins.strategies.spring import Spring
 from femubench.update import (
+    Changes,
     Joints,
     UpdateOptions,
     all_elements,
     scale_property,
-    select_determined,
     sensitivity_update,
 )
 
@@ -272,7 +272,7 @@ def test_no_more_parameters_than_frequencies(hframe_case: Any) -> None:
         return scale_property(name, "EI", ())
 
     levels = [[some("a"), some("b")], [], [some("c"), some("d")], [some("e")]]
-    counts = {n: [change.name for change in select_determined(levels, n)] for n in (1, 2, 3, 4, 9)}
+    counts = {n: [change.name for change in Changes.determined(levels, n)] for n in (1, 2, 3, 4, 9)}
     assert counts == {1: ["a"], 2: ["a", "b"], 3: ["a", "b"], 4: list("abcd"), 9: list("abcde")}
 
 

@@ -90,7 +90,7 @@ class Change:
         """Return the same with nothing known of its values but their range.
 
         Examples:
-            >>> float(update.scale_all_stiffness(model, 0.1).without_prior().parameters[0].std)
+            >>> float(update.Changes(model).stiffness(0.1).without_prior().parameters[0].std)
             inf
         """
         free = tuple(replace(p, std=np.inf) for p in map(parameter_of, self.parameters))

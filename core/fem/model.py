@@ -89,26 +89,27 @@ class LowRank:
         dense: FloatArray = self.basis @ self.core @ self.basis.T
         return dense
 
+    @classmethod
+    def total(cls, parts: Sequence[LowRank | None]) -> LowRank | None:
+        """Return the sum of low-rank changes with the smallest rank that represents it.
 
-def total_change(parts: Sequence[LowRank | None]) -> LowRank | None:
-    """Return the sum of low-rank changes with the smallest rank that represents it.
+        Arguments:
+            parts: changes of one matrix; None stands for no change.
 
-    Arguments:
-        parts: changes of one matrix; None stands for no change.
-
-    Examples:
-        >>> change = fem.LowRank(np.eye(4, 2), np.eye(2))
-        >>> np.allclose(update.total_change([change, None, change]).toarray(), 2 * change.toarray())
-        True
-    """
-    changes = [part for part in parts if part is not None]
-    if not changes:
-        return None
-    q, r = la.qr(np.hstack([change.basis for change in changes]), mode="economic")
-    core = r @ la.block_diag(*(change.core for change in changes)) @ r.T
-    values, turn = la.eigh(0.5 * (core + core.T))
-    keep = np.abs(values) > _NEGLIGIBLE * np.abs(values).max(initial=0.0)
-    return LowRank(q @ turn[:, keep], np.diag(values[keep]))
+        Examples:
+            >>> change = fem.LowRank(np.eye(4, 2), np.eye(2))
+            >>> both = fem.LowRank.total([change, None, change])
+            >>> np.allclose(both.toarray(), 2 * change.toarray())
+            True
+        """
+        changes = [part for part in parts if part is not None]
+        if not changes:
+            return None
+        q, r = la.qr(np.hstack([change.basis for change in changes]), mode="economic")
+        core = r @ la.block_diag(*(change.core for change in changes)) @ r.T
+        values, turn = la.eigh(0.5 * (core + core.T))
+        keep = np.abs(values) > _NEGLIGIBLE * np.abs(values).max(initial=0.0)
+        return cls(q @ turn[:, keep], np.diag(values[keep]))
 
 
 class Geometry(Protocol):

@@ -10,14 +10,7 @@ import numpy as np
 from femubench import Measurement, Model
 from femubench.effect import Change
 from femubench.fem import Structure
-from femubench.update import (
-    JointGroup,
-    Joints,
-    SensitivityStrategy,
-    scale_all_stiffness,
-    select_determined,
-    set_property,
-)
+from femubench.update import Changes, JointGroup, Joints, SensitivityStrategy, set_property
 
 _SHARE_WITHOUT_DEPTH = 0.1  # of the element
 _ALMOST_NOTHING = 3.12e-6  # m, the initial offset of the passing member in table 4(e)
@@ -70,10 +63,10 @@ class Offset(SensitivityStrategy):
             own[group.role].append(_length(structure, group, start))
         levels = [
             own["branch"] + own["end"],
-            [scale_all_stiffness(structure)],
+            [Changes(structure).stiffness()],
             own["through"],
         ]
-        return Joints(structure).with_rigid_ends(lengths), select_determined(levels, count)
+        return Joints(structure).with_rigid_ends(lengths), Changes.determined(levels, count)
 
     def _initial(self, structure: Structure, group: JointGroup) -> tuple[float, float]:
         """Return the rigid lengths in the stiffness and in the mass matrix in m."""

@@ -10,13 +10,12 @@ from femubench import Measurement, Model, NotApplicable
 from femubench.effect import Change
 from femubench.fem import Structure
 from femubench.update import (
+    Changes,
     JointGroup,
     Joints,
     SensitivityStrategy,
     all_elements,
-    scale_all_stiffness,
     scale_property,
-    select_determined,
     set_property,
 )
 
@@ -77,7 +76,7 @@ class Spring(SensitivityStrategy):
         sprung = Joints(structure).with_springs(placed, arm=self.arm, arm_factor=self.arm_factor)
         if self.variant == "global":
             mass = scale_property("rhoA all members", "rhoA", all_elements(sprung), fatal=True)
-            return sprung, [scale_all_stiffness(sprung), mass]
+            return sprung, [Changes(sprung).stiffness(), mass]
         return sprung, self._springs(sprung, groups, values, len(measurement))
 
     def _groups(self, structure: Structure, count: int) -> dict[str, tuple[str, ...]]:
@@ -107,9 +106,9 @@ class Spring(SensitivityStrategy):
                 if name in values[group]
             ]
 
-        stiffness = [scale_all_stiffness(structure)] if self.free_stiffness else []
+        stiffness = [Changes(structure).stiffness()] if self.free_stiffness else []
         levels = [level(_BENDING), stiffness, level(_TORSION), level(_TRANSLATION)]
-        return select_determined(levels, count)
+        return Changes.determined(levels, count)
 
 
 def _flexible(structure: Structure, groups: tuple[JointGroup, ...]) -> dict[str, tuple[str, ...]]:
