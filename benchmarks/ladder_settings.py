@@ -12,7 +12,7 @@ import scipy.linalg as la
 
 import femubench.scenarios
 from femubench import Model, Sensors, read_case, solve_modes
-from femubench.fem import FloatArray, Frame, Structure, rectangular_tube
+from femubench.fem import FloatArray, Frame, Section, Structure
 from femubench.modal import rigid_modes_of
 from femubench.scenarios.generate import ladder_sensors
 from femubench.scenarios.structures import HALF_SIDE, RUNG, ladder_truth
@@ -75,7 +75,7 @@ def setting(
         frame = numbered(frame, backward.split("+"))
     model = Model.of(frame if accelerometer else replace(frame, masses=()))
     used, dofs = case.used_measurement(0), model.dofs
-    tested = ladder_truth(rectangular_tube(0.0254, 0.0254, 0.00238))
+    tested = ladder_truth(Section.rectangular_tube(0.0254, 0.0254, 0.00238))
     truth = Model.of(tested).attach(frame.masses if accelerometer else (), ())
     true = solve_modes(truth).elastic.shapes[:, :3]
     labels = tuple(str(i) for i in range(len(dofs)))

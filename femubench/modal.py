@@ -11,16 +11,11 @@ from femubench.core.modal.frf import (
     Quantity as Quantity,
     receptance as receptance,
 )
-from femubench.core.modal.generalised_mass import mass_normalised as mass_normalised
-from femubench.core.modal.group_prior import (
-    group_prior_std as group_prior_std,
-    largest_factor as largest_factor,
-    support_groups as support_groups,
-)
+from femubench.core.modal.group_prior import GroupPriors as GroupPriors
 from femubench.core.modal.many_changes import modes_of_changes as modes_of_changes
 from femubench.core.modal.pairing import pair_measured as pair_measured, pair_modes as pair_modes
 from femubench.core.modal.rigid import rigid_modes_of as rigid_modes_of
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities as eigenvalue_sensitivities
-from femubench.core.modal.signals import TimeSignals as TimeSignals, join_records as join_records
+from femubench.core.modal.signals import TimeSignals as TimeSignals
 
 __all__ = [name for name in dir() if not name.startswith("_")]

@@ -17,7 +17,7 @@ from femubench.core.conformance.place_words import has_place
 from femubench.core.drawing.places import find_wireframe
 from femubench.core.effect.places import split_direction
 from femubench.effect import ModelPlaces, Places
-from femubench.fem import Frame, MemberSet, rectangular_tube, round_tube
+from femubench.fem import Frame, MemberSet, Section
 from femubench.plugins.effects.material import Density, MemberMass, MemberStiffness, YoungsModulus
 from femubench.plugins.effects.wall_thickness import WallThickness
 
@@ -178,7 +178,7 @@ def test_a_family_changes_as_its_members_do(effect: type, two_metals: Case) -> N
 def test_a_wall_changes_all_constants_as_the_shape_does(
     ladder: FrameBuilder, portal: FrameBuilder
 ) -> None:
-    thick = rectangular_tube(0.0254, 0.0254, 1.2 * 0.00238)
+    thick = Section.rectangular_tube(0.0254, 0.0254, 1.2 * 0.00238)
     (plain,) = {m.section for m in ladder(polar=False).members}
     frame = WallThickness().frame(ladder(polar=False), "BE", [0.2])
     changed = frame.members[frame.member_index["BE"]].section
@@ -197,7 +197,7 @@ def test_a_wall_changes_all_constants_as_the_shape_does(
 
 def test_a_wall_is_that_of_a_tube(ladder: FrameBuilder, hframe: FrameBuilder) -> None:
     frame = ladder()
-    ring, bar = round_tube(0.02, 0.002), round_tube(0.02, 0.01)
+    ring, bar = Section.round_tube(0.02, 0.002), Section.round_tube(0.02, 0.01)
     sections = {"BE": ring, "CF": bar}
     members = tuple(replace(m, section=sections.get(m.name, m.section)) for m in frame.members)
     places = WallThickness().places(Model.of(replace(frame, members=members)))

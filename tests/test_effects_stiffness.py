@@ -15,17 +15,7 @@ from femubench.core.effect.places import split_direction
 from femubench.core.fem.frame import Coupling, Factor
 from femubench.core.fem.model import LowRank
 from femubench.effect import FrameEffect, ModelPlaces, Places
-from femubench.fem import (
-    Frame,
-    JointSpring,
-    ModelError,
-    Place,
-    PointMass,
-    RigidEnd,
-    Structure,
-    mass_matrices,
-    stiffness_matrices,
-)
+from femubench.fem import Frame, JointSpring, ModelError, Place, PointMass, RigidEnd, Structure
 from femubench.plugins.effects.flexible_ends import rate_nodes
 from femubench.plugins.effects.joint_offset import JointOffset
 from femubench.plugins.effects.joint_rotation import JointRotation
@@ -169,7 +159,7 @@ def held_element_frequency(model: Model) -> float:
     properties = model.frame_structure.properties
     turning = [3] if model.frame_structure.frame.plane != "in-plane" else []
     turning += [4, 5] if model.frame_structure.frame.plane == "3d" else [4]
-    stiffness, mass = stiffness_matrices(properties), mass_matrices(properties)
+    stiffness, mass = properties.stiffness_matrices(), properties.mass_matrices()
     ratio = [stiffness[:, i, i] / mass[:, i, i] for i in turning]
     return float(np.sqrt(np.min(ratio)) / (2.0 * np.pi))
 

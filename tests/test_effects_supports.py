@@ -26,8 +26,8 @@ from femubench.fem import (
     Member,
     ModelError,
     Place,
+    Section,
     Support,
-    solid_rectangle,
 )
 from femubench.plugins.effects.support_flexibility import SupportFlexibility
 
@@ -119,7 +119,7 @@ def test_words_of_supports(held: list[Model]) -> None:
     assert len(drawn.place("support:all").points) == 3
 
 
-LENGTH, SECTION, STEEL = 1.2, solid_rectangle(0.03, 0.012), Material(207e9, 0.3, 7850.0)
+LENGTH, SECTION, STEEL = 1.2, Section.solid_rectangle(0.03, 0.012), Material(207e9, 0.3, 7850.0)
 EI = STEEL.E * SECTION.Iy
 STATIONS = np.linspace(0.1, 1.0, 10)
 

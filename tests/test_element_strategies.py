@@ -12,7 +12,6 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from femubench.core.errors import NotApplicable
-from femubench.core.fem.beam import stiffness_matrices
 from femubench.core.fem.frame import (
     Frame,
     Joint,
@@ -26,7 +25,7 @@ from femubench.core.fem.frame import (
 )
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
-from femubench.core.fem.sections import rectangular_tube
+from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
@@ -55,7 +54,7 @@ from femubench.plugins.strategies.nobari import Nobari, NobariRigid
 from femubench.plugins.strategies.physical import Physical
 
 RNG = np.random.default_rng(0)
-TUBE = rectangular_tube(0.0254, 0.0254, 0.00238)
+TUBE = Section.rectangular_tube(0.0254, 0.0254, 0.00238)
 STIFF_TUBE = replace(TUBE, J=TUBE.Jp)
 PRINTED = (226.8, 275.2, 537.4)
 WIDTH = 0.2794
@@ -234,7 +233,7 @@ def test_nominal_elements_are_made_of_their_strain_modes(plane: Any, beam: Any) 
     structure = Structure.build(ladder(plane, beam, rigid_ends=ENDS))
     vectors = scale_strain_vectors(structure, np.arange(28))
     moving = np.outer(structure.active_local, structure.active_local)
-    stiffness = stiffness_matrices(structure.properties) * moving
+    stiffness = structure.properties.stiffness_matrices() * moving
     built = vectors @ np.swapaxes(vectors, 1, 2)
     assert built == pytest.approx(stiffness, abs=1e-12 * np.abs(stiffness).max())
 
@@ -298,7 +297,7 @@ def test_nobari_terms_are_those_of_equation_20_and_obey_21() -> None:
     assert k3[np.ix_(slope, slope)] == pytest.approx(nominal[2] * np.array([[2, 1], [1, 2]]))
     assert k4[np.ix_(twist, twist)] == pytest.approx(p.GJ[0] / L * np.array([[1, -1], [-1, 1]]))
     assert family.patterns.sum(axis=1) == pytest.approx(
-        stiffness_matrices(p) * np.outer(structure.active_local, structure.active_local), abs=1e-6
+        p.stiffness_matrices() * np.outer(structure.active_local, structure.active_local), abs=1e-6
     )
 
 

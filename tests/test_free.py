@@ -28,7 +28,7 @@ from femubench.core.inference.examine import examine
 from femubench.core.look.look import look
 from femubench.diagnosis import list_effects
 from femubench.effect import Parameter
-from femubench.fem import Property, with_group_factors
+from femubench.fem import Groups, Property
 
 CASES = Path(__file__).parent / "cases"
 
@@ -154,7 +154,7 @@ def test_floors_on_rails_keep_their_springs_as_causes(weights: tuple[float, ...]
 def test_damage_is_no_matter_of_tolerance_where_there_is_a_reference() -> None:
     model, (wanted,) = row_of_masses(), [e for e in list_effects() if e.name == "member-stiffness"]
     storey = [Property("storey-2", "E", ("group:storey-2",))]
-    broken = frequencies_of(with_group_factors(model, storey, [0.56]), 0.03)
+    broken = frequencies_of(Groups(model).with_factors(storey, [0.56]), 0.03)
 
     def loss(reference: Measurement | None) -> float:
         seen = examine(model, broken, [wanted], tolerance=0.0, pairs=False, reference=reference)

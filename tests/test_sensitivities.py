@@ -21,7 +21,7 @@ from femubench.core.fem.frame import (
 )
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import QUANTITIES, Property
-from femubench.core.fem.sections import rectangular_tube
+from femubench.core.fem.sections import Section
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import Modes, solve_modes
 from femubench.core.modal.sensitivity import (
@@ -190,7 +190,7 @@ def test_a_factor_on_all_stiffness_moves_every_eigenvalue_alike(portal: Any) -> 
 
 
 def test_a_repeated_eigenvalue_leaves_out_what_turns_inside_its_space() -> None:
-    tube = rectangular_tube(0.04, 0.04, 0.002)
+    tube = Section.rectangular_tube(0.04, 0.04, 0.002)
     steel = Material(207e9, 0.3, 7850.0)
     joints = (Joint("foot", (0.0, 0.0, 0.0)), Joint("top", (1.0, 0.0, 0.0)))
     clamp = Support(Place(joint="foot"), ("x", "y", "z", "rx", "ry", "rz"))

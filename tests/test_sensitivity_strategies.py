@@ -23,7 +23,6 @@ from femubench import (
 )
 from femubench.core.conformance.problems import problem
 from femubench.core.fem.model_parameters import matrix_slopes
-from femubench.core.fem.sections import constant_kappa
 from femubench.core.modal.eigen import count_evaluations
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
 from femubench.core.update.residuals import Targets, predict
@@ -77,7 +76,8 @@ def measured(
 
 def with_shear(frame: Frame) -> Frame:
     members = tuple(
-        replace(m, section=replace(m.section, kappa=constant_kappa(0.4355))) for m in frame.members
+        replace(m, section=replace(m.section, kappa=Section.constant_kappa(0.4355)))
+        for m in frame.members
     )
     return replace(frame, beam="timoshenko", members=members)
 

@@ -6,7 +6,7 @@ from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.places import Places, bare_place, split_direction
 from femubench.core.errors import ModelError
-from femubench.core.fem.group_factors import group_places
+from femubench.core.fem.group_factors import Groups
 from femubench.core.fem.model import Model
 
 
@@ -16,7 +16,7 @@ def has_place(model: Model, place: str) -> bool:
     if model.structure is not None:
         words = (bare, place)
         return any(_in_frame(model, w) for w in words) or _is_interface(model, bare)
-    known = {"all", *group_places(model, "stiffness"), *group_places(model, "mass")}
+    known = {"all", *Groups(model).places("stiffness"), *Groups(model).places("mass")}
     if isinstance(model.geometry, MatrixGeometry):
         known |= set(model.geometry.names)
     return place in known or bare in known or _is_interface(model, bare)

@@ -20,7 +20,9 @@ from femubench.core.errors import ModelError
 from femubench.core.fem.frame import ACTIVE, Frame, Member, Place, split_half
 from femubench.core.fem.group_factors import GROUP
 from femubench.core.fem.joints import joint_groups
+from femubench.core.fem.mesh import member_axes
 from femubench.core.fem.sensors import DIRECTIONS
+from femubench.core.typing import FloatArray
 
 ALL = "all"
 _TYPE, _BRANCH, _SUPPORT = "type:", ":branch", "support:"
@@ -300,6 +302,15 @@ class Places:
             if pair[0] in self.frame.joint_index and pair[1] in self.frame.joint_index:
                 return pair
         raise ModelError(f"there is no pair of joints {place!r}")
+
+    def axes(self, member: Member) -> FloatArray:
+        """Return the local axes of a member as rows, the first along it, (3, 3).
+
+        Examples:
+            >>> print(np.abs(effect.Places(frame).axes(frame.members[0])[2]))
+            [0. 0. 1.]
+        """
+        return member_axes(self.frame, member)[0]
 
     def directed_point(self, place: str) -> tuple[Place, str]:
         """Return the point and the direction that a place with a direction stands for.

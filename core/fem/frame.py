@@ -327,6 +327,11 @@ class Frame:
         share = self.rotary_inertia
         return float(self.beam == "timoshenko" if share is None else share)
 
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Return the directions in which joints may move, of x, y, z, rx, ry, rz."""
+        return ACTIVE[self.plane]
+
     @cached_property
     def joint_index(self) -> Mapping[str, int]:
         """Return the position of every joint in `joints`."""

@@ -256,6 +256,20 @@ class Model(Shown):
         change = self.mass_change
         return product if change is None else product + change @ vectors
 
+    def mass_normalised(self, shapes: FloatArray) -> FloatArray:
+        """Return shapes with phi' M phi = 1 each, (n, m).
+
+        Arguments:
+            shapes: at all dofs, each with some mass in it, (n, m).
+
+        Examples:
+            >>> shapes = model.mass_normalised(3.0 * modes.shapes)
+            >>> np.allclose(np.diag(shapes.T @ model.mass_times(shapes)), 1.0)
+            True
+        """
+        mass = np.einsum("ij,ij->j", shapes, self.mass_times(shapes))
+        return np.asarray(shapes / np.sqrt(mass))
+
     def attach(self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]) -> Model:
         """Return the model with further masses and springs to ground.
 

@@ -13,17 +13,12 @@ from femubench.core.change.parametric_model import ParametricModel
 from femubench.core.change.tabulated import change_of
 from femubench.core.errors import InputError, NotApplicable, UnknownNameError
 from femubench.core.fem.frame import Frame
-from femubench.core.fem.group_factors import GROUP, group_places
+from femubench.core.fem.group_factors import GROUP, Groups
 from femubench.core.fem.joints import JointGroup, all_elements, elements_at, joint_groups
 from femubench.core.fem.model import Model
 from femubench.core.fem.slopes import Matrix
 from femubench.core.fem.structure import Structure
-from femubench.core.modal.group_prior import (
-    STRUCTURE_STD,
-    group_prior_std,
-    largest_factor,
-    support_groups,
-)
+from femubench.core.modal.group_prior import STRUCTURE_STD, GroupPriors
 from femubench.core.plugin.loader import list_effects
 from femubench.core.roles import Effect
 
@@ -211,15 +206,19 @@ class Changes:
         """
         model, quantity = self.model, "E" if matrix == "stiffness" else "density"
         found = []
-        for place in group_places(model, matrix):
+        for place in Groups(model).places(matrix):
             name, std = place.removeprefix(GROUP), None
             if own_prior:
-                std = group_prior_std(model, name)
+                std = GroupPriors(model).std(name)
                 limit = max(20.0, float(np.exp(_WIDEST * std)))
             else:
-                limit = 100.0 if matrix == "stiffness" and name in support_groups(model) else 20.0
+                limit = (
+                    100.0 if matrix == "stiffness" and name in GroupPriors(model).supports else 20.0
+                )
             at = f"{matrix} {place}", quantity, (place,)
-            upper = min(limit, largest_factor(model, name) if matrix == "stiffness" else limit)
+            upper = min(
+                limit, GroupPriors(model).largest_factor(name) if matrix == "stiffness" else limit
+            )
             found.append(scale_property(*at, prior_std=std, lower=1.0 / limit, upper=upper))
         return found
 
@@ -242,7 +241,7 @@ class Changes:
             ['stiffness group:deck']
         """
         every = self.parts("groups")
-        held = {f"{GROUP}{name}" for name in support_groups(self.model)}
+        held = {f"{GROUP}{name}" for name in GroupPriors(self.model).supports}
         supports = [change for change in every if change.places[0] in held]
         rest = [change for change in every if change.places[0] not in held]
         levels = (

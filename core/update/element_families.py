@@ -12,7 +12,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError, NotApplicable
-from femubench.core.fem.beam import stiffness_matrices
 from femubench.core.fem.frame import Plane
 from femubench.core.fem.model import Model
 from femubench.core.fem.model_parameters import matrix_slopes, with_values
@@ -500,7 +499,7 @@ def _changeable(structure: Structure) -> tuple[IntArray, FloatArray, list[str]]:
     elements = np.flatnonzero(carries)
     if len(elements) == 0:
         raise NotApplicable("no element of the model carries mass")
-    stiffness = stiffness_matrices(structure.properties.take(elements))
+    stiffness = structure.properties.take(elements).stiffness_matrices()
     seen: Counter[str] = Counter()
     labels = []
     for e in elements:
@@ -537,6 +536,6 @@ def scale_strain_vectors(structure: Structure, elements: IntArray) -> FloatArray
     vectors = strain_vectors(p.length - p.rigid_1 - p.rigid_2, p.rigid_1, p.rigid_2)
     vectors = vectors[:, :, active_strain_modes(structure.active_local)]
     inverse = np.linalg.pinv(vectors)
-    core = inverse @ stiffness_matrices(p) @ np.swapaxes(inverse, 1, 2)
+    core = inverse @ p.stiffness_matrices() @ np.swapaxes(inverse, 1, 2)
     diagonal = np.einsum("eqq->eq", core)
     return np.asarray(vectors * np.sqrt(np.maximum(diagonal, 0.0))[:, None, :])

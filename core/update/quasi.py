@@ -16,7 +16,6 @@ from femubench.core.modal.expansion import (
     expand_by_rotation,
     find_measured_rows,
 )
-from femubench.core.modal.generalised_mass import mass_normalised
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import pair_measured
 from femubench.core.typing import FloatArray, IntArray
@@ -153,4 +152,4 @@ class WantedModes:
         rows = find_measured_rows(measured.shapes)
         sensors = sp.csr_array(model.observe(measured.sensors))[rows]
         shapes = expand_by_dynamics(model, sensors, measured.shapes[rows], measured.eigenvalues)
-        return mass_normalised(model, shapes)
+        return model.mass_normalised(shapes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from femubench import Model, UpdateResult
-from femubench.fem import FloatArray, Structure, stiffness_matrices
+from femubench.fem import FloatArray, Structure
 from femubench.plot import wireframe_of
 from femubench.reproduction import Figure, MatrixImage, StructureMap, Workbench
 from femubench.results import element_norms, stiffness_difference
@@ -48,7 +48,7 @@ def relative_change(structure: Structure, change: FloatArray) -> FloatArray:
         structure: the nominal frame.
         change: of the local element matrices, (n, 12, 12).
     """
-    nominal = stiffness_matrices(structure.properties)
+    nominal = structure.properties.stiffness_matrices()
     return element_norms(structure, change) / element_norms(structure, nominal)
 
 

@@ -16,7 +16,7 @@ from femubench.effect import (
     Size,
     Term,
 )
-from femubench.fem import Coupling, Frame, coupling_matrices
+from femubench.fem import Coupling, Frame
 
 _BOUND = 0.8
 
@@ -49,5 +49,5 @@ class BendingTorsionCoupling(FrameEffect):
         """Return what a coefficient of 1 adds to the elements of the member."""
         structure = model.frame_structure
         elements = ModelPlaces(model).elements(place)
-        blocks = coupling_matrices(structure.properties.take(elements))
+        blocks = structure.properties.take(elements).coupling_matrices()
         return Change.proportional(Term("stiffness", ElementOperator(structure, elements, blocks)))

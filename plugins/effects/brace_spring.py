@@ -24,7 +24,7 @@ from femubench.effect import (
     Term,
     once_for,
 )
-from femubench.fem import ACTIVE, Brace, Frame
+from femubench.fem import Brace, Frame
 
 _SHARE = 0.01  # of the mean EA / L of the members
 _MOST = 300
@@ -50,7 +50,7 @@ class BraceSpring(FrameEffect):
         frame = model.structure.frame
         body = dict(frame.joint_index)  # the number of the rigid body that links make of joints
         for link in frame.links:
-            if len(link.motions) in (0, len(ACTIVE[frame.plane])):
+            if len(link.motions) in (0, len(frame.active)):
                 taken = {body[name] for name in (link.leads, *link.follows)}
                 body = {name: min(taken) if own in taken else own for name, own in body.items()}
         joined = {frozenset(body[name] for name in member.ends) for member in frame.members}

@@ -30,7 +30,7 @@ from femubench.effect import (
     Term,
     once_for,
 )
-from femubench.fem import FloatArray, Frame, IntArray, Structure, mass_matrices, stiffness_matrices
+from femubench.fem import FloatArray, Frame, IntArray, Structure
 from femubench.update import Joints
 
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
@@ -255,8 +255,8 @@ class _Elements:
             return []
         structure, turned = model.frame_structure, np.swapaxes(self.motion, 1, 2)
         p = structure.properties
-        plain_k = once_for(model, "element stiffness", lambda: stiffness_matrices(p))
-        plain_m = once_for(model, "element mass", lambda: mass_matrices(p))
+        plain_k = once_for(model, "element stiffness", lambda: p.stiffness_matrices())
+        plain_m = once_for(model, "element mass", lambda: p.mass_matrices())
         stiffness = turned @ self.stiffness @ self.motion - plain_k[self.rows]
         mass = turned @ self.mass @ self.motion - plain_m[self.rows]
         return [
@@ -284,7 +284,7 @@ def _behind_arms(structure: Structure, rows: IntArray, arms: FloatArray) -> list
         # A point at a distance a along x moves by a rz in y and by -a ry in z.
         motion[:, 6 * side + 1, 6 * side + 5] = sign * arms[:, side]
         motion[:, 6 * side + 2, 6 * side + 4] = -sign * arms[:, side]
-    return list(zip(stiffness_matrices(p), mass_matrices(p), motion, strict=True))
+    return list(zip(p.stiffness_matrices(), p.mass_matrices(), motion, strict=True))
 
 
 def _element_items(

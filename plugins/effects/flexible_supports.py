@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import connected_components
 
 from femubench import Model
 from femubench.effect import Change, ModelPlaces, Places, RowOperator, Term, once_for
-from femubench.fem import ACTIVE, FloatArray, Frame, GroundSpring, IntArray, SparseArray
+from femubench.fem import FloatArray, Frame, GroundSpring, IntArray, SparseArray
 
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 Held = tuple[str, str]  # the word of a support, and a direction that it holds
@@ -144,7 +144,7 @@ def release_supports(model: Model) -> ReleasedSupports:
 
 def _release(model: Model) -> ReleasedSupports:
     structure = model.frame_structure
-    frame, active = structure.frame, ACTIVE[structure.frame.plane]
+    frame, active = structure.frame, structure.frame.active
     pairs = ((str(Places(frame).point(str(s.at))), d) for s in frame.supports for d in s.fixed)
     held = list(dict.fromkeys(pair for pair in pairs if pair[1] in active))
     # Between the dofs that are held there is no stress of a preload to find.

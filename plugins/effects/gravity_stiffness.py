@@ -11,7 +11,7 @@ import numpy as np
 
 from femubench import Model, solve_modes
 from femubench.effect import Change, FrameEffect, Parameter, Size, Term, once_for
-from femubench.fem import Frame, ModelError, SparseArray, gravity_stiffness
+from femubench.fem import Frame, GeometricStiffness, ModelError, SparseArray
 
 # Beyond the own weight there may be loads that stand on it; what stands is safe from buckling
 # by three times its weight and more.
@@ -68,4 +68,4 @@ class GravityStiffness(FrameEffect):
 
 def _unit(model: Model) -> SparseArray:
     """Return the geometric stiffness of the weight, worked out once."""
-    return once_for(model, "weight", lambda: gravity_stiffness(model.frame_structure))
+    return once_for(model, "weight", lambda: GeometricStiffness(model.frame_structure).of_weight())

@@ -15,7 +15,7 @@ from femubench.effect import (
     Places,
     Size,
 )
-from femubench.fem import ACTIVE, FloatArray, Frame, Structure
+from femubench.fem import FloatArray, Frame, Structure
 from femubench.plugins.effects.flexible_ends import end_stiffness, flexible_ends_change, soften_ends
 from femubench.update import JointGroup, Joints
 
@@ -113,7 +113,7 @@ def _multiples(values: FloatArray, count: int) -> FloatArray:
 
 def _parts(frame: Frame) -> tuple[tuple[str, ...], ...]:
     """Return the local directions of bending, and of torsion where the plane has it."""
-    active = ACTIVE[frame.plane]
+    active = frame.active
     parts = (tuple(d for d in group if d in active) for group in (_BENDING, _TORSION))
     return tuple(part for part in parts if part)
 

@@ -22,14 +22,7 @@ from femubench.effect import (
     Term,
     once_for,
 )
-from femubench.fem import (
-    FloatArray,
-    Frame,
-    IntArray,
-    RigidEnd,
-    Structure,
-    stiffness_matrices,
-)
+from femubench.fem import FloatArray, Frame, IntArray, RigidEnd, Structure
 from femubench.update import Joints
 
 _SHARE = 0.02  # of the member, where sections are numbers
@@ -155,7 +148,7 @@ def _kept_blocks(
         many = p.take(np.tile(np.arange(len(p)), len(nodes)))
         more = (nodes[:, None, None] * sides[fresh]).reshape(-1, 2)
         rigid = {"rigid_1": many.rigid_1 + more[:, 0], "rigid_2": many.rigid_2 + more[:, 1]}
-        values = stiffness_matrices(replace(many, **rigid)).reshape(len(nodes), -1)
+        values = replace(many, **rigid).stiffness_matrices().reshape(len(nodes), -1)
         basis = _basis(key, nodes)
         weight = basis.max(axis=1)[:, None]
         fitted = np.linalg.lstsq(basis / weight, values / weight, rcond=1e-13)[0]

@@ -16,7 +16,7 @@ from femubench.effect import (
     Site,
     Size,
 )
-from femubench.fem import ACTIVE, Frame, Structure
+from femubench.fem import Frame, Structure
 from femubench.plugins.effects.flexible_ends import (
     end_arm,
     end_room,
@@ -107,7 +107,7 @@ class JointRotation(FrameEffect):
 
 def _parts(frame: Frame, place: str) -> dict[str, tuple[str, ...]]:
     """Return the local directions that belong to every stiffness, by its name."""
-    active = ACTIVE[frame.plane]
+    active = frame.active
     bending, torsion = (tuple(d for d in group if d in active) for group in (_BENDING, _TORSION))
     if place.endswith(Places.APART):
         names = ("bending",) if len(bending) == 1 else tuple(f"bending {d}" for d in bending)

@@ -21,7 +21,7 @@ from femubench.effect import (
     once_for,
     tabulate_change,
 )
-from femubench.fem import Factor, Frame, halves_of, stiffness_matrices
+from femubench.fem import Factor, Frame, halves_of
 
 _LOSS = Parameter("loss", "", 0.3, lower=0.0, upper=0.95, one_sided=True, wording="share")
 
@@ -64,7 +64,7 @@ class LocalStiffnessLoss(FrameEffect):
         structure = model.frame_structure
         rows = ModelPlaces(model).elements(place)
         whole = once_for(
-            model, "element stiffness", lambda: stiffness_matrices(structure.properties)
+            model, "element stiffness", lambda: structure.properties.stiffness_matrices()
         )
         lost = ElementOperator(structure, rows, whole, share=-np.ones(len(rows)), kind=rows)
         return Change.proportional(Term("stiffness", lost))

@@ -20,15 +20,7 @@ from femubench.effect import (
     Term,
     once_for,
 )
-from femubench.fem import (
-    Eccentricity,
-    FloatArray,
-    Frame,
-    IntArray,
-    Section,
-    Structure,
-    eccentric_mass_parts,
-)
+from femubench.fem import Eccentricity, FloatArray, Frame, IntArray, Section, Structure
 
 _SCALE, _BOUND = 0.15, 1.0  # of the size of the section
 
@@ -80,7 +72,7 @@ class MassEccentricity(FrameEffect):
 def _parts(structure: Structure, axis: Literal["y", "z"]) -> tuple[FloatArray, IntArray]:
     """Return what is linear, quadratic and mixed by kinds of elements, and each one's kind."""
     first, kind = structure.properties.alike()
-    found = eccentric_mass_parts(structure.properties.take(first))
+    found = structure.properties.take(first).eccentric_mass_parts()
     return np.stack([found[name] for name in (axis, 2 * axis, "yz")], axis=1), kind
 
 

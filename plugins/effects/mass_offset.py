@@ -22,7 +22,7 @@ from femubench.effect import (
     Term,
     once_for,
 )
-from femubench.fem import ACTIVE, FloatArray, Frame, Member, PointMass, SparseArray, member_axes
+from femubench.fem import FloatArray, Frame, Member, PointMass, SparseArray
 from femubench.plugins.effects.mass_eccentricity import section_size
 
 _SHARE = 0.005  # of the structure's mass
@@ -99,7 +99,7 @@ class MassOffset(FrameEffect):
 
 
 def _directions(model: Model) -> list[str]:
-    return [d for d in ACTIVE[model.frame_structure.frame.plane] if d in "xyz"]
+    return [d for d in model.frame_structure.frame.active if d in "xyz"]
 
 
 def _member_at(frame: Frame, place: str) -> Member:
@@ -108,7 +108,7 @@ def _member_at(frame: Frame, place: str) -> Member:
 
 def _across(frame: Frame, place: str) -> FloatArray:
     """Return the direction of an arm, global, (3,); an arm up is not felt out of plane."""
-    axes, _ = member_axes(frame, _member_at(frame, place))
+    axes = Places(frame).axes(_member_at(frame, place))
     return np.asarray(axes[1] if frame.plane == "out-of-plane" else axes[2])
 
 

@@ -20,7 +20,7 @@ from femubench.effect import (
     Size,
     Term,
 )
-from femubench.fem import Frame, mass_matrices
+from femubench.fem import Frame
 
 
 class RotaryInertia(FrameEffect):
@@ -67,6 +67,6 @@ class RotaryInertia(FrameEffect):
         own = whole.properties.take(rows)
         none = np.zeros(len(own))
         without = own.scale("rhoIy", none).scale("rhoIz", none)
-        blocks = mass_matrices(own) - mass_matrices(without)
+        blocks = own.mass_matrices() - without.mass_matrices()
         term = Term("mass", ElementOperator(structure, rows, blocks))
         return Change.proportional(term, neutral=structure.frame.rotary_share)

@@ -17,7 +17,7 @@ from femubench.effect import (
     Site,
     Size,
 )
-from femubench.fem import FloatArray, Frame, Member, member_axes
+from femubench.fem import FloatArray, Frame, Member
 from femubench.plugins.effects.flexible_supports import flexible_supports_change, soften_supports
 
 _SOFTEST = 1e-3  # of the scale
@@ -113,13 +113,13 @@ def _resistance(frame: Frame, word: str, direction: str) -> float:
     """Return the mean stiffness of whole members against a motion of a support."""
     kind, axis = divmod((*_TRANSLATIONS, *_ROTATIONS).index(direction), 3)
     members = Places(frame).members_at(f"support:{word}")
-    turns = [np.asarray(member_axes(frame, m)[0][:, axis] ** 2) for m in members]
+    turns = [np.asarray(Places(frame).axes(m)[:, axis] ** 2) for m in members]
     return float(np.mean([_own(frame, m)[kind] @ t for m, t in zip(members, turns, strict=True)]))
 
 
 def _own(frame: Frame, member: Member) -> FloatArray:
     """Return EA/L and 12 EI/L^3 above GJ/L and 4 EI/L along a member's axes, (2, 3)."""
-    s, m, length = member.section, member.material, member_axes(frame, member)[1]
+    s, m, length = member.section, member.material, frame.member_length(member.name)
     lateral = s.Iz or s.Iy
     twist = m.G * s.J / length or 4.0 * m.E * s.Iy / length
     return np.array(

@@ -20,7 +20,6 @@ from femubench.fem import (
     ModelError,
     Place,
     SparseArray,
-    member_axes,
 )
 from femubench.plugins.effects.flexible_supports import release_supports
 
@@ -119,7 +118,7 @@ def beam_of(frame: Frame, member: str) -> Beam:
 
 
 def _along(frame: Frame, member: Member) -> FloatArray:
-    return np.asarray(member_axes(frame, member)[0][0])
+    return np.asarray(Places(frame).axes(member)[0])
 
 
 def directions_across(frame: Frame, name: str) -> list[str]:

@@ -20,7 +20,7 @@ from femubench.effect import (
     Term,
     once_for,
 )
-from femubench.fem import Factor, FloatArray, Frame, Member, stiffness_matrices
+from femubench.fem import Factor, FloatArray, Frame, Member
 
 _AXES = ("x", "y", "z")
 _FLAT = 1e-6  # of the largest extent
@@ -78,7 +78,7 @@ class Temperature(FrameEffect):
         rows = ModelPlaces(model).elements("all", arms=place == "all")
         slopes = np.array([slope_of(member.material.E) for member in frame.members])
         whole = once_for(
-            model, "element stiffness", lambda: stiffness_matrices(structure.properties)
+            model, "element stiffness", lambda: structure.properties.stiffness_matrices()
         )
         own = slopes[mesh.member[rows]]
         even = Term("stiffness", ElementOperator(structure, rows, whole, share=own, kind=rows))

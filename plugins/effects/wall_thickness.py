@@ -22,18 +22,7 @@ from femubench.effect import (
     Term,
     once_for,
 )
-from femubench.fem import (
-    BeamProperties,
-    FloatArray,
-    Frame,
-    IntArray,
-    Member,
-    Section,
-    Structure,
-    mass_matrices,
-    stiffness_matrices,
-    wall_of,
-)
+from femubench.fem import BeamProperties, FloatArray, Frame, IntArray, Member, Section, Structure
 
 _SCALE, _MOST, _NODES = 0.1, 0.9, 9
 _MATRICES: tuple[Literal["stiffness", "mass"], ...] = ("stiffness", "mass")
@@ -134,11 +123,11 @@ def _walls(
     first, own_kind = structure.properties.take(rows).alike(structure.mesh.member[rows])
     own = structure.properties.take(rows[first])
     which = np.array([index[int(m)] for m in structure.mesh.member[rows[first]]])
-    still = np.array([stiffness_matrices(own), mass_matrices(own)])
+    still = np.array([own.stiffness_matrices(), own.mass_matrices()])
     found = []
     for node in ChebyshevPoints(-bound, bound, _NODES).points:
         other = _scaled(own, members, which, 1.0 + float(node))
-        found.append(np.array([stiffness_matrices(other), mass_matrices(other)]) - still)
+        found.append(np.array([other.stiffness_matrices(), other.mass_matrices()]) - still)
     kind = np.zeros(len(structure.mesh.member), dtype=np.int64)
     kind[rows] = own_kind
     return np.array(found), kind
@@ -150,7 +139,7 @@ def _wall(section: Section) -> float | None:
     tube = section.shape in ("rectangular-tube", "round-tube") and section.A > 0.0
     if width is None or height is None or not tube:
         return None
-    wall = wall_of(section)
+    wall = section.wall
     return wall if wall < (1.0 - 1e-9) * min(width, height) / 2.0 else None
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from femubench import Measurement, Model
 from femubench.effect import Corrected
-from femubench.fem import Frame, Section, wall_of
+from femubench.fem import Frame, Section
 
 _SAME = 1e-6
 _CONSTANTS = ("A", "Iy", "Iz", "J", "Jp")
@@ -44,7 +44,7 @@ def resize_section(section: Section, sizes: Mapping[str, float]) -> Section | No
     old = sizes_of(section)
     if not old:
         return None
-    wall = wall_of(section)
+    wall = section.wall
     new = {"wall": wall, **old, **sizes}
     width, height = new["width"], new.get("height", new["width"])
     if section.shape == "round-tube" and new["wall"] > 0.499 * old["width"]:

@@ -10,7 +10,7 @@ import scipy.linalg as la
 
 from femubench import Measurement, Model, Strategy, StrategyFailure, UpdateResult
 from femubench.fem import FloatArray, LowRank
-from femubench.modal import mass_normalised, rigid_modes_of
+from femubench.modal import rigid_modes_of
 from femubench.update import check_used_modes, expand_measured_shapes
 
 # Below this share of independent motion two expanded shapes are one.
@@ -37,7 +37,7 @@ def expand_without_momentum(
     """
     shapes = expand_measured_shapes(model, measurement, rigid)
     shapes = shapes - rigid @ (rigid.T @ model.mass_times(shapes))  # what rounding left
-    shapes = mass_normalised(model, shapes)
+    shapes = model.mass_normalised(shapes)
     mass = shapes.T @ model.mass_times(shapes)
     smallest = float(la.eigvalsh(mass)[0])
     if not smallest > _DEPENDENT:

@@ -10,7 +10,6 @@ from scipy.optimize import lsq_linear
 
 from femubench import InputError, Measurement, Model, Modes, UpdateResult, solve_modes
 from femubench.fem import FloatArray
-from femubench.modal import mass_normalised
 from femubench.update import ParametricModel, ParametricStrategy, QuasiModes, expand_measured_shapes
 
 _RIDGE = 1e-3  # decides what no equation sees
@@ -69,7 +68,7 @@ class CrossModel(ParametricStrategy):
         if self.expansion == "force":
             own = solve_modes(model).elastic
             own = own.take(np.arange(min(len(own), self.modes * len(measurement))))
-            shapes = mass_normalised(model, expand_measured_shapes(model, measurement))
+            shapes = model.mass_normalised(expand_measured_shapes(model, measurement))
         else:
             quasi = QuasiModes.of(model, measurement)
             own, shapes = quasi.modes.take(quasi.partners), quasi.shapes

@@ -9,7 +9,7 @@ import numpy as np
 
 from femubench import Measurement, Model, UpdateResult
 from femubench.fem import FloatArray
-from femubench.modal import mass_normalised, rigid_modes_of
+from femubench.modal import rigid_modes_of
 from femubench.update import ModalSpace, ParametricStrategy, QuasiModes, expand_measured_shapes
 
 _BARE = 1e-6  # of a mode's strain energy: where there is less, its change says nothing
@@ -59,7 +59,7 @@ class StrainEnergy(ParametricStrategy):
         paired = QuasiModes.of(model, measurement)
         own = paired.modes.shapes[:, paired.partners]
         shapes = expand_measured_shapes(model, measurement, rigid_modes_of(model))
-        shapes = mass_normalised(model, shapes)
+        shapes = model.mass_normalised(shapes)
         # What softens takes energy: its size counts.
         energies = (np.abs(np.einsum("pjj->pj", parts.energies(s, s))) for s in (own, shapes))
         index = energy_change_index(*energies)
