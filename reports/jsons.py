@@ -11,9 +11,9 @@ from femubench.reports.summary import finding, lead
 from femubench.reports.twins import twins_by_strategy
 from femubench.results import (
     Run,
+    Standings,
     StudyAxes,
     gain_by,
-    list_rows,
     run_to_json,
     unsteady,
 )
@@ -36,7 +36,7 @@ class JsonReporter:
     def render(self, run: Run) -> str:
         """Return strict JSON: what is not a finite number is null."""
         board = board_of(run)
-        said = {"lead": lead(run), "finding": finding(run, list_rows(run))}
+        said = {"lead": lead(run), "finding": finding(run, Standings.of(run).rows)}
         plain = {**run_to_json(run), **said, "leaderboard": board}
         plain["predictive"] = predictive_json(run)
         if StudyAxes.from_run(run) is not None:
@@ -78,5 +78,5 @@ def board_of(run: Run) -> list[dict[str, Any]]:
             **({"twins": twins[row["strategy"]]} if row["strategy"] in twins else {}),
             **({"unsteady": differing[row["strategy"]]} if row["strategy"] in differing else {}),
         }
-        for row in list_rows(run)
+        for row in Standings.of(run).rows
     ]

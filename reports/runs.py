@@ -36,7 +36,6 @@ from femubench.results import (
     Run,
     Standings,
     StudyAxes,
-    list_rows,
     modes_frame,
     twin_gains,
 )
@@ -200,7 +199,7 @@ def _cells(row: Mapping[Any, Any]) -> dict[str, Cell]:
 def _board(run: Run, title: str = "") -> Iterator[Passage]:
     """Yield the leaderboard, what its columns mean, and what the run shows."""
     standings = Standings.of(run)
-    rows, bare = list_rows(run, standings), unconfined(run)
+    rows, bare = standings.rows, unconfined(run)
     tested = any(row["better_than"] for row in rows)
     heads = {"#": Column("#", 6), "strategy": Column("strategy", 16, left=True), **_FIGURES}
     listed = [

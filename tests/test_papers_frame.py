@@ -26,7 +26,7 @@ from femubench.papers.frame import (
 )
 from femubench.papers.frame.common import CASE, TRUTH, rigid_modes, strain_modes
 from femubench.papers.printed import read_printed
-from femubench.reproduction import Cell, Extra, Study, Workbench, under
+from femubench.reproduction import Cell, Extra, Study, Workbench
 from femubench.update import QuasiModes
 
 pytestmark = pytest.mark.slow(20)
@@ -139,7 +139,7 @@ def test_no_accusation_stands_where_shapes_decide(bench: Workbench, rerun: Study
 def test_no_accusation_of_a_convention_stands_where_shapes_decide(rerun: Study) -> None:
     for convention in rerun.conventions():
         for choice in convention.choices:
-            for cell in under(choice, rerun.cells).values():
+            for cell in choice.under(rerun.cells).values():
                 if cell.verdict == "does-not-follow":
                     reach = [cell.ours, *cell.others()]
                     known = [value for value in reach if value is not None]

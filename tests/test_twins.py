@@ -51,6 +51,7 @@ from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
 from femubench.core.schema.records import run_from_json, run_to_json
 from femubench.core.schema.results import JobResult, Run
+from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.repeatability import unsteady
 from femubench.core.score.scoring import judge, reference_of
 from femubench.core.score.twin_gain import twin_gains
@@ -58,7 +59,6 @@ from femubench.core.twin.disguise import disguise_case
 from femubench.core.twin.similarity import Similarity, matrix_factors, similar_case, similar_frame
 from femubench.core.twin.twins import FAMILIES, Twin, again, twin_of, twins_of
 from femubench.core.typing import SparseArray
-from femubench.results import leaderboard
 
 BY = Similarity(length=1.3, modulus=0.7, density=1.4)
 COMPUTED = ["frame-solid", "suite/bracket", "suite/tower"]

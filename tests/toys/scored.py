@@ -8,7 +8,8 @@ from typing import Any
 
 from femubench.core.schema.records import to_plain
 from femubench.core.schema.results import Block
-from femubench.results import JobResult, PairedMode, Rule, Run, rank_results
+from femubench.core.score.ranking import rank_results
+from femubench.results import JobResult, PairedMode, Rule, Run
 
 HERTZ = {"used": 100.0, "higher": 200.0, "modified": 300.0}
 
