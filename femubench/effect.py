@@ -17,14 +17,13 @@ from femubench.core.effect.model_places import (
 from femubench.core.effect.places import Places as Places
 from femubench.core.effect.reading import Reading as Reading
 from femubench.core.effect.sizes import Site as Site, Size as Size
-from femubench.core.effect.suspect import Corrected as Corrected, Suspect as Suspect
+from femubench.core.effect.suspect import Suspect as Suspect
 from femubench.core.effect.textbook import (
     textbook_model as textbook_model,
     textbook_values as textbook_values,
 )
 from femubench.core.look.modes import Seen as Seen
 from femubench.core.modal.eigen import once_for as once_for
-from femubench.core.roles import Effect as Effect
 from femubench.core.schema.diagnosis import LookWarning as LookWarning
 
 __all__ = [name for name in dir() if not name.startswith("_")]

@@ -30,7 +30,7 @@ from femubench.core.inference.effort import Effort
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.screening import _pulls, screen_hypotheses
 from femubench.core.modal.eigen import count_evaluations, modes_of
-from femubench.effect import Effect
+from femubench.core.roles import Effect
 from femubench.fem import Frame
 from femubench.plugins.effects.added_mass import AddedMass
 from femubench.plugins.effects.attached_oscillator import AttachedOscillator

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from femubench import Measurement, Model
-from femubench.effect import Corrected
 from femubench.fem import Frame, Section
 
 _SAME = 1e-6
@@ -62,7 +61,7 @@ def resize_section(section: Section, sizes: Mapping[str, float]) -> Section | No
 
 def correct_section(
     old: Section, new: Section, model: Model, measurement: Measurement, value: float
-) -> Corrected:
+) -> tuple[Model, Measurement]:
     """Return the model with one section in the place of another one of the same name."""
     structure = model.frame_structure
     members = tuple(

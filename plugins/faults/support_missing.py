@@ -8,7 +8,7 @@ from functools import partial
 from typing import ClassVar, Literal
 
 from femubench import Measurement, Model
-from femubench.effect import Corrected, Suspect
+from femubench.effect import Suspect
 from femubench.fem import Frame, Place, Support
 
 
@@ -64,7 +64,7 @@ def _place(at: str, direction: Sequence[str]) -> str:
 
 def _held(
     supports: tuple[Support, ...], model: Model, measurement: Measurement, value: float
-) -> Corrected:
+) -> tuple[Model, Measurement]:
     structure = model.frame_structure
     frame = replace(structure.frame, supports=supports)
     return Model.of(structure.rebuilt(frame)), measurement

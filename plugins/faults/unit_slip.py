@@ -11,7 +11,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from femubench import Measurement, Model
-from femubench.effect import Corrected, Suspect
+from femubench.effect import Suspect
 from femubench.fem import Frame, Material
 from femubench.plugins.faults.sections import (
     correct_section,
@@ -83,7 +83,7 @@ def _of_sections(frame: Frame) -> Iterator[Suspect]:
 
 def _with_material(
     wrong: Material, right: Material, model: Model, measurement: Measurement, value: float
-) -> Corrected:
+) -> tuple[Model, Measurement]:
     structure = model.frame_structure
     members = tuple(
         replace(m, material=right) if m.material == wrong else m for m in structure.frame.members
