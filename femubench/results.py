@@ -4,12 +4,7 @@ from femubench.core.drawing.element_change import (
     element_norms as element_norms,
     stiffness_difference as stiffness_difference,
 )
-from femubench.core.run.frames import (
-    modes_frame as modes_frame,
-    results_frame as results_frame,
-    run_from_json as run_from_json,
-    run_to_json as run_to_json,
-)
+from femubench.core.run.frames import run_from_json as run_from_json, run_to_json as run_to_json
 from femubench.core.run.store import Store as Store
 from femubench.core.schema.paired_modes import PairedMode as PairedMode
 from femubench.core.schema.results import JobResult as JobResult, Run as Run
@@ -20,6 +15,5 @@ from femubench.core.score.repeatability import unsteady as unsteady
 from femubench.core.score.scoring import predict_block as predict_block
 from femubench.core.score.twin_gain import twin_gains as twin_gains
 from femubench.core.study.axes import StudyAxes as StudyAxes
-from femubench.core.study.gain import gain_by as gain_by
 
 __all__ = [name for name in dir() if not name.startswith("_")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import femubench
 from femubench.reports.page.rounding import clean
 from femubench.reports.predictive import predictive_json
 from femubench.reports.summary import finding, lead
@@ -13,7 +14,6 @@ from femubench.results import (
     Run,
     Standings,
     StudyAxes,
-    gain_by,
     run_to_json,
     unsteady,
 )
@@ -40,7 +40,7 @@ class JsonReporter:
         plain = {**run_to_json(run), **said, "leaderboard": board}
         plain["predictive"] = predictive_json(run)
         if StudyAxes.from_run(run) is not None:
-            cells = gain_by(run).to_dict("records")
+            cells = femubench.Run.of(run).gain_by().to_dict("records")
             plain["cells"] = [{str(name): clean(v) for name, v in row.items()} for row in cells]
         return json.dumps(plain, indent=1, allow_nan=False)
 

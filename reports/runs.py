@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
 
+import femubench
 from femubench.reports import study
 from femubench.reports.blocks import Block, Cell, Column, Items, Passage, Table
 from femubench.reports.cells import NOTHING, hertz, interval, plain, whole
@@ -36,7 +37,6 @@ from femubench.results import (
     Run,
     Standings,
     StudyAxes,
-    modes_frame,
     twin_gains,
 )
 
@@ -358,7 +358,7 @@ def _mac(modes: Iterable[PairedMode]) -> float | None:
 
 def _changes(run: Run) -> Iterator[Passage]:
     """Yield the errors after every design change, a table a scenario, a strategy a row."""
-    modes, seed = modes_frame(run), first_seed(run)
+    modes, seed = femubench.Run.of(run).modes, first_seed(run)
     modes = modes[(modes["block"] == "modified") & (modes["seed"] == seed)]
     modes = modes.assign(
         square=modes["counted_percent"] ** 2, name=modes["modification"].fillna("")

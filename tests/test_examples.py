@@ -41,9 +41,9 @@ def public_functions() -> dict[str, Callable[..., Any]]:
             if inspect.isfunction(value):
                 found.setdefault(value, f"{module_name}.{name}")
             elif inspect.isclass(value):
-                for method in vars(value):
-                    own = inspect.unwrap(getattr(value, method))
-                    own = getattr(own, "__func__", own)
+                for method, held in vars(value).items():
+                    kinds = ("fget", "func", "__func__", "__wrapped__")
+                    own = next((getattr(held, k) for k in kinds if hasattr(held, k)), held)
                     if inspect.isfunction(own) and ">>> " in (own.__doc__ or ""):
                         found.setdefault(own, f"{module_name}.{name}.{method}")
     return {name: function for function, name in found.items()}
