@@ -3,7 +3,6 @@
 from femubench.core.change.change import Change as Change
 from femubench.core.change.interpolation import ChebyshevPoints as ChebyshevPoints
 from femubench.core.change.parameter import Parameter as Parameter
-from femubench.core.change.tabulated import tabulate_change as tabulate_change
 from femubench.core.change.terms import (
     ElementOperator as ElementOperator,
     RowOperator as RowOperator,

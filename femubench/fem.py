@@ -5,9 +5,7 @@ from femubench.core.case.nodes import MatrixGeometry as MatrixGeometry, matrix_m
 from femubench.core.case.opensees import from_opensees as from_opensees
 from femubench.core.child.workers import call_apart as call_apart
 from femubench.core.errors import ModelError as ModelError
-from femubench.core.fem.beam import (
-    BeamProperties as BeamProperties,
-)
+from femubench.core.fem.beam import BeamProperties as BeamProperties
 from femubench.core.fem.frame import (
     Brace as Brace,
     Coupling as Coupling,
@@ -27,15 +25,12 @@ from femubench.core.fem.frame import (
     Preload as Preload,
     RigidEnd as RigidEnd,
     Support as Support,
-    halves_of as halves_of,
 )
 from femubench.core.fem.group_factors import Groups as Groups
 from femubench.core.fem.model import LowRank as LowRank
 from femubench.core.fem.parameters import Property as Property
 from femubench.core.fem.preload import GeometricStiffness as GeometricStiffness
-from femubench.core.fem.sections import (
-    Section as Section,
-)
+from femubench.core.fem.sections import Section as Section
 from femubench.core.fem.sensors import Outline as Outline
 from femubench.core.fem.structure import Structure as Structure
 from femubench.core.typing import (

@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.frame import ACTIVE, Frame, Member, Place, split_half
+from femubench.core.fem.frame import ACTIVE, Frame, Member, Place, halves_of, split_half
 from femubench.core.fem.group_factors import GROUP
 from femubench.core.fem.joints import joint_groups
 from femubench.core.fem.mesh import member_axes
@@ -126,6 +126,16 @@ class Places:
             ('rung-right/1', 'rung-right/2')
         """
         return tuple(f"{m.name}/{k}" for m in self.frame.members for k in range(1, m.elements + 1))
+
+    @staticmethod
+    def halves(place: str) -> tuple[str, ...]:
+        """Return the words of both halves of an element; nothing for what is half of one.
+
+        Examples:
+            >>> effect.Places.halves("rung-middle/1")
+            ('rung-middle/1:first', 'rung-middle/1:second')
+        """
+        return halves_of(place)
 
     def types(self) -> tuple[str, ...]:
         """Return the places of the joint types with two joints at least; else the joint says it.

@@ -19,9 +19,8 @@ from femubench.effect import (
     Size,
     Term,
     once_for,
-    tabulate_change,
 )
-from femubench.fem import Factor, Frame, halves_of
+from femubench.fem import Factor, Frame
 
 _LOSS = Parameter("loss", "", 0.3, lower=0.0, upper=0.95, one_sided=True, wording="share")
 
@@ -39,7 +38,7 @@ class LocalStiffnessLoss(FrameEffect):
 
     def finer(self, model: Model, place: str) -> Sequence[str]:
         """Return the halves of the element: damage ends where it likes, not at a node."""
-        return halves_of(place)
+        return Places.halves(place)
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the fraction that is lost."""
@@ -59,8 +58,8 @@ class LocalStiffnessLoss(FrameEffect):
 
     def change(self, model: Model, place: str) -> Change:
         """Return the stiffness of the element with a minus sign."""
-        if not halves_of(place):
-            return tabulate_change(self, model, place, self.parameters(model, place))
+        if not Places.halves(place):
+            return self.tabulate(model, place)
         structure = model.frame_structure
         rows = ModelPlaces(model).elements(place)
         whole = once_for(
