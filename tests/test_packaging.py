@@ -70,9 +70,11 @@ def test_facade_says_the_same_to_python_and_to_type_checkers() -> None:
 
 def test_no_door_more() -> None:
     """A new public name takes the place of one that nobody needs, or goes into an object."""
-    pages = (path.stem for path in (ROOT / "femubench").glob("[a-z]*.py"))
-    doors = {page: len(import_module(f"femubench.{page}").__all__) for page in pages}
-    assert sum(doors.values()) + len(femubench.__all__) <= 205, doors
+    pages = [path.stem for path in (ROOT / "femubench").glob("[a-z]*.py")]
+    doors = {page: import_module(f"femubench.{page}").__all__ for page in pages}
+    # Where pytest rewrites assertions a module has names of its own, such as `@pytest_ar`.
+    count = {page: sum(map(str.isidentifier, names)) for page, names in doors.items()}
+    assert sum(count.values()) + len(femubench.__all__) <= 202, count
 
 
 def test_index_of_the_docs_names_every_page() -> None:
