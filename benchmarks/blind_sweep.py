@@ -6,7 +6,6 @@ import re
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, astuple, dataclass
-from functools import partial
 from typing import Any
 
 from stated_probabilities import Statement, percent, statements
@@ -20,7 +19,7 @@ from femubench.core.challenge.structures import STRUCTURES, structure_named
 from femubench.core.challenge.truth import DataKind, Hidden, Truth
 from femubench.core.challenge.visibility import delta_chi2
 from femubench.core.diagnosis.result import Diagnosis
-from femubench.core.effect.places import match
+from femubench.core.effect.places import Places
 from femubench.core.errors import FemubenchError
 
 Diagnose = Callable[[Case], Diagnosis]
@@ -152,7 +151,7 @@ def _fits(diagnosis: Diagnosis, truth: Truth) -> Record:
         return {}
     frame = structure_named(truth.structure).frame
     causes = [[CataloguedCause(cause.effect, cause.place, cause.values)] for cause in truth.causes]
-    return fits_of(diagnosis.examination, causes, registered_effects(), partial(match, frame))
+    return fits_of(diagnosis.examination, causes, registered_effects(), Places(frame).match)
 
 
 # What a diagnosis can say, and where, of causes that the catalogue did not have when it was drawn.
@@ -175,7 +174,7 @@ def _stated_of(answer: Answer, truth: Truth) -> list[Statement]:
         if said := known.get(effect):
             words = place.split(":") if effect.startswith("support") else re.findall(r"\d+", place)
             return set(said.groups()) <= set(words)
-        return any(effect == c.effect and match(frame, place, c.place) for c in truth.causes)
+        return any(effect == c.effect and Places(frame).match(place, c.place) for c in truth.causes)
 
     return statements(answer, is_named, is_placed)
 

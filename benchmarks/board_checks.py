@@ -16,10 +16,10 @@ from scipy.stats import trim_mean
 
 import femubench
 from femubench import Run
-from femubench.core.score.leaderboard import GainTable
+from femubench.core.score.leaderboard import GainTable, leaderboard
 from femubench.core.score.statistics import tell_apart
 from femubench.core.typing import FloatArray
-from femubench.results import Rule, leaderboard
+from femubench.results import Rule
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data"

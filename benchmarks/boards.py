@@ -19,10 +19,11 @@ import femubench
 from femubench import Run
 from femubench.core.display import count_noun
 from femubench.core.schema.run_options import StartModels
+from femubench.core.score.leaderboard import list_rows
 from femubench.reports.predictive import PredictiveReporter
 from femubench.reports.runs import board_text
 from femubench.reports.summary import finding
-from femubench.results import list_rows, run_to_json
+from femubench.results import run_to_json
 
 ROOT = Path(__file__).parents[1]
 _BEGIN, _END = "<!-- {} -->\n", "<!-- /{} -->"

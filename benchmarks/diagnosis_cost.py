@@ -28,7 +28,7 @@ from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.fem.frame import Frame, Joint, Material, Member, Plane
 from femubench.core.fem.model import Model
-from femubench.core.fem.sections import rectangular_tube
+from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.measurement import Measurement
@@ -40,7 +40,7 @@ SOLVES, MILLISECONDS, MEGABYTES = 60.0, 2.0, 600.0  # what is asked for
 _SEED = 16
 _ALUMINIUM = Material(70e9, 0.33, 2700.0)
 _SCENARIOS = Path(str(files("femubench.scenarios")))
-_SECTION = rectangular_tube(0.06, 0.03, 0.003)
+_SECTION = Section.rectangular_tube(0.06, 0.03, 0.003)
 
 
 @dataclass(frozen=True)

@@ -33,11 +33,12 @@ from femubench.core.library.cases import read_cases
 from femubench.core.library.rank import textbook_of
 from femubench.core.modal.eigen import DENSE_LIMIT, Modes, modes_of, solve_modes
 from femubench.core.plugin.loader import load_plugins
+from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.ranking import Scale
 from femubench.core.score.scoring import reference_of, score_model
 from femubench.core.typing import FloatArray, SparseArray
 from femubench.modal import pair_measured
-from femubench.results import Rule, leaderboard, twin_gains
+from femubench.results import Rule, twin_gains
 from femubench.update import with_measured_frequencies
 
 TABLE = Path(__file__).parents[1] / "docs" / "data" / "knowledge-free.csv"

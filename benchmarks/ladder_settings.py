@@ -12,19 +12,19 @@ import scipy.linalg as la
 
 import femubench.scenarios
 from femubench import Model, Sensors, read_case, solve_modes
-from femubench.fem import FloatArray, Frame, Structure, rectangular_tube
+from femubench.fem import FloatArray, Frame, Section, Structure
 from femubench.modal import rigid_modes_of
 from femubench.scenarios.generate import ladder_sensors
 from femubench.scenarios.structures import HALF_SIDE, RUNG, ladder_truth
-from femubench.update import ElementFamily, generic_family, nobari_family, physical_family
+from femubench.update import ElementFamily
 
 FRAME = Path(femubench.scenarios.__file__).parent / "frame"
 BREDT = 2.9033e-8  # m4
 FAMILIES = {
-    "physical": physical_family,
-    "nobari": nobari_family,
-    "generic-ls": generic_family,
-    "generic-adjusted": lambda structure: generic_family(structure, tied=True),
+    "physical": ElementFamily.physical,
+    "nobari": ElementFamily.nobari,
+    "generic-ls": ElementFamily.generic,
+    "generic-adjusted": lambda structure: ElementFamily.generic(structure, tied=True),
 }
 
 
@@ -75,7 +75,7 @@ def setting(
         frame = numbered(frame, backward.split("+"))
     model = Model.of(frame if accelerometer else replace(frame, masses=()))
     used, dofs = case.used_measurement(0), model.dofs
-    tested = ladder_truth(rectangular_tube(0.0254, 0.0254, 0.00238))
+    tested = ladder_truth(Section.rectangular_tube(0.0254, 0.0254, 0.00238))
     truth = Model.of(tested).attach(frame.masses if accelerometer else (), ())
     true = solve_modes(truth).elastic.shapes[:, :3]
     labels = tuple(str(i) for i in range(len(dofs)))

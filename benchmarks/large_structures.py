@@ -11,10 +11,10 @@ import scipy.sparse as sp
 from femubench.core.case.nodes import matrix_model
 from femubench.core.fem.frame import Frame, Joint, Material, Member, Place, Support
 from femubench.core.fem.model import Model
-from femubench.core.fem.sections import Section, round_tube
+from femubench.core.fem.sections import Section
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
-TUBE: Section = round_tube(0.04, 0.003)
+TUBE: Section = Section.round_tube(0.04, 0.003)
 BAY = (0.5, 0.56, 0.63)  # m; with one size, every second mode would be repeated
 
 

@@ -22,10 +22,11 @@ from tabulate import tabulate
 
 import femubench
 from femubench import NotApplicable, plot
+from femubench.core.score.ranking import rank_results
+from femubench.core.update.change_lists import element_sets
 from femubench.fem import FloatArray
 from femubench.plot import Axis, Chart
-from femubench.results import rank_results
-from femubench.update import ParametricStrategy, element_sets
+from femubench.update import ParametricStrategy
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data" / "method-by-parameters.csv"

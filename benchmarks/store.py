@@ -25,8 +25,10 @@ import numpy as np
 from femubench.core.run.recording import Results, begin_run
 from femubench.core.run.store import Store
 from femubench.core.run.upkeep import find_store_faults
+from femubench.core.schema.results import Block
+from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.ranking import list_models
-from femubench.results import Block, JobResult, PairedMode, leaderboard
+from femubench.results import JobResult, PairedMode
 
 CASES, STRATEGIES = 25, 20
 RUN = "20260101T000000Z-5e7e71"

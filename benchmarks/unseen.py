@@ -9,8 +9,8 @@ import numpy as np
 
 from femubench import Run
 from femubench.core.schema.results import UNSEEN
-from femubench.core.score.statistics import interval_of_mean
-from femubench.results import FEWEST, JobResult, structures_of
+from femubench.core.score.statistics import FEWEST, interval_of_mean
+from femubench.results import JobResult
 
 OFFSET_PERCENT = 0.05  # added to both errors: one that is met must not decide everything
 
@@ -25,7 +25,7 @@ def unseen_logs(run: Run, zero: str = "textbook") -> dict[str, dict[str, float]]
         run: with the strategy `zero` in it.
         zero: whose errors are the unit.
     """
-    structures = structures_of(run)
+    structures = run.structures
     unit = {r.case: _errors(r) for r in run.results if r.strategy == zero}
     found: dict[str, dict[str, list[float]]] = {}
     for result in run.results:

@@ -16,8 +16,8 @@ The example of every function starts from these lines:
 >>> readings = model.observe(measurement.sensors)
 >>> modes = femubench.solve_modes(model)
 >>> stiffness = fem.Property("E", "E", update.all_elements(structure))
->>> joints = update.joint_groups(frame)
->>> joint = update.scale_joint(structure, joints[0])
+>>> joints = update.Joints(structure).groups()
+>>> joint = update.Changes(structure).joint(joints[0])
 >>> nominal, scaled = femubench.strategies["unchanged"], femubench.strategies["global"]
 >>> result = scaled.update(model, measurement, None)
 >>> run = femubench.rank(case, [nominal, scaled], nominal="drawn")

@@ -1,15 +1,9 @@
 """Modal analysis: pairing and correlation of modes, expansion, sensitivities, receptances."""
 
 from femubench.core.modal.complex_modes import real_modes as real_modes
-from femubench.core.modal.correlated_errors import shrunk_correlation as shrunk_correlation
-from femubench.core.modal.correlation import (
-    auto_mac as auto_mac,
-    mac as mac,
-    modal_scale_factor as modal_scale_factor,
-)
+from femubench.core.modal.correlation import mac as mac
 from femubench.core.modal.expansion import (
     expand_by_dynamics as expand_by_dynamics,
-    expand_by_rotation as expand_by_rotation,
     expand_by_serep as expand_by_serep,
 )
 from femubench.core.modal.frf import (
@@ -17,30 +11,11 @@ from femubench.core.modal.frf import (
     Quantity as Quantity,
     receptance as receptance,
 )
-from femubench.core.modal.generalised_mass import mass_normalised as mass_normalised
-from femubench.core.modal.group_prior import (
-    group_prior_std as group_prior_std,
-    largest_factor as largest_factor,
-    support_groups as support_groups,
-)
+from femubench.core.modal.group_prior import GroupPriors as GroupPriors
 from femubench.core.modal.many_changes import modes_of_changes as modes_of_changes
-from femubench.core.modal.pairing import (
-    Pairing as Pairing,
-    pair_measured as pair_measured,
-    pair_modes as pair_modes,
-)
-from femubench.core.modal.rigid import (
-    rigid_body_vectors as rigid_body_vectors,
-    rigid_modes_of as rigid_modes_of,
-)
-from femubench.core.modal.sensitivity import (
-    eigenvalue_sensitivities as eigenvalue_sensitivities,
-    frequency_sensitivities as frequency_sensitivities,
-    shape_sensitivities as shape_sensitivities,
-)
-from femubench.core.modal.signals import (
-    TimeSignals as TimeSignals,
-    join_records as join_records,
-)
+from femubench.core.modal.pairing import pair_measured as pair_measured, pair_modes as pair_modes
+from femubench.core.modal.rigid import rigid_modes_of as rigid_modes_of
+from femubench.core.modal.sensitivity import eigenvalue_sensitivities as eigenvalue_sensitivities
+from femubench.core.modal.signals import TimeSignals as TimeSignals
 
 __all__ = [name for name in dir() if not name.startswith("_")]

@@ -4,14 +4,12 @@ No function touches pyplot: ``ax.get_figure().savefig("mode.svg")`` writes what 
 function raises `InputError` for what it cannot draw.
 """
 
-from femubench.core.drawing.wireframe import Wireframe as Wireframe, wireframe_of as wireframe_of
+from femubench.core.drawing.wireframe import wireframe_of as wireframe_of
 from femubench.core.plot.calibration import calibration as calibration
 from femubench.core.plot.chart import Axis as Axis, Chart as Chart, Mark as Mark, Series as Series
 from femubench.core.plot.cost import error_against_cost as error_against_cost
 from femubench.core.plot.diagnosis import (
     MOST_ROWS as MOST_ROWS,
-    ResidualDot as ResidualDot,
-    Spot as Spot,
     error_budget as error_budget,
     evidence as evidence,
     residual_dots as residual_dots,

@@ -12,11 +12,9 @@ from femubench.core.reproduction.cell import Cell as Cell, Page as Page
 from femubench.core.reproduction.convention import (
     Choice as Choice,
     Convention as Convention,
-    under as under,
 )
 from femubench.core.reproduction.equation import Equation as Equation
 from femubench.core.reproduction.ground import (
-    VERDICTS as VERDICTS,
     Ground as Ground,
     Verdict as Verdict,
 )
@@ -24,17 +22,11 @@ from femubench.core.reproduction.printed_table import (
     Entry as Entry,
     Grid as Grid,
     PrintedTable as PrintedTable,
-    as_printed as as_printed,
-    places_of as places_of,
 )
 from femubench.core.reproduction.study import (
-    FIGURES as FIGURES,
     Extra as Extra,
     Study as Study,
-    count_different as count_different,
-    verdict_counts as verdict_counts,
 )
 from femubench.core.reproduction.workbench import Workbench as Workbench
-from femubench.core.roles import Paper as Paper
 
 __all__ = [name for name in dir() if not name.startswith("_")]

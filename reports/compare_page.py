@@ -21,7 +21,7 @@ from femubench.reports.html import to_html
 from femubench.reports.markdown import to_markdown
 from femubench.reports.svg import drawing
 from femubench.reports.terminal import to_terminal
-from femubench.results import METHOD
+from femubench.results import Standings
 
 _VALUES = ("loss", "used", "higher", "modified", "seconds")
 _BLANK = "\u2800"  # stands for an indent until the table is made, which strips all white space
@@ -33,7 +33,9 @@ _LEGEND = (
     "seeds); seconds (sums). lost: results that A has and B has not."
 )
 _TELLING = "Scenarios where nothing differs are left out."
-_EVIDENCE = f"{METHOD} The interval of the mean difference is by bootstrap over structures."
+_EVIDENCE = (
+    f"{Standings.METHOD} The interval of the mean difference is by bootstrap over structures."
+)
 _FOREST = (
     "Mean difference of the gains, B - A, with its 95 % interval. The line is at no change; the "
     "table has the figures."

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from femubench.results import Run, modes_frame, results_frame
+import femubench
+from femubench.results import Run
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -16,17 +17,17 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 class CsvReporter:
     """One line a job."""
 
-    name, suffix, frame = "csv", ".csv", staticmethod(results_frame)
+    name, suffix, table = "csv", ".csv", "table"
 
     def render(self, run: Run) -> str:
         """Return the rows as CSV."""
-        return harmless_csv(self.frame(run))
+        return harmless_csv(getattr(femubench.Run.of(run), self.table))
 
 
 class ModesCsvReporter(CsvReporter):
     """One line a measured mode of every job."""
 
-    name, suffix, frame = "modes-csv", ".modes.csv", staticmethod(modes_frame)
+    name, suffix, table = "modes-csv", ".modes.csv", "modes"
 
 
 def harmless_csv(frame: pd.DataFrame) -> str:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import femubench
 from femubench.reports.page.rounding import clean
 from femubench.reports.predictive import predictive_json
 from femubench.reports.summary import finding, lead
 from femubench.reports.twins import twins_by_strategy
 from femubench.results import (
     Run,
+    Standings,
     StudyAxes,
-    gain_by,
-    list_rows,
     run_to_json,
     unsteady,
 )
@@ -36,11 +36,11 @@ class JsonReporter:
     def render(self, run: Run) -> str:
         """Return strict JSON: what is not a finite number is null."""
         board = board_of(run)
-        said = {"lead": lead(run), "finding": finding(run, list_rows(run))}
+        said = {"lead": lead(run), "finding": finding(run, Standings.of(run).rows)}
         plain = {**run_to_json(run), **said, "leaderboard": board}
         plain["predictive"] = predictive_json(run)
         if StudyAxes.from_run(run) is not None:
-            cells = gain_by(run).to_dict("records")
+            cells = femubench.Run.of(run).gain_by().to_dict("records")
             plain["cells"] = [{str(name): clean(v) for name, v in row.items()} for row in cells]
         return json.dumps(plain, indent=1, allow_nan=False)
 
@@ -78,5 +78,5 @@ def board_of(run: Run) -> list[dict[str, Any]]:
             **({"twins": twins[row["strategy"]]} if row["strategy"] in twins else {}),
             **({"unsteady": differing[row["strategy"]]} if row["strategy"] in differing else {}),
         }
-        for row in list_rows(run)
+        for row in Standings.of(run).rows
     ]

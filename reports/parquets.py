@@ -6,9 +6,10 @@ import io
 import json
 from typing import NoReturn
 
+import femubench
 from femubench import InputError
 from femubench.reports.summary import notes_of
-from femubench.results import Run, results_frame
+from femubench.results import Run
 
 
 class ParquetReporter:
@@ -38,7 +39,7 @@ class ParquetReporter:
             raise InputError(
                 "format parquet needs pyarrow", expected="pip install 'femubench[parquet]'"
             ) from None
-        table = pyarrow.Table.from_pandas(results_frame(run), preserve_index=False)
+        table = pyarrow.Table.from_pandas(femubench.Run.of(run).table, preserve_index=False)
         about = json.dumps({"run": run.meta.get("run"), "notes": notes_of(run)})
         table = table.replace_schema_metadata({**(table.schema.metadata or {}), "femubench": about})
         stream = io.BytesIO()

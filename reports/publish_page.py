@@ -15,7 +15,7 @@ from femubench.reports.markdown import to_markdown
 from femubench.reports.summary import headline
 from femubench.reports.svg import drawing
 from femubench.reports.templating import asset, templates
-from femubench.results import rank_items
+from femubench.results import Standings
 
 _MOST_DRAWN = 20
 _LEAST = -1.0  # the least gain that there is
@@ -133,7 +133,7 @@ def _on_case(strategies: Iterable[Data], name: str, digest: str) -> list[tuple[D
         item, row = entry
         return (bool(row["conflict"]),), -row["gain"], item["name"]
 
-    return [entry for _, entry in rank_items(found, order)]
+    return Standings.ordered(found, order)
 
 
 def _flags(row: Data) -> list[str]:

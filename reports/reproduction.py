@@ -18,17 +18,7 @@ from femubench.reports.cells import plain
 from femubench.reports.digits import Digits, off
 from femubench.reports.markdown import escape, to_markdown
 from femubench.reports.terminal import WIDTH, to_terminal
-from femubench.reproduction import (
-    FIGURES,
-    VERDICTS,
-    Cell,
-    Extra,
-    Figure,
-    Study,
-    Verdict,
-    count_different,
-    verdict_counts,
-)
+from femubench.reproduction import Cell, Extra, Figure, Ground, Study, Verdict
 
 Words = Mapping[Verdict, str]
 
@@ -84,14 +74,14 @@ def reproduction_text(studies: Sequence[Study]) -> str:
 
 def reproduction_markdown(studies: Sequence[Study], *, figures: bool = False) -> str:
     """Return studies in GitHub's Markdown; `figures`: link to `FIGURES`/NAME.svg."""
-    folder = f"{FIGURES}/" if figures else ""
+    folder = f"{Study.FIGURES}/" if figures else ""
     sections = [*_legend(WORDS), *_chapters(studies, WORDS, folder)]
     return f"# {escape(counts_line(studies))}\n\n{to_markdown(sections)}"
 
 
 def sentence_of_counts(cells: Sequence[Cell]) -> str:
     """Return how many cells there are of every verdict, as a sentence without its stop."""
-    count = verdict_counts(cells)
+    count = Cell.verdict_counts(cells)
     return (
         f"{count['independent']} of {len(cells)} printed {_noun(cells)} agree independently "
         f"({different(cells)}), "
@@ -104,15 +94,17 @@ def sentence_of_counts(cells: Sequence[Cell]) -> str:
 
 def summary(cells: Sequence[Cell]) -> str:
     """Return the counts of a table without those that are zero."""
-    counts = verdict_counts(cells)
+    counts = Cell.verdict_counts(cells)
     more = {"independent": f" ({different(cells)})"}
-    parts = (f"{counts[v]} {_VERDICTS[v][3]}{more.get(v, '')}" for v in VERDICTS if counts[v])
+    parts = (
+        f"{counts[v]} {_VERDICTS[v][3]}{more.get(v, '')}" for v in Ground.VERDICTS if counts[v]
+    )
     return f"{len(cells)} {_noun(cells)}: {', '.join(parts)}"
 
 
 def different(cells: Sequence[Cell]) -> str:
     """Return how many different figures agree independently, in words."""
-    count = count_different(cells)
+    count = Cell.count_different(cells)
     return f"{count} different figure{'s' * (count != 1)}"
 
 

@@ -20,17 +20,15 @@ from femubench.reports.digits import off
 from femubench.reports.svg import drawing, embed_svg
 from femubench.reports.templating import templates
 from femubench.reproduction import (
-    VERDICTS,
     Cell,
     Convention,
     Figure,
+    Grid,
+    Ground,
     PrintedTable,
     StructureMap,
     Study,
     Verdict,
-    as_printed,
-    places_of,
-    under,
 )
 
 _FAULTS: tuple[Verdict, ...] = ("misprint", "does-not-follow")
@@ -56,8 +54,8 @@ def reproduction_html(studies: Sequence[Study], drawings: Mapping[str, str]) -> 
         cells=[cell for study in studies for cell in study.cells],
         options=[option for paper in papers for option in paper.options],
         drawn=lambda one: Drawing(one.title, one.caption, _shown(one, drawings[one.name])),
-        drawing=drawing, embedded=embed_svg, faults=_FAULTS, off=off, places_of=places_of,
-        say=words, tally=_tally, verdicts=VERDICTS,
+        drawing=drawing, embedded=embed_svg, faults=_FAULTS, off=off, places_of=Grid.places_of,
+        say=words, tally=_tally, verdicts=Ground.VERDICTS,
     )  # fmt: skip
 
 
@@ -110,7 +108,7 @@ class _Paper:
     @cached_property
     def tables(self) -> list[tuple[str, PrintedTable, dict[tuple[str, str], Cell]]]:
         """Return id, layout and cells of every table that has some."""
-        found = as_printed(self.study.tables, self.study.cells)
+        found = PrintedTable.filled(self.study.tables, self.study.cells)
         return [(f"{self._name}t{k}", table, own) for k, (table, own) in enumerate(found) if own]
 
     @cached_property
@@ -132,7 +130,7 @@ class _Paper:
         judged = Counter((cell.table, cell.verdict) for cell in own.values())
         yield _Option(name, f"{name}-0", convention.judged, own, {})
         for number, choice in enumerate(convention.choices, 1):
-            cells = own | under(choice, self.study.cells)
+            cells = own | choice.under(self.study.cells)
             more = Counter((cell.table, cell.verdict) for cell in cells.values())
             more.subtract(judged)
             yield _Option(name, f"{name}-{number}", choice.label, cells, more)

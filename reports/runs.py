@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
 
+import femubench
 from femubench.reports import study
 from femubench.reports.blocks import Block, Cell, Column, Items, Passage, Table
 from femubench.reports.cells import NOTHING, hertz, interval, plain, whole
@@ -36,8 +37,6 @@ from femubench.results import (
     Run,
     Standings,
     StudyAxes,
-    list_rows,
-    modes_frame,
     twin_gains,
 )
 
@@ -200,7 +199,7 @@ def _cells(row: Mapping[Any, Any]) -> dict[str, Cell]:
 def _board(run: Run, title: str = "") -> Iterator[Passage]:
     """Yield the leaderboard, what its columns mean, and what the run shows."""
     standings = Standings.of(run)
-    rows, bare = list_rows(run, standings), unconfined(run)
+    rows, bare = standings.rows, unconfined(run)
     tested = any(row["better_than"] for row in rows)
     heads = {"#": Column("#", 6), "strategy": Column("strategy", 16, left=True), **_FIGURES}
     listed = [
@@ -359,7 +358,7 @@ def _mac(modes: Iterable[PairedMode]) -> float | None:
 
 def _changes(run: Run) -> Iterator[Passage]:
     """Yield the errors after every design change, a table a scenario, a strategy a row."""
-    modes, seed = modes_frame(run), first_seed(run)
+    modes, seed = femubench.Run.of(run).modes, first_seed(run)
     modes = modes[(modes["block"] == "modified") & (modes["seed"] == seed)]
     modes = modes.assign(
         square=modes["counted_percent"] ** 2, name=modes["modification"].fillna("")

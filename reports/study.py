@@ -6,11 +6,12 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
+import femubench
 from femubench import InputError
 from femubench.reports.blocks import Block, Column, Drawing, Items, Passage, Table
 from femubench.reports.cells import NOTHING, format_fixed, interval, plain
 from femubench.reports.summary import failures, header, lead, notes_of, troubles
-from femubench.results import Run, StudyAxes, gain_by
+from femubench.results import Run, StudyAxes
 
 _MOST_ON_SCREEN = 60  # cells
 _MOST_COLUMNS = 9
@@ -46,7 +47,7 @@ def sections_of(run: Run, *drawing: Block) -> Iterator[Passage]:
     x, y = known.pictured
     yield Passage("", [lead(run)], area="first")
     yield Passage(f"Gain by {x} and {y}", [*drawing, _grid(run, known, x, y)])
-    cells = gain_by(run).to_dict("records")
+    cells = femubench.Run.of(run).gain_by().to_dict("records")
     yield Passage(f"Cells ({len(cells)})", [*_cells(cells), _COUNTED])
     if failed := failures(troubles(run.results)):
         yield Passage("Failures", failed)
@@ -84,7 +85,9 @@ def _grid(run: Run, known: StudyAxes, x: str, y: str) -> Block:
         x, y, columns, rows = y, x, rows, columns
     if len(columns) > _MOST_COLUMNS:
         return f"{len(columns)} by {len(rows)} values: see the cells."
-    found = {(row[x], row[y]): row for row in gain_by(run, x, y).to_dict("records")}
+    found = {
+        (row[x], row[y]): row for row in femubench.Run.of(run).gain_by(x, y).to_dict("records")
+    }
     heads = [Column(y, 24, left=True), *(Column(StudyAxes.text_of(v), 7) for v in columns)]
     cells = [[_gain(found[c, r]) if (c, r) in found else None for c in columns] for r in rows]
     table = [[StudyAxes.text_of(r), *line] for r, line in zip(rows, cells, strict=True)]

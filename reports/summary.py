@@ -9,16 +9,7 @@ from typing import Any
 
 from femubench.reports.blocks import Block, Column, Table
 from femubench.reports.cells import first_of, format_fixed, interval, join_names, plain
-from femubench.results import (
-    JobResult,
-    PairedMode,
-    Rule,
-    Run,
-    find_basis,
-    interval_kind,
-    note_missing_jobs,
-    structures_of,
-)
+from femubench.results import JobResult, PairedMode, Rule, Run, Standings, Store
 
 FINE = ("ok", "not-applicable")
 _HEADER = (
@@ -135,7 +126,7 @@ def lead(run: Run) -> str:
     elif models == "textbook":
         start = "as drawn" if run.nominals[0] == "drawn" else "of the textbooks"
         stated.append(f"All start from the models {start}.")
-    if find_basis(run) != "unseen":
+    if Standings.basis_of(run) != "unseen":
         stated.append(
             "No case holds data back: the gain is that on the modes that were given, and nothing "
             "here shows what was learnt."
@@ -152,7 +143,7 @@ def unconfined(run: Run) -> frozenset[str]:
 
 
 def _doubts(run: Run) -> Iterator[str]:
-    if find_basis(run) == "unseen" and not (run.meta.get("twins") or {}).get("of"):
+    if Standings.basis_of(run) == "unseen" and not (run.meta.get("twins") or {}).get("of"):
         yield "no twins ran, so that memory of the cases is not excluded"
     if unconfined(run):
         reason = plain(run.meta.get("sandbox_reason") or "")
@@ -166,7 +157,7 @@ def shortfalls(run: Run) -> list[str]:
     ended = [f"{t.strategy} on {t.case} ({t.status})" for t in troubles(jobs)]
     count = sum(result.status not in FINE for result in jobs)
     failed = [f"{count} of {len(jobs)} jobs failed: {first_of(ended, 3)}"] if ended else []
-    missing = note_missing_jobs(run.meta, jobs)
+    missing = Store.note_missing_jobs(run.meta, jobs)
     return [*_doubts(run), *([plain(missing)] if missing else []), *map(plain, failed)]
 
 
@@ -176,11 +167,11 @@ def finding(run: Run, board: Sequence[Mapping[Any, Any]]) -> list[str]:
     Arguments:
         board: rows of its leaderboard.
     """
-    kind = interval_kind(run)
-    structures = {structures_of(run).get(case, case) for case in cases_of(run)}
+    kind = Standings.interval_of(run)
+    structures = {run.structures.get(case, case) for case in cases_of(run)}
     count = len(seeds_of(run) if kind == "seeds" else structures)
     models = "handbooks" if run.meta.get("yardstick") == "textbook" else "the nominal models"
-    unseen = find_basis(run) == "unseen"
+    unseen = Standings.basis_of(run) == "unseen"
     where = "Above the given band" if unseen else "On the modes that were given"
     stated = headline(board, where, models, len(structures), f"{count} {kind}" * bool(kind))
     best = next((row for row in board if row["rank"] == 1), None)
@@ -266,7 +257,7 @@ def notes_of(run: Run) -> list[str]:
     """Return what a reader has to know before anything else: what was left out, what is missing."""
     stated = run.meta.get("notes")
     notes = [plain(note) for note in stated] if isinstance(stated, (list, tuple)) else []
-    if missing := note_missing_jobs(run.meta, (*run.results, *run.companions)):
+    if missing := Store.note_missing_jobs(run.meta, (*run.results, *run.companions)):
         notes.append(plain(missing))  # the store may have said so
     return list(dict.fromkeys(notes))
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from femubench import Model, Sensors, solve_modes
-from femubench.fem import GroundSpring, Place, PointMass, rectangular_tube
+from femubench.fem import GroundSpring, Place, PointMass, Section
 from femubench.scenarios.structures import HALF_SIDE, RUNG, ladder_truth
 from femubench.scenarios.twin_data import read_shapes, twin_modes
 
@@ -152,7 +152,7 @@ def _write_truth(path: Path, model: Model, sensors: Sensors, count: int) -> None
 
 def write_beam(root: Path) -> None:
     """Write the scenarios whose truth is the ladder of shear-flexible beams and soft joints."""
-    tube = rectangular_tube(0.0254, 0.0254, 0.00238)
+    tube = Section.rectangular_tube(0.0254, 0.0254, 0.00238)
     for folder, stretch, soft in (
         ("frame-beam", 1.0, 1.0),
         ("frame-beam-asymmetric", 1.04, 0.25),

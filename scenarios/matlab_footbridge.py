@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import scipy.io
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from femubench import InputError
-from femubench.fem import BoolArray, FloatArray
+from femubench.fem import FloatArray
 from femubench.scenarios.nodes_from_stiffness import Row, label_rows
 
 VARIABLE = "FEMUBENCH_FOOTBRIDGE"
@@ -133,7 +134,7 @@ def _matrices(model: _Variables) -> dict[str, str | FloatArray]:
     return {"mass.mtx": square * mass, **parts, "dofs.csv": dofs, "case.toml": text}
 
 
-def _rows(model: _Variables, turns: BoolArray) -> list[Row]:
+def _rows(model: _Variables, turns: NDArray[np.bool_]) -> list[Row]:
     """Return what the rows are, which the files do not say and the stiffness does, in inches.
 
     Where it does not either, every row is a node of its own on a line.

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
+from numpy.typing import NDArray
 
-from femubench.fem import BoolArray, FloatArray
+from femubench.fem import FloatArray
 
 _Words = np.ndarray[tuple[int], np.dtype[np.object_]]
 _FREE = 1e-9  # of the stiffness of a row
@@ -30,7 +31,7 @@ class Row:
 
 
 def label_rows(
-    stiffness: FloatArray, turns: BoolArray, across: Sequence[int], upright: Sequence[int]
+    stiffness: FloatArray, turns: NDArray[np.bool_], across: Sequence[int], upright: Sequence[int]
 ) -> list[Row] | None:
     """Return what the rows are; None where the stiffness does not tell.
 
@@ -92,7 +93,7 @@ def _axes(rolls: FloatArray) -> FloatArray | None:
     return np.array([turning[first].mean(axis=0), other.mean(axis=0)])
 
 
-def _shifted(shifts: FloatArray, turns: BoolArray, across: int, upright: int) -> _Words:
+def _shifted(shifts: FloatArray, turns: NDArray[np.bool_], across: int, upright: int) -> _Words:
     """Return y, z, x for rows that shift with one, with another and not at all, (n,)."""
     shifts = shifts / np.abs(shifts).max()
     like = [np.abs(shifts - shifts[row]).max(axis=1) < _SAME for row in (across, upright)]

@@ -23,7 +23,7 @@ from femubench.core.fem.frame import (
     PointMass,
     RigidEnd,
 )
-from femubench.core.fem.sections import Section, constant_kappa, rectangular_tube
+from femubench.core.fem.sections import Section
 
 FrameBuilder = Callable[..., Frame]
 
@@ -73,7 +73,7 @@ def build_ladder(
         polar: torsion constant equal to the polar moment, as the paper has it.
         stretch: factor on the half side between E and F.
     """
-    tube = rectangular_tube(0.0254, 0.0254, 0.00238)
+    tube = Section.rectangular_tube(0.0254, 0.0254, 0.00238)
     section = replace(tube, J=tube.Jp) if polar else tube
     material = replace(ALUMINIUM, E=E)
     x = {"A": 0.0, "B": HALF_SIDE, "C": 2 * HALF_SIDE, "D": 0.0, "E": HALF_SIDE}
@@ -143,7 +143,9 @@ def build_asymmetric(softness: float = 1.0, **options: Any) -> Frame:
 def build_portal(seed: int, beam: str = "timoshenko", elements: int = 2, **parts: Any) -> Frame:
     """Return a 3-D frame of nine members between seven random points, none along an axis."""
     rng = np.random.default_rng(seed)
-    section = replace(rectangular_tube(0.04, 0.03, 0.002), kappa=constant_kappa(0.44))
+    section = replace(
+        Section.rectangular_tube(0.04, 0.03, 0.002), kappa=Section.constant_kappa(0.44)
+    )
     material = Material(70e9, 0.3, 2700.0)
     points = rng.uniform(-0.5, 0.5, (7, 3)) + np.linspace(0.0, 2.0, 7)[:, None] * [1.0, 0.3, -0.2]
     joints = tuple(Joint(f"J{i}", (p[0], p[1], p[2])) for i, p in enumerate(points.tolist()))

@@ -21,7 +21,6 @@ from femubench.core.fit.residuals import Data
 from femubench.core.inference.examine import pose_problem
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.roles import Effect
-from femubench.effect import total_mass
 from femubench.fem import FloatArray, Frame, Joint, Material, Member, Place, Section, Support
 
 FREQUENCY_STD, SHAPE_STD, MASS_STD = 0.002, 0.015, 0.002
@@ -79,7 +78,7 @@ def measured(
     sensors = sensors_on_joints(frame) if shapes else NO_SENSORS
     seen = np.asarray(model.observe(sensors) @ modes.shapes) if shapes else np.zeros((0, count))
     seen = seen / np.abs(seen).max(axis=0, initial=1e-300)
-    mass = total_mass(model)
+    mass = model.total_mass
     if rng is not None:
         frequencies = frequencies * (1.0 + FREQUENCY_STD * rng.standard_normal(count))
         seen = seen + SHAPE_STD * rng.standard_normal(seen.shape)

@@ -12,7 +12,8 @@ from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.fem.model import Dofs
 from femubench.core.modal.eigen import solve_dense
-from femubench.effect import Change, Effect, once_for
+from femubench.core.roles import Effect
+from femubench.effect import Change, once_for
 from femubench.fem import FloatArray
 
 

@@ -21,7 +21,7 @@ from femubench.fem import (
     Member,
     Place,
     PointMass,
-    solid_rectangle,
+    Section,
 )
 
 FILE = Path(__file__).parent / "bulk_data" / "garteur.bdf"
@@ -126,7 +126,7 @@ def frame() -> Frame:
     members = []
     for bar, i, first, last in bars():
         part = PARTS[i - 1]
-        section = solid_rectangle(part.width / 1e3, part.height / 1e3)
+        section = Section.solid_rectangle(part.width / 1e3, part.height / 1e3)
         up = (0.0, 1.0, 0.0) if part.name == "fin" else (0.0, 0.0, 1.0)
         members.append(Member(f"E{bar}", (str(first), str(last)), 1, section, metal, up))
     return Frame(

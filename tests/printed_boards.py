@@ -10,9 +10,9 @@ import pytest
 
 import femubench
 from femubench import Run
+from femubench.core.score.leaderboard import list_rows
 from femubench.reports.cells import shorten_text
 from femubench.reports.summary import finding
-from femubench.results import list_rows
 
 ROOT = Path(__file__).parents[1]
 COLUMNS = ("gain", "gain_low", "gain_high", "error_percent", "better_share", "error_gain")

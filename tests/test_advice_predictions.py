@@ -18,7 +18,7 @@ from femubench.core.advise.point_attachments import antiresonances, predict_load
 from femubench.core.advise.prediction import Outlook, Points, Predicted, distance
 from femubench.core.fit.modal_fit import Fit, state_at
 from femubench.core.inference.settings import overridden
-from femubench.effect import point_in, translation_rows
+from femubench.effect import ModelPlaces
 from femubench.fem import FloatArray, Frame, Place, PointMass, Support
 from femubench.plugins.effects.added_mass import AddedMass
 from femubench.plugins.effects.grounding_spring import GroundingSpring
@@ -69,12 +69,14 @@ class TestPredictions:
         zeros = antiresonances(view)
         rigid = problem.space.rigid
         for i in range(0, len(points.labels), 3):
-            at = point_in(model, points.labels[i])
+            at = ModelPlaces(model).point(points.labels[i])
             other = extended.attach([PointMass(at, 0.04)], [])
             expected = solve_modes(other).natural_frequencies[rigid : rigid + 6]
             assert_allclose(loaded[i].values, expected, rtol=2e-5)
             sensor = sum(points.counts[:i])
-            row = np.asarray(translation_rows(extended, at, points.directions[i][:1]).toarray())
+            row = np.asarray(
+                ModelPlaces(extended).translations(at, points.directions[i][:1]).toarray()
+            )
             free = la.null_space(row)
             inner = [free.T @ m.toarray() @ free for m in (extended.stiffness, extended.mass)]
             top = problem.data.measurement.frequencies.max()
@@ -123,7 +125,7 @@ class TestPredictions:
         (text,) = (text for text in options if "static" in text)
         assert text == "measure the static deflection under a known load at F, z"
         view, _ = one_outlook(problem, fits[0])
-        row = translation_rows(model, Place(joint="F"), ["z"]).toarray()[0]
+        row = ModelPlaces(model).translations(Place(joint="F"), ["z"]).toarray()[0]
         stiff = YoungsModulus().extend(model, "all", [0.1]).stiffness.toarray()
         exact = float(row @ la.solve(stiff, row))
         found = view.flexibility().values.max()

@@ -10,11 +10,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.beam import mass_matrices, stiffness_matrices
 from femubench.core.fem.frame import Frame, GroundSpring, Joint, Material, Member, Place, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
-from femubench.core.fem.sections import Section, constant_kappa
+from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
@@ -22,7 +21,7 @@ from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]
-OBLONG = Section(A=4e-4, Iy=3e-8, Iz=1.2e-8, J=1e-8, Jp=4.2e-8, kappa=constant_kappa(0.45))
+OBLONG = Section(A=4e-4, Iy=3e-8, Iz=1.2e-8, J=1e-8, Jp=4.2e-8, kappa=Section.constant_kappa(0.45))
 MATERIAL = Material(70e9, 0.3, 2700.0)
 
 
@@ -34,7 +33,7 @@ def test_assembly_is_the_sum_of_rotated_elements(portal: FrameBuilder) -> None:
     structure = Structure.build(portal(3))
     size = 6 * len(structure.mesh.xyz)
     mass, stiffness = np.zeros((size, size)), np.zeros((size, size))
-    k, m = stiffness_matrices(structure.properties), mass_matrices(structure.properties)
+    k, m = structure.properties.stiffness_matrices(), structure.properties.mass_matrices()
     for e, ends in enumerate(structure.mesh.ends):
         T = np.kron(np.eye(4), structure.mesh.axes[e])
         index = np.concatenate([6 * node + np.arange(6) for node in ends])

@@ -25,7 +25,7 @@ from femubench.core.fem.frame import (
 )
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.parameters import Property
-from femubench.core.fem.sections import Section, constant_kappa
+from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
@@ -182,7 +182,7 @@ def test_a_rigid_length_beyond_the_element_is_refused(hframe: FrameBuilder) -> N
         structure.with_values([parameter], [0.06])
 
 
-OBLONG = Section(A=4e-4, Iy=3e-8, Iz=1.2e-8, J=1e-8, Jp=4.2e-8, kappa=constant_kappa(0.45))
+OBLONG = Section(A=4e-4, Iy=3e-8, Iz=1.2e-8, J=1e-8, Jp=4.2e-8, kappa=Section.constant_kappa(0.45))
 MATERIAL = Material(70e9, 0.3, 2700.0)
 
 

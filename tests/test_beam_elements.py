@@ -9,15 +9,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from femubench.core.fem.beam import (
-    BeamProperties,
-    mass_matrices,
-    shape_functions,
-    stiffness_matrices,
-)
+from femubench.core.fem.beam import BeamProperties, shape_functions
 from femubench.core.fem.frame import Frame, Joint, Material, Member, Place, Support
 from femubench.core.fem.model import Model
-from femubench.core.fem.sections import Section, constant_kappa
+from femubench.core.fem.sections import Section
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.typing import FloatArray
 
@@ -67,7 +62,7 @@ def test_mass_is_the_quadrature_of_the_shape_functions(shear_shape: float) -> No
     mass = sum(quadrature(N[:, i], VALUES["rhoA"]) for i in range(3))
     mass = mass + quadrature(N[:, 3], VALUES["rhoJp"])
     mass = mass + quadrature(N[:, 4], ROTARY["rhoIy"]) + quadrature(N[:, 5], ROTARY["rhoIz"])
-    found = mass_matrices(p)[0]
+    found = p.mass_matrices()[0]
     np.testing.assert_allclose(found, mass, rtol=0, atol=1e-12 * np.abs(found).max())
 
 
@@ -81,7 +76,7 @@ def test_stiffness_is_the_quadrature_of_the_strains(shear: dict[str, float]) -> 
     if shear:
         stiffness += quadrature(slope[1] - N[:, 5], 1.0 / shear["flex_y"])
         stiffness += quadrature(slope[2] + N[:, 4], 1.0 / shear["flex_z"])
-    found = stiffness_matrices(p)[0]
+    found = p.stiffness_matrices()[0]
     np.testing.assert_allclose(found, stiffness, rtol=0, atol=1e-12 * np.abs(found).max())
 
 
@@ -107,11 +102,11 @@ def test_partly_rigid_element_is_the_transformed_shorter_one(
 ) -> None:
     short = one(**shear, length=LENGTH - first - second)
     T = arm(first, second)
-    expected = T.T @ stiffness_matrices(short)[0] @ T
-    found = stiffness_matrices(one(**shear, rigid_1=first, rigid_2=second))[0]
+    expected = T.T @ short.stiffness_matrices()[0] @ T
+    found = one(**shear, rigid_1=first, rigid_2=second).stiffness_matrices()[0]
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
-    expected = T.T @ mass_matrices(short)[0] @ T
-    found = mass_matrices(one(**shear, rigid_mass_1=first, rigid_mass_2=second))[0]
+    expected = T.T @ short.mass_matrices()[0] @ T
+    found = one(**shear, rigid_mass_1=first, rigid_mass_2=second).mass_matrices()[0]
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
@@ -130,12 +125,12 @@ def test_partly_rigid_element_is_the_printed_equation(a: float) -> None:
     )  # fmt: skip
     sign = np.array([1.0, -1.0, 1.0, -1.0])
     index = np.ix_([2, 4, 8, 10], [2, 4, 8, 10])
-    found = stiffness_matrices(one(rigid_1=a))[0]
+    found = one(rigid_1=a).stiffness_matrices()[0]
     tolerance = 1e-12 * np.abs(printed).max()
     np.testing.assert_allclose(found[index], printed * np.outer(sign, sign), atol=tolerance, rtol=0)
     assert found[0, 0] == pytest.approx(VALUES["EA"] / (L - a), rel=1e-14)
     # The other end is the mirror image: swap the nodes, turn the slopes.
-    mirrored = stiffness_matrices(one(rigid_2=a))[0][index]
+    mirrored = one(rigid_2=a).stiffness_matrices()[0][index]
     swap = np.array([2, 3, 0, 1])
     expected = printed[np.ix_(swap, swap)]
     np.testing.assert_allclose(mirrored, expected, atol=tolerance, rtol=0)
@@ -149,7 +144,7 @@ def test_rigid_motion_costs_no_energy_and_carries_the_whole_mass() -> None:
         block = np.eye(6)
         block[1, 5], block[2, 4] = x[end], -x[end]
         motions[6 * end : 6 * end + 6] = block
-    k, m = stiffness_matrices(p)[0], mass_matrices(p)[0]
+    k, m = p.stiffness_matrices()[0], p.mass_matrices()[0]
     assert np.abs(k @ motions).max() < 1e-12 * np.abs(k).max()
     inertia = motions.T @ m @ motions
     total = VALUES["rhoA"] * LENGTH
@@ -160,7 +155,7 @@ def test_rigid_motion_costs_no_energy_and_carries_the_whole_mass() -> None:
 
 # ---- beams against the roots of their frequency equations ----------------------------------
 
-SECTION = Section(A=4e-4, Iy=2e-8, Iz=2e-8, J=3e-8, Jp=4e-8, kappa=constant_kappa(0.45))
+SECTION = Section(A=4e-4, Iy=2e-8, Iz=2e-8, J=3e-8, Jp=4e-8, kappa=Section.constant_kappa(0.45))
 MATERIAL = Material(70e9, 0.3, 2700.0)
 SPAN = 0.5
 
@@ -261,7 +256,7 @@ def test_timoshenko_beam_meets_its_frequency_equation(bending_mass: str) -> None
 
 
 def test_thin_timoshenko_beam_is_an_euler_bernoulli_beam() -> None:
-    thin = replace(SECTION, Iy=SECTION.Iy * 1e-6, kappa=constant_kappa(0.45))
+    thin = replace(SECTION, Iy=SECTION.Iy * 1e-6, kappa=Section.constant_kappa(0.45))
     material = Material(70e9, 0.3, 2700.0)
     joints = (Joint("A", (0.0, 0.0, 0.0)), Joint("B", (SPAN, 0.0, 0.0)))
     found = []

@@ -13,7 +13,7 @@ from femubench import Case, read_case, solve_modes
 from femubench.core.case.faults import key_lines, line_of
 from femubench.core.case.schema import CaseSpec
 from femubench.core.fem.frame import Frame, GroundSpring, JointSpring, Place, PointMass, RigidEnd
-from femubench.core.fem.sections import rectangular_tube
+from femubench.core.fem.sections import Section
 from femubench.modal import real_modes
 
 CASES = Path(__file__).parent / "cases"
@@ -37,7 +37,7 @@ def test_in_plane_frame() -> None:
     assert post.width is None
     assert post.kappa is not None
     assert post.kappa(0.3) == (0.44, 0.44)
-    assert girder.section.Iy == rectangular_tube(0.04, 0.06, 0.003).Iy
+    assert girder.section.Iy == Section.rectangular_tube(0.04, 0.06, 0.003).Iy
     assert girder.section.height == 0.06
     np.testing.assert_allclose(left.material.G, 210e9 / 2.6)
     assert frame.masses == (

@@ -17,7 +17,7 @@ from femubench.core.case.writing import write_case
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Frame, Joint, Material, Member, Place, PointMass
 from femubench.core.fem.mesh import Mesh, build_mesh
-from femubench.core.fem.sections import rectangular_tube
+from femubench.core.fem.sections import Section
 
 CASES = Path(__file__).parent / "cases"
 JOINTS = "name,x,y,z\nfoot,0,0,0\nknee,0.0,0,0.5\ntip,0.4,0.3,0.6\n"
@@ -98,7 +98,7 @@ def test_large_frames_are_written_with_tables(
 def plane_frame(count: int, elements: int = 3) -> Frame:
     """Return a zigzag of members out of plane."""
     rng = np.random.default_rng(5)
-    tube, steel = rectangular_tube(0.05, 0.04, 0.003), Material(2.1e11, 0.3, 7800.0)
+    tube, steel = Section.rectangular_tube(0.05, 0.04, 0.003), Material(2.1e11, 0.3, 7800.0)
     joints = tuple(
         Joint(f"J{i}", (float(i), float(rng.uniform(-1, 1)), 0.0)) for i in range(count + 1)
     )

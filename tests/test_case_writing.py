@@ -43,7 +43,7 @@ from femubench.core.fem.frame import (
 )
 from femubench.core.fem.model import LowRank
 from femubench.core.fem.parameters import Property
-from femubench.core.fem.sections import Section, constant_kappa, rectangular_tube, round_tube
+from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.measurement import Measurement
 
@@ -314,13 +314,20 @@ def test_a_changed_section_keeps_its_shape(tmp_path: Path, ladder: Case) -> None
     ("section", "table"),
     [
         (
-            rectangular_tube(0.04, 0.06, 0.003),
+            Section.rectangular_tube(0.04, 0.06, 0.003),
             {"shape": "rectangular-tube", "width": 0.04, "height": 0.06, "wall": 0.003},
         ),
-        (round_tube(0.03, 0.0021), {"shape": "round-tube", "diameter": 0.03, "wall": 0.0021}),
-        (round_tube(0.03, 0.015), {"shape": "solid-circle", "diameter": 0.03}),
         (
-            replace(rectangular_tube(0.04, 0.04, 0.0025), kappa=constant_kappa(0.4), J=1e-8),
+            Section.round_tube(0.03, 0.0021),
+            {"shape": "round-tube", "diameter": 0.03, "wall": 0.0021},
+        ),
+        (Section.round_tube(0.03, 0.015), {"shape": "solid-circle", "diameter": 0.03}),
+        (
+            replace(
+                Section.rectangular_tube(0.04, 0.04, 0.0025),
+                kappa=Section.constant_kappa(0.4),
+                J=1e-8,
+            ),
             {"shape": "square-tube", "width": 0.04, "wall": 0.0025, "J": 1e-8, "kappa": 0.4},
         ),
         (

@@ -10,14 +10,13 @@ import pytest
 import femubench
 from femubench import InputError, Model, NotApplicable
 from femubench.core.change.change import parameter_of
+from femubench.core.update.change_lists import check_changes
 from femubench.fem import Place, Support
 from femubench.modal import eigenvalue_sensitivities
 from femubench.update import (
+    Changes,
+    ModalSpace,
     ParametricModel,
-    check_changes,
-    list_changes,
-    modal_space,
-    parameterise,
     scale_property,
     sensitivity_update,
     set_property,
@@ -49,7 +48,7 @@ def inside(parametric: ParametricModel) -> np.ndarray:
 )
 def test_slopes_of_a_list_are_those_of_differences(case: str, words: str) -> None:
     model = femubench.cases[case].model
-    parametric = ParametricModel(model, tuple(list_changes(model, words)))
+    parametric = ParametricModel(model, tuple(Changes(model).listed(words)))
     x = inside(parametric)
     at = parametric.at(x)
     modes = femubench.solve_modes(at).elastic.take(np.arange(4))
@@ -68,9 +67,9 @@ def test_slopes_of_a_list_are_those_of_differences(case: str, words: str) -> Non
 
 
 def test_the_modal_space_has_the_frequencies_and_slopes_of_the_model() -> None:
-    parametric = parameterise(FRAME.model, "sections+joint-rotation+joint-mass")
+    parametric = Changes(FRAME.model).parameterise("sections+joint-rotation+joint-mass")
     used, x = FRAME.used_measurement(), inside(parametric)
-    space = modal_space(parametric, used, shape_weight=0.1, at=0.5 * x)
+    space = ModalSpace.of(parametric, used, shape_weight=0.1, at=0.5 * x)
     exact = femubench.solve_modes(parametric.at(x)).elastic.natural_frequencies[:6]
     values, _ = space.eigenpairs(x)
     hertz = np.sqrt(np.abs(values)) / (2.0 * np.pi)
@@ -84,11 +83,11 @@ def test_the_modal_space_has_the_frequencies_and_slopes_of_the_model() -> None:
 
 def test_an_effect_sits_at_its_coarsest_places_or_at_the_one_that_is_named() -> None:
     model = FRAME.model
-    names = [change.name for change in list_changes(model, "joint-rotation+density")]
+    names = [change.name for change in Changes(model).listed("joint-rotation+density")]
     assert names == ["joint-rotation L", "joint-rotation T", "density all"]
-    (alone,) = list_changes(model, "joint-rotation@J1")
+    (alone,) = Changes(model).listed("joint-rotation@J1")
     assert alone.places == ("J1",)
-    free, held = (list_changes(model, "density", prior_std=std)[0] for std in (None, 0.1))
+    free, held = (Changes(model).listed("density", prior_std=std)[0] for std in (None, 0.1))
     assert parameter_of(free.parameters[0]).std == np.inf
     assert parameter_of(held.parameters[0]).std == 1.0
 
@@ -98,14 +97,14 @@ def test_what_has_no_place_or_name_is_one_line() -> None:
     with pytest.raises(InputError, match=r"there is no 'member' \(expected own, elements, "):
         check_changes("sections+member")
     with pytest.raises(NotApplicable, match="joint-rotation has no place in this model at 'X'"):
-        list_changes(FRAME.model, "joint-rotation@X")
+        Changes(FRAME.model).listed("joint-rotation@X")
     matrices = replace(FRAME.model, structure=None)
     with pytest.raises(NotApplicable, match="joint-rotation has no place in this model"):
-        list_changes(matrices, "joint-rotation")
+        Changes(matrices).listed("joint-rotation")
     with pytest.raises(NotApplicable, match=r"attached-oscillator.* adds degrees of freedom"):
-        parameterise(FRAME.model, "attached-oscillator@J1")
+        Changes(FRAME.model).parameterise("attached-oscillator@J1")
     with pytest.raises(NotApplicable, match=r"is in E .* and in E "):
-        parameterise(FRAME.model, "members+sections")
+        Changes(FRAME.model).parameterise("members+sections")
 
 
 @pytest.mark.parametrize(
@@ -154,17 +153,17 @@ def test_a_list_that_contradicts_itself_is_refused() -> None:
     with pytest.raises(InputError, match=r"one of own, .* not 'members\+sections'"):
         check_changes("members+sections", parts_alone=True)
     with pytest.raises(NotApplicable, match=r"no plugin|nobody"):
-        list_changes(FRAME.model, "nobody/effect")
-    together = parameterise(FRAME.model, "joint-rotation+joint-flexibility")
+        Changes(FRAME.model).listed("nobody/effect")
+    together = Changes(FRAME.model).parameterise("joint-rotation+joint-flexibility")
     with pytest.raises(NotApplicable, match="do not go together in this model"):
-        modal_space(together, FRAME.used_measurement(), shape_weight=0.0)
+        ModalSpace.of(together, FRAME.used_measurement(), shape_weight=0.0)
     with pytest.raises(NotApplicable, match="do not go together in this model"):
         sensitivity_update(FRAME.model, together.changes, FRAME.used_measurement())
 
 
 def test_a_point_without_a_mass_is_worse_than_any_model() -> None:
-    lighter = parameterise(FRAME.model, "member-mass+density")
-    space = modal_space(lighter, FRAME.used_measurement(), shape_weight=0.1)
+    lighter = Changes(FRAME.model).parameterise("member-mass+density")
+    space = ModalSpace.of(lighter, FRAME.used_measurement(), shape_weight=0.1)
     low = space.fit(lighter.lower)
     assert low.paired == 0
     assert low.cost > 1e3 * space.fit(np.zeros(len(lighter))).cost
@@ -175,7 +174,7 @@ def test_masses_of_matrices_and_of_held_frames_have_the_terms_in_them() -> None:
     held = replace(
         FRAME.model.frame_structure.frame, supports=(Support(Place(joint="J1"), ("z", "rx", "ry")),)
     )
-    frame = ParametricModel(Model.of(held), tuple(list_changes(Model.of(held), "added-mass@J5")))
+    frame = ParametricModel(Model.of(held), tuple(Changes(Model.of(held)).listed("added-mass@J5")))
     (kilograms,) = frame.values(np.array([0.5]))
     at = frame.at(np.array([0.5]))
     assert frame.mass(np.array([0.5]), at) == pytest.approx(
@@ -183,7 +182,7 @@ def test_masses_of_matrices_and_of_held_frames_have_the_terms_in_them() -> None:
     )
     half = replace(FRAME.model, structure=None, mass_groups={"half": 0.5 * FRAME.model.mass})
     factor = scale_property("mass", "density", ("group:half",))
-    both = ParametricModel(half, (factor, *list_changes(half, "youngs-modulus")))
+    both = ParametricModel(half, (factor, *Changes(half).listed("youngs-modulus")))
     x = np.zeros(len(both))
     x[0] = np.log(1.2)
     assert both.mass(x, both.at(x)) == pytest.approx(1.1 * half.total_mass, rel=1e-9)

@@ -23,10 +23,12 @@ from femubench import (
     solve_modes,
 )
 from femubench.core.plugin.loader import load_plugins
+from femubench.core.run.runner import run_jobs
+from femubench.core.score.leaderboard import leaderboard
 from femubench.fem import Frame, GroundSpring, Place, Preload
 from femubench.modal import rigid_modes_of
 from femubench.plugins.strategies.diagnosed import Diagnosed
-from femubench.results import Run, leaderboard, run_jobs
+from femubench.results import Run
 from femubench.scenarios import HERE
 from femubench.update import with_measured_frequencies
 

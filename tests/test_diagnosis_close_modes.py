@@ -18,10 +18,10 @@ from diagnosis_problems import (
 
 from femubench import Measurement, Model, diagnose, solve_modes
 from femubench.core.fit.modal_fit import state_at
-from femubench.fem import Frame, Joint, Material, Member, rectangular_tube
+from femubench.fem import Frame, Joint, Material, Member, Section
 
 CORNERS = {"A": (0.0, 0.0, 0.0), "B": (1.0, 0.0, 0.0), "C": (1.0, 1.0, 0.0), "D": (0.0, 1.0, 0.0)}
-TUBE, ALUMINIUM = rectangular_tube(0.03, 0.03, 0.003), Material(7e10, 0.33, 2700.0)
+TUBE, ALUMINIUM = Section.rectangular_tube(0.03, 0.03, 0.003), Material(7e10, 0.33, 2700.0)
 FRAME = Frame(
     "out-of-plane",
     "euler-bernoulli",

@@ -20,7 +20,6 @@ from femubench.core.fit.modal_basis import solve_pencil
 from femubench.core.fit.modal_fit import Fit, Problem, State, bounds_of, fit, state_at
 from femubench.core.fit.projection import Projection
 from femubench.core.modal.eigen import natural_shift, solve_dense
-from femubench.effect import total_mass
 from femubench.fem import FloatArray, Frame
 
 STRUCTURES = ("ladder", "hframe")
@@ -94,13 +93,13 @@ def test_only_what_has_weight_moves_the_mass(problems: dict[str, Problem]) -> No
     # The arms of flexible joints are massless.
     heavy = {"density", "member-mass", "joint-mass", "added-mass", "attached-oscillator"}
     heavy |= {"joint-rotation", "joint-flexibility", "wall-thickness"}
-    nominal = total_mass(problem.model)
+    nominal = problem.model.total_mass
     for part in of_each_kind(problem):
         h = part.hypothesis
         state = state_at(problem, (part,), inside(part))
         values = [float(v) for v in h.values(state.x[None])[0]]
         extended = h.effect.extend(problem.model, h.place, values)
-        assert state.mass == pytest.approx(total_mass(extended), rel=1e-9), (h.name, h.place)
+        assert state.mass == pytest.approx(extended.total_mass, rel=1e-9), (h.name, h.place)
         assert (abs(state.mass / nominal - 1.0) > 1e-6) == (h.name in heavy)
 
 

@@ -19,7 +19,7 @@ from femubench.core.change.hypothesis import Hypothesis, hypotheses_of
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.fem.frame import GroundSpring, Joint, Material, Member, Place, Support
 from femubench.core.fem.model import Dofs
-from femubench.core.fem.sections import rectangular_tube
+from femubench.core.fem.sections import Section
 from femubench.core.fit.extended_model import departure, extend_model, raw_residual
 from femubench.core.fit.modal_fit import Problem, state_at
 from femubench.core.fit.noise import Noise
@@ -30,7 +30,7 @@ from femubench.core.inference.effort import Effort
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.screening import _pulls, screen_hypotheses
 from femubench.core.modal.eigen import count_evaluations, modes_of
-from femubench.effect import Effect
+from femubench.core.roles import Effect
 from femubench.fem import Frame
 from femubench.plugins.effects.added_mass import AddedMass
 from femubench.plugins.effects.attached_oscillator import AttachedOscillator
@@ -178,7 +178,7 @@ class TestCoordinates:
 )
 def test_alike_elements_share_matrices_and_act_as_each_alone(model: Model, effect: Effect) -> None:
     frame = model.frame_structure.frame
-    tube = rectangular_tube(0.06, 0.03, 0.003)
+    tube = Section.rectangular_tube(0.06, 0.03, 0.003)
     members = tuple(replace(member, section=tube) for member in frame.members)
     model = Model.of(replace(frame, beam="euler-bernoulli", members=members))
     basis = np.random.default_rng(3).standard_normal((model.size, 5))
@@ -271,7 +271,7 @@ class TestNaming:
 def lattice(count: int, elements: int) -> Frame:
     """Return a building of count x count x count bays, clamped at its feet."""
     rng = np.random.default_rng(0)
-    section = rectangular_tube(0.06, 0.03, 0.003)
+    section = Section.rectangular_tube(0.06, 0.03, 0.003)
     grid = [(i, j, k) for i in range(count + 1) for j in range(count + 1) for k in range(count + 1)]
     joints = tuple(
         Joint(

@@ -25,7 +25,8 @@ from femubench import Run
 from femubench.core.library.cases import read_cases
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.schema.results import Nominal
-from femubench.results import JobResult, PredictiveBoard, leaderboard
+from femubench.core.score.leaderboard import leaderboard
+from femubench.results import JobResult, PredictiveBoard
 
 pytestmark = pytest.mark.nightly
 PAGES = ("README.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md"))))

@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as Canvas
 
-from femubench.core.drawing.wireframe import DrawnJoint, DrawnMember
+from femubench.core.drawing.wireframe import DrawnJoint, DrawnMember, Wireframe
 from femubench.core.plot.figure import draw_figure, render_figure
-from femubench.plot import Wireframe
 from femubench.reproduction import Bars, Curve, Curves, Figure, MatrixImage, StructureMap
 
 AWKWARD = 'a < b & "c" $x_1$ $'

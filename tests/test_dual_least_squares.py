@@ -9,7 +9,8 @@ import femubench
 from femubench.core.fit import gauss_newton
 from femubench.core.fit.dual_least_squares import DualPosterior, dual_step
 from femubench.core.update import sensitivity_update as iteration
-from femubench.update import UpdateOptions, scale_parts, sensitivity_update
+from femubench.core.update.change_lists import Changes
+from femubench.update import UpdateOptions, sensitivity_update
 
 RNG = np.random.default_rng(5)
 S, RESIDUAL = RNG.standard_normal((4, 30)), RNG.standard_normal(4)
@@ -37,7 +38,7 @@ def test_an_update_of_many_parameters_is_that_of_few(
 ) -> None:
     case = femubench.cases["frame"]
     std = 0.1 if statistical else None
-    unknowns = scale_parts(case.model, "elements", prior_std=std)
+    unknowns = Changes(case.model).parts("elements", prior_std=std)
     options = UpdateOptions(weighting="statistical" if statistical else "unit")
     used = case.used_measurement()
     dense = sensitivity_update(case.model, unknowns, used, options)
@@ -59,7 +60,7 @@ def test_many_parameters_without_a_prior_and_damping_are_refused(
     case = femubench.cases["frame"]
     for module in (iteration, gauss_newton):
         monkeypatch.setattr(module, "MANY", 3)
-    unknowns = scale_parts(case.model, "elements")
+    unknowns = Changes(case.model).parts("elements")
     with pytest.raises(femubench.NotApplicable, match="without damping or a prior"):
         sensitivity_update(
             case.model, unknowns, case.used_measurement(), UpdateOptions(damping=0.0)

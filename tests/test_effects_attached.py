@@ -18,18 +18,11 @@ from femubench.core.challenge.truth import finer
 from femubench.core.change.hypothesis import by_themselves, finer as finer_hypotheses, hypothesis_at
 from femubench.core.diagnosis.region import Regions
 from femubench.core.diagnosis.tables import list_causes
-from femubench.core.effect.places import match
+from femubench.core.effect.places import Places, bare_place
 from femubench.core.fit.projection import Projector
 from femubench.core.inference.examine import examine
 from femubench.core.modal.eigen import solve_dense
-from femubench.effect import (
-    FrameEffect,
-    bare_place,
-    elastic_band,
-    find_directed_point,
-    total_mass,
-    translation_rows,
-)
+from femubench.effect import FrameEffect, ModelPlaces, elastic_band
 from femubench.fem import FloatArray, Frame, GroundSpring, ModelError, Place, Support
 from femubench.plugins.effects.added_mass import AddedMass
 from femubench.plugins.effects.amplitude_dependent_stiffness import AmplitudeDependentStiffness
@@ -191,8 +184,8 @@ def test_stiff_oscillator_is_a_mass_and_a_soft_one_rides_along(models: dict[str,
     mass = AddedMass().extend(model, "T1", [0.5])
     np.testing.assert_allclose(hertz(stiff)[3:], hertz(mass)[3:], rtol=1e-6)
     soft = effect.extend(model, "T1:x", [0.5, 1e-3])
-    at, _ = find_directed_point(model, "T1:x")
-    across = translation_rows(model, at, ["z"])
+    at, _ = ModelPlaces(model).directed_point("T1:x")
+    across = ModelPlaces(model).translations(at, ["z"])
     carried = replace(model, mass=model.mass + 0.5 * (across.T @ across))
     # Three rigid modes and the mass that hangs on next to nothing.
     np.testing.assert_allclose(hertz(soft, 13)[4:], hertz(carried)[3:], rtol=1e-6)
@@ -205,7 +198,7 @@ def test_an_oscillator_is_tried_free_where_it_can_be_felt_across(models: dict[st
     assert effect.finer(models["hframe"], "T1:x") == ("T1:x:free",)
     assert effect.finer(models["hframe"], "T1:x:free") == ()
     assert effect.finer(models["ladder"], "A") == ()  # out of plane there is one direction
-    assert match(models["hframe"].frame_structure.frame, "T1:x:free", "T1:-x")
+    assert Places(models["hframe"].frame_structure.frame).match("T1:x:free", "T1:-x")
 
 
 @pytest.mark.parametrize("place", ["T1:x", "T1:z:free"])
@@ -285,7 +278,7 @@ def test_models_from_matrices(models: dict[str, Model]) -> None:
     """What hangs on nodes goes without a frame; all else says that it does not apply."""
     frame, model = models["hframe"], as_matrices(models["hframe"])
     np.testing.assert_allclose(elastic_band(model), elastic_band(frame), rtol=1e-9)
-    np.testing.assert_allclose(total_mass(model), total_mass(frame), rtol=1e-9)
+    np.testing.assert_allclose(model.total_mass, frame.total_mass, rtol=1e-9)
     for effect, suffix in ((AddedMass(), ""), (GroundingSpring(), ":x")):
         place = f"n2{suffix}"
         assert place in effect.places(model)

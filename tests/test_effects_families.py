@@ -15,9 +15,9 @@ from femubench.core.case.case import Case
 from femubench.core.case.writing import write_case
 from femubench.core.conformance.place_words import has_place
 from femubench.core.drawing.places import find_wireframe
-from femubench.core.effect.places import match
-from femubench.effect import elements_of, members_at, members_of, set_places, split_direction
-from femubench.fem import Frame, MemberSet, Structure, rectangular_tube, round_tube
+from femubench.core.effect.places import split_direction
+from femubench.effect import ModelPlaces, Places
+from femubench.fem import Frame, MemberSet, Section
 from femubench.plugins.effects.material import Density, MemberMass, MemberStiffness, YoungsModulus
 from femubench.plugins.effects.wall_thickness import WallThickness
 
@@ -100,12 +100,12 @@ def two_metals(tmp_path: Path) -> Case:
 
 def test_sets_sections_and_materials_are_places(two_metals: Case) -> None:
     frame = two_metals.model.frame_structure.frame
-    assert members_of(frame, "set:weld") == ("AB", "BC")
-    assert members_of(frame, "section:tube") == ("AB", "BC", "CD")
-    assert members_of(frame, "material:brass") == ("BC", "DA")
-    assert members_of(frame, "section:none") == ()
+    assert Places(frame).members("set:weld") == ("AB", "BC")
+    assert Places(frame).members("section:tube") == ("AB", "BC", "CD")
+    assert Places(frame).members("material:brass") == ("BC", "DA")
+    assert Places(frame).members("section:none") == ()
     # The bar is one member, which says it.
-    assert set_places(frame) == ("set:weld", "section:tube")
+    assert Places(frame).sets() == ("set:weld", "section:tube")
     assert YoungsModulus().places(two_metals.model) == ("all", "material:steel", "material:brass")
     assert Density().places(two_metals.model) == YoungsModulus().places(two_metals.model)
     families = ("AB", "BC", "CD", "DA", "set:weld", "section:tube")
@@ -115,8 +115,8 @@ def test_sets_sections_and_materials_are_places(two_metals: Case) -> None:
     for word in ("set:weld", "section:tube", "material:brass"):
         assert has_place(two_metals.model, word)
     assert split_direction("set:x") == ("set:x", None)
-    assert [m.name for m in members_at(frame, "set:weld")] == ["AB", "BC"]
-    assert len(elements_of(Structure.build(frame), "material:brass")) == 6
+    assert [m.name for m in Places(frame).members_at("set:weld")] == ["AB", "BC"]
+    assert len(ModelPlaces(Model.of(frame)).elements("material:brass")) == 6
     drawn = find_wireframe(two_metals.model, ["set:weld"]).place("set:weld")
     assert [span.member for span in drawn.spans] == [0, 1]
 
@@ -127,12 +127,12 @@ def test_equal_families_are_one_place(ladder: FrameBuilder) -> None:
         sets=(MemberSet("rungs", RUNGS), MemberSet("across", RUNGS), MemberSet("one", ("BE",))),
         families=(MemberSet("section:thick", SIDES), MemberSet("material:aluminium", SIDES)),
     )
-    assert set_places(frame) == ("set:rungs",)
-    assert set_places(frame, ("material",)) == ("material:aluminium",)
-    assert match(frame, "set:rungs", "set:across")
-    assert match(frame, "set:one", "BE")
-    assert match(frame, "section:thick", "material:aluminium")
-    assert not match(frame, "set:rungs", "all")
+    assert Places(frame).sets() == ("set:rungs",)
+    assert Places(frame).sets(("material",)) == ("material:aluminium",)
+    assert Places(frame).match("set:rungs", "set:across")
+    assert Places(frame).match("set:one", "BE")
+    assert Places(frame).match("section:thick", "material:aluminium")
+    assert not Places(frame).match("set:rungs", "all")
 
 
 def test_a_set_comes_back_from_the_file(two_metals: Case, tmp_path: Path) -> None:
@@ -171,14 +171,14 @@ def test_a_family_changes_as_its_members_do(effect: type, two_metals: Case) -> N
     frame = model.frame_structure.frame
     changed = one.frame(frame, place, [0.2])
     assert {m.name for m, n in zip(frame.members, changed.members, strict=True) if m != n} == set(
-        members_of(frame, place)
+        Places(frame).members(place)
     )
 
 
 def test_a_wall_changes_all_constants_as_the_shape_does(
     ladder: FrameBuilder, portal: FrameBuilder
 ) -> None:
-    thick = rectangular_tube(0.0254, 0.0254, 1.2 * 0.00238)
+    thick = Section.rectangular_tube(0.0254, 0.0254, 1.2 * 0.00238)
     (plain,) = {m.section for m in ladder(polar=False).members}
     frame = WallThickness().frame(ladder(polar=False), "BE", [0.2])
     changed = frame.members[frame.member_index["BE"]].section
@@ -197,7 +197,7 @@ def test_a_wall_changes_all_constants_as_the_shape_does(
 
 def test_a_wall_is_that_of_a_tube(ladder: FrameBuilder, hframe: FrameBuilder) -> None:
     frame = ladder()
-    ring, bar = round_tube(0.02, 0.002), round_tube(0.02, 0.01)
+    ring, bar = Section.round_tube(0.02, 0.002), Section.round_tube(0.02, 0.01)
     sections = {"BE": ring, "CF": bar}
     members = tuple(replace(m, section=sections.get(m.name, m.section)) for m in frame.members)
     places = WallThickness().places(Model.of(replace(frame, members=members)))

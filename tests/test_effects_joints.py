@@ -10,20 +10,11 @@ from diagnosis_problems import case_of, clamped_portal, measured
 from effect_checks import compare
 
 from femubench import Model, diagnose
-from femubench.fem import (
-    Frame,
-    Joint,
-    JointSpring,
-    Material,
-    Member,
-    Place,
-    Support,
-    rectangular_tube,
-)
+from femubench.fem import Frame, Joint, JointSpring, Material, Member, Place, Section, Support
 from femubench.plugins.effects.joint_flexibility import JointFlexibility
 from femubench.plugins.effects.joint_rotation import JointRotation
 
-TUBE, STEEL = rectangular_tube(0.06, 0.04, 0.003), Material(207e9, 0.3, 7850.0)
+TUBE, STEEL = Section.rectangular_tube(0.06, 0.04, 0.003), Material(207e9, 0.3, 7850.0)
 
 
 def portal(elements: int) -> Frame:

@@ -24,14 +24,14 @@ from femubench.fem import (
     Member,
     ModelError,
     Place,
+    Section,
     Support,
-    solid_rectangle,
 )
 from femubench.plugins.effects.support_added import SupportAdded
 from femubench.plugins.effects.support_position import SupportPosition
 from femubench.plugins.effects.support_removed import SupportRemoved
 
-LENGTH, SECTION, STEEL = 1.0, solid_rectangle(0.03, 0.012), Material(207e9, 0.3, 7850.0)
+LENGTH, SECTION, STEEL = 1.0, Section.solid_rectangle(0.03, 0.012), Material(207e9, 0.3, 7850.0)
 SPEED = np.sqrt(STEEL.E * SECTION.Iy / (STEEL.rho * SECTION.A)) / (2.0 * np.pi)
 STATIONS = np.array([0.2, 0.4, 0.5, 0.75, 0.9, 1.0])
 ROLLER = 0.6

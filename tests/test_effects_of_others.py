@@ -21,8 +21,8 @@ from femubench.core.conformance.checking import findings, subjects
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
 from femubench.core.look.look import look
 from femubench.core.plugin.loader import load_plugins
+from femubench.core.roles import Effect
 from femubench.diagnosis import list_effects
-from femubench.effect import Effect
 from femubench.reports.cells import figure, format_signed
 from femubench.reports.diagnosis import diagnosis_html, diagnosis_text
 

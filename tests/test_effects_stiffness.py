@@ -11,31 +11,12 @@ import scipy.sparse as sp
 from effect_checks import as_matrices, changed_matrices, check_exact, check_neutral, compare
 
 from femubench import Model, NotApplicable, solve_modes
-from femubench.core.effect.places import match, pair_of
+from femubench.core.effect.places import split_direction
 from femubench.core.fem.frame import Coupling, Factor
 from femubench.core.fem.model import LowRank
-from femubench.effect import (
-    FrameEffect,
-    elements_of,
-    ends_of,
-    joint_types,
-    point_of,
-    point_places,
-    rate_nodes,
-    split_direction,
-    type_place,
-)
-from femubench.fem import (
-    Frame,
-    JointSpring,
-    ModelError,
-    Place,
-    PointMass,
-    RigidEnd,
-    Structure,
-    mass_matrices,
-    stiffness_matrices,
-)
+from femubench.effect import FrameEffect, ModelPlaces, Places
+from femubench.fem import Frame, JointSpring, ModelError, Place, PointMass, RigidEnd, Structure
+from femubench.plugins.effects.flexible_ends import rate_nodes
 from femubench.plugins.effects.joint_offset import JointOffset
 from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.local_stiffness_loss import LocalStiffnessLoss
@@ -142,9 +123,9 @@ def test_couplings_and_massless_arms_go_with_their_member(
     model = Model.of(structure)
     for effect, at in ((YoungsModulus(), 0), (MemberStiffness(), 5), (TorsionConstant(), 0)):
         check_exact(effect, model, effect.places(model)[at], [0.4])
-    assert len(elements_of(structure, "m5")) == 2
-    assert len(elements_of(structure, "m5", arms=True)) == 3
-    assert len(elements_of(structure, "m5/2", arms=True)) == 1
+    assert len(ModelPlaces(Model.of(structure)).elements("m5")) == 2
+    assert len(ModelPlaces(Model.of(structure)).elements("m5", arms=True)) == 3
+    assert len(ModelPlaces(Model.of(structure)).elements("m5/2", arms=True)) == 1
 
 
 def test_places(models: dict[str, Model]) -> None:
@@ -170,7 +151,7 @@ def test_one_member_is_all(ladder: FrameBuilder) -> None:
     model = Model.of(replace(frame, members=frame.members[:1], joints=frame.joints[:2]))
     for effect in (MemberStiffness(), MemberMass(), JointRotation(), JointOffset()):
         assert effect.places(model) == ()
-    assert match(model.frame_structure.frame, "AB", "all")
+    assert Places(model.frame_structure.frame).match("AB", "all")
 
 
 def held_element_frequency(model: Model) -> float:
@@ -178,7 +159,7 @@ def held_element_frequency(model: Model) -> float:
     properties = model.frame_structure.properties
     turning = [3] if model.frame_structure.frame.plane != "in-plane" else []
     turning += [4, 5] if model.frame_structure.frame.plane == "3d" else [4]
-    stiffness, mass = stiffness_matrices(properties), mass_matrices(properties)
+    stiffness, mass = properties.stiffness_matrices(), properties.mass_matrices()
     ratio = [stiffness[:, i, i] / mass[:, i, i] for i in turning]
     return float(np.sqrt(np.min(ratio)) / (2.0 * np.pi))
 
@@ -300,10 +281,10 @@ def test_matrices_without_a_frame(models: dict[str, Model]) -> None:
 def test_loss_takes_split_elements_whole(ladder: FrameBuilder) -> None:
     masses = (PointMass(Place(member="AB", s=0.3), 0.05),)
     model = Model.of(replace(ladder(), masses=masses))
-    rows = elements_of(model.frame_structure, "AB/2")
+    rows = ModelPlaces(model).elements("AB/2")
     assert len(rows) == 2
-    assert len(elements_of(model.frame_structure, "AB")) == 5
-    assert len(elements_of(model.frame_structure, "all")) == 29
+    assert len(ModelPlaces(model).elements("AB")) == 5
+    assert len(ModelPlaces(model).elements("all")) == 29
     check_exact(LocalStiffnessLoss(), model, "AB/2", [0.4])
     for half in LocalStiffnessLoss().finer(model, "AB/2"):  # tabulated
         found = compare(LocalStiffnessLoss(), model, half, [0.4])
@@ -311,50 +292,50 @@ def test_loss_takes_split_elements_whole(ladder: FrameBuilder) -> None:
     assert not LocalStiffnessLoss().finer(model, "AB/2:first")
     for wrong in ("AB/9", "AB/x", "XY", "XY/1"):
         with pytest.raises(ModelError, match="there is no place"):
-            elements_of(model.frame_structure, wrong)
+            ModelPlaces(model).elements(wrong)
 
 
 def test_words_for_joints_and_ends(ladder: FrameBuilder, hframe: FrameBuilder) -> None:
     frame = ladder()
-    assert joint_types(frame) == {"L": ("A", "C", "D", "F"), "T": ("B", "E")}
-    assert ends_of(frame, "B") == ("AB@B", "BC@B", "BE@B")
-    assert len(ends_of(frame, "T")) == len(ends_of(frame, "type:T")) == 6
-    assert ends_of(frame, "BE@E") == ("BE@E",)
+    assert frame.joint_types == {"L": ("A", "C", "D", "F"), "T": ("B", "E")}
+    assert Places(frame).ends_of("B") == ("AB@B", "BC@B", "BE@B")
+    assert len(Places(frame).ends_of("T")) == len(Places(frame).ends_of("type:T")) == 6
+    assert Places(frame).ends_of("BE@E") == ("BE@E",)
     for wrong in ("X", "type:X", "AB@F", "AB", "all"):
         with pytest.raises(ModelError, match="no member ends at"):
-            ends_of(frame, wrong)
-    assert type_place(frame, "L") == "L"
+            Places(frame).ends_of(wrong)
+    assert Places(frame).types()[0] == "L"
     joints = tuple(replace(j, type="A" if j.type == "L" else j.type) for j in frame.joints)
     clash = replace(frame, joints=joints)
-    assert type_place(clash, "A") == "type:A"
-    assert len(ends_of(clash, "A")) == 2
-    assert len(ends_of(clash, "type:A")) == 8
+    assert Places(clash).types()[0] == "type:A"
+    assert len(Places(clash).ends_of("A")) == 2
+    assert len(Places(clash).ends_of("type:A")) == 8
     assert JointRotation().places(Model.of(clash))[:2] == ("type:A", "T")
-    assert joint_types(hframe()) == {"T": ("T1", "T2")}
+    assert hframe().joint_types == {"T": ("T1", "T2")}
 
 
 def test_words_for_points(models: dict[str, Model]) -> None:
     frame = models["ladder"].frame_structure.frame
-    assert point_of(frame, "A:z") == Place(joint="A")
-    assert point_of(frame, "AB@0.25:-rx") == Place(member="AB", s=0.25)
-    assert point_of(frame, "AB@0") == point_of(frame, "AB@A") == Place(joint="A")
-    assert point_of(frame, "AB@1") == Place(joint="B")
+    assert Places(frame).point("A:z") == Place(joint="A")
+    assert Places(frame).point("AB@0.25:-rx") == Place(member="AB", s=0.25)
+    assert Places(frame).point("AB@0") == Places(frame).point("AB@A") == Place(joint="A")
+    assert Places(frame).point("AB@1") == Place(joint="B")
     assert split_direction("AB@0.25:-rx") == ("AB@0.25", "-rx")
     assert split_direction("type:x") == ("type:x", None)
     assert split_direction("type:x:z") == ("type:x", "z")
     assert split_direction("A") == ("A", None)
     for wrong in ("AB@1.5", "XY@0.5", "AB@half", "AB", "X"):
         with pytest.raises(ModelError):
-            point_of(frame, wrong)
-    places = point_places(models["ladder"])
+            Places(frame).point(wrong)
+    places = ModelPlaces(models["ladder"]).points()
     assert places[:9] == (*"ABCDEF", "AB@0.25", "AB@0.5", "AB@0.75")
     # Stations between mesh nodes are of no use: they would split an element.
     thirds = replace(frame, members=tuple(replace(m, elements=3) for m in frame.members))
-    assert point_places(Model.of(thirds))[6:8] == ("AB@0.333333", "AB@0.666667")
-    assert point_of(thirds, "AB@0.333333").s == 1 / 3
+    assert ModelPlaces(Model.of(thirds)).points()[6:8] == ("AB@0.333333", "AB@0.666667")
+    assert Places(thirds).point("AB@0.333333").s == 1 / 3
     tenths = replace(frame, members=tuple(replace(m, elements=10) for m in frame.members))
-    assert point_places(Model.of(tenths))[6:9] == ("AB@0.2", "AB@0.5", "AB@0.8")
-    assert point_places(matrix_model(models["ladder"]))[:2] == ("n0", "n1")
+    assert ModelPlaces(Model.of(tenths)).points()[6:9] == ("AB@0.2", "AB@0.5", "AB@0.8")
+    assert ModelPlaces(matrix_model(models["ladder"])).points()[:2] == ("n0", "n1")
 
 
 def test_same_place_in_other_words(ladder: FrameBuilder, portal: FrameBuilder) -> None:
@@ -362,20 +343,20 @@ def test_same_place_in_other_words(ladder: FrameBuilder, portal: FrameBuilder) -
     same = "A=AB@A AB@A=AD@A type:L=L A:z=AB@0:-z A-E=E-A AB@0.250001=AB@0.25"
     other = "B=AB@B AB@B=BC@B L=A A=A:z A:z=A:x AB=AB/1 AB/1=AB/2 AB=all A-E=A-F AB@0.25=AB@0.5"
     for a, b in (pair.split("=") for pair in same.split()):
-        assert match(frame, a, b), (a, b)
-        assert match(frame, b, a), (a, b)
+        assert Places(frame).match(a, b), (a, b)
+        assert Places(frame).match(b, a), (a, b)
     for a, b in (pair.split("=") for pair in other.split()):
-        assert not match(frame, a, b), (a, b)
+        assert not Places(frame).match(a, b), (a, b)
     joints = tuple(replace(j, type="lone" if j.name == "J3" else "") for j in portal(3).joints)
     lone = replace(portal(3), joints=joints)
-    assert match(lone, "lone", "J3")
-    assert match(lone, "m0@J0", "J0")
+    assert Places(lone).match("lone", "J3")
+    assert Places(lone).match("m0@J0", "J0")
     dashed = replace(frame, joints=tuple(replace(j, name=f"p-{j.name}") for j in frame.joints))
     members = tuple(replace(m, ends=(f"p-{m.ends[0]}", f"p-{m.ends[1]}")) for m in frame.members)
     dashed = replace(dashed, members=members, masses=())
-    assert pair_of(dashed, "p-A-p-E") == ("p-A", "p-E")
+    assert Places(dashed).pair("p-A-p-E") == ("p-A", "p-E")
     with pytest.raises(ModelError, match="no pair of joints"):
-        pair_of(dashed, "A-E")
+        Places(dashed).pair("A-E")
 
 
 def test_many_rates_are_interpolated() -> None:
@@ -422,7 +403,7 @@ def test_directions_apart_and_a_free_arm(
     (spring,) = effect.frame(frame, "BE@B:apart", [3e3, 4e2, 0.5]).joint_springs
     assert spring.stiffness == {"ry": 3e3, "rx": 4e2}
     assert spring.arm == pytest.approx(0.5 * 0.0127)
-    assert match(frame, "BE@B:apart", "BE@B")
-    assert match(frame, "A:apart", "AB@A")
-    assert not match(frame, "BE@B:apart", "BE@E")
-    assert ends_of(frame, "BE@B:apart") == ("BE@B",)
+    assert Places(frame).match("BE@B:apart", "BE@B")
+    assert Places(frame).match("A:apart", "AB@A")
+    assert not Places(frame).match("BE@B:apart", "BE@E")
+    assert Places(frame).ends_of("BE@B:apart") == ("BE@B",)

@@ -14,9 +14,9 @@ from scipy.optimize import brentq
 from femubench import Measurement, Model, Sensors, diagnose
 from femubench.core.conformance.place_words import has_place
 from femubench.core.drawing.places import find_wireframe
-from femubench.core.effect.places import match
+from femubench.core.effect.places import split_direction
 from femubench.core.fem.model import common_dofs
-from femubench.effect import Site, members_at, split_direction, support_places, supports_of
+from femubench.effect import Places, Site
 from femubench.fem import (
     FloatArray,
     Frame,
@@ -26,8 +26,8 @@ from femubench.fem import (
     Member,
     ModelError,
     Place,
+    Section,
     Support,
-    solid_rectangle,
 )
 from femubench.plugins.effects.support_flexibility import SupportFlexibility
 
@@ -102,24 +102,24 @@ def test_words_of_supports(held: list[Model]) -> None:
     frame = held[0].frame_structure.frame
     assert split_direction("support:A:rz") == ("support:A", "rz")
     assert split_direction("support:x") == ("support:x", None)
-    assert match(frame, "support:F", "support:F:z")
-    assert not match(frame, "support:A", "support:A:z")
-    assert not match(frame, "support:A:rx", "A:rx")
-    assert supports_of(frame, "support:A:z") == {"A": {"z": np.inf}}
-    assert [m.name for m in members_at(frame, "support:A:z")] == ["AB", "AD"]
+    assert Places(frame).match("support:F", "support:F:z")
+    assert not Places(frame).match("support:A", "support:A:z")
+    assert not Places(frame).match("support:A:rx", "A:rx")
+    assert Places(frame).supports_of("support:A:z") == {"A": {"z": np.inf}}
+    assert [m.name for m in Places(frame).members_at("support:A:z")] == ["AB", "AD"]
     for word in ("support:C", "support:F:rx", "F"):
         with pytest.raises(ModelError, match="no support"):
-            supports_of(frame, word)
+            Places(frame).supports_of(word)
     site = Site(frame, "support:BC@0.4:z", 1.0, np.array([1.0]))
     assert [m.name for m in site.members] == ["BC"]
-    drawn = find_wireframe(held[0], support_places(frame))
+    drawn = find_wireframe(held[0], Places(frame).supports())
     corner = drawn.place("support:A:ry")
     assert corner.kind == "point"
     assert corner.points == ((0.0, 0.0, 0.0),)
     assert len(drawn.place("support:all").points) == 3
 
 
-LENGTH, SECTION, STEEL = 1.2, solid_rectangle(0.03, 0.012), Material(207e9, 0.3, 7850.0)
+LENGTH, SECTION, STEEL = 1.2, Section.solid_rectangle(0.03, 0.012), Material(207e9, 0.3, 7850.0)
 EI = STEEL.E * SECTION.Iy
 STATIONS = np.linspace(0.1, 1.0, 10)
 

@@ -11,7 +11,7 @@ import pytest
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame, Joint, Material, Member
 from femubench.core.fem.model import LowRank, Model
-from femubench.core.fem.sections import round_tube
+from femubench.core.fem.sections import Section
 from femubench.core.modal.eigen import (
     DENSE_LIMIT,
     count_evaluations,
@@ -80,7 +80,7 @@ def test_matrices_that_are_not_finite_are_refused(ladder: FrameBuilder) -> None:
 
 
 def test_repeated_eigenvalues_give_orthonormal_shapes() -> None:
-    section = round_tube(0.02, 0.002)
+    section = Section.round_tube(0.02, 0.002)
     joints = (Joint("A", (0.0, 0.0, 0.0)), Joint("B", (0.3, 0.4, 0.5)))
     member = Member("m", ("A", "B"), 6, section, Material(70e9, 0.3, 2700.0))
     model = Model.of(Frame("3d", "euler-bernoulli", joints, (member,)))

@@ -12,7 +12,6 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from femubench.core.errors import NotApplicable
-from femubench.core.fem.beam import stiffness_matrices
 from femubench.core.fem.frame import (
     Frame,
     Joint,
@@ -26,20 +25,18 @@ from femubench.core.fem.frame import (
 )
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
-from femubench.core.fem.sections import rectangular_tube
+from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.update.element_families import (
+    ElementFamily,
     free_terms,
-    generic_family,
     half_turn,
     mid_plane_mirror,
-    nobari_family,
     operations_of,
-    physical_family,
     scale_strain_vectors,
     strain_mode_signs,
 )
@@ -51,13 +48,13 @@ from femubench.core.update.equation_error import (
     smallest_core_eigenvalue,
     solve_least_change,
 )
-from femubench.core.update.quasi import QuasiModes, quasi_measured_modes
+from femubench.core.update.quasi import QuasiModes
 from femubench.plugins.strategies.generic import GenericAdjusted, GenericLS
 from femubench.plugins.strategies.nobari import Nobari, NobariRigid
 from femubench.plugins.strategies.physical import Physical
 
 RNG = np.random.default_rng(0)
-TUBE = rectangular_tube(0.0254, 0.0254, 0.00238)
+TUBE = Section.rectangular_tube(0.0254, 0.0254, 0.00238)
 STIFF_TUBE = replace(TUBE, J=TUBE.Jp)
 PRINTED = (226.8, 275.2, 537.4)
 WIDTH = 0.2794
@@ -204,7 +201,7 @@ def test_tied_cores_do_not_depend_on_the_direction_a_member_is_drawn_in(plane: A
     matrices, names = [], []
     for reverse in (False, True):
         model = one_member(reverse, plane)
-        family = generic_family(model.frame_structure, tied=True)
+        family = ElementFamily.generic(model.frame_structure, tied=True)
         x = {name: 0.1 * np.cos(1 + i) for i, name in enumerate(sorted(family.names))}
         matrices.append(stiffness_by_place(model, family, np.array([x[n] for n in family.names])))
         names.append(set(family.names))
@@ -218,10 +215,10 @@ def test_tied_cores_do_not_depend_on_the_direction_a_member_is_drawn_in(plane: A
 
 def test_symmetry_classes_set_the_number_of_parameters() -> None:
     structure = Structure.build(ladder())
-    assert len(generic_family(structure, plain="full", joint="full")) == 28 * 3
-    assert len(generic_family(structure, plain="mirror", joint="half-turn")) == 28 * 4
-    assert len(generic_family(structure, plain="none")) == 28 * 6
-    assert len(generic_family(structure, plain="full", joint="full", tied=True)) == 9
+    assert len(ElementFamily.generic(structure, plain="full", joint="full")) == 28 * 3
+    assert len(ElementFamily.generic(structure, plain="mirror", joint="half-turn")) == 28 * 4
+    assert len(ElementFamily.generic(structure, plain="none")) == 28 * 6
+    assert len(ElementFamily.generic(structure, plain="full", joint="full", tied=True)) == 9
 
 
 ENDS = (
@@ -236,15 +233,15 @@ def test_nominal_elements_are_made_of_their_strain_modes(plane: Any, beam: Any) 
     structure = Structure.build(ladder(plane, beam, rigid_ends=ENDS))
     vectors = scale_strain_vectors(structure, np.arange(28))
     moving = np.outer(structure.active_local, structure.active_local)
-    stiffness = stiffness_matrices(structure.properties) * moving
+    stiffness = structure.properties.stiffness_matrices() * moving
     built = vectors @ np.swapaxes(vectors, 1, 2)
     assert built == pytest.approx(stiffness, abs=1e-12 * np.abs(stiffness).max())
 
 
 def all_families(structure: Any) -> Any:
-    yield physical_family(structure)
-    yield generic_family(structure)
-    yield generic_family(structure, tied=True)
+    yield ElementFamily.physical(structure)
+    yield ElementFamily.generic(structure)
+    yield ElementFamily.generic(structure, tied=True)
 
 
 @pytest.mark.parametrize("plane", ["out-of-plane", "3d"])
@@ -260,7 +257,7 @@ def test_families_with_cores_keep_rigid_modes_for_any_parameters(plane: Any) -> 
 
 def test_physical_factor_equals_the_parameter_of_the_structure() -> None:
     structure = NOMINAL.frame_structure
-    family = physical_family(structure)
+    family = ElementFamily.physical(structure)
     x = np.zeros(len(family))
     x[family.names.index("EI rung1/3")] = 0.25
     x[family.names.index("GJ side00/1")] = -0.4
@@ -279,7 +276,7 @@ def test_massless_arms_and_their_joint_springs_stay_as_they_are() -> None:
     model = Model.of(ladder(joint_springs=springs))
     structure = model.frame_structure
     assert (structure.properties.rhoA == 0.0).sum() == 1
-    for family in (*all_families(structure), nobari_family(structure)):
+    for family in (*all_families(structure), ElementFamily.nobari(structure)):
         assert len(family.elements) == 28
         change = family.change(np.ones(len(family)))
         assert not change[structure.properties.rhoA == 0.0].any()
@@ -289,7 +286,7 @@ def test_massless_arms_and_their_joint_springs_stay_as_they_are() -> None:
 
 def test_nobari_terms_are_those_of_equation_20_and_obey_21() -> None:
     structure = NOMINAL.frame_structure
-    family = nobari_family(structure)
+    family = ElementFamily.nobari(structure)
     p, L = structure.properties, float(structure.properties.length[0])
     w, slope, twist = [2, 8], [4, 10], [3, 9]  # slope = -ry
     k1, k2, k3, k4 = family.patterns[0]
@@ -300,12 +297,12 @@ def test_nobari_terms_are_those_of_equation_20_and_obey_21() -> None:
     assert k3[np.ix_(slope, slope)] == pytest.approx(nominal[2] * np.array([[2, 1], [1, 2]]))
     assert k4[np.ix_(twist, twist)] == pytest.approx(p.GJ[0] / L * np.array([[1, -1], [-1, 1]]))
     assert family.patterns.sum(axis=1) == pytest.approx(
-        stiffness_matrices(p) * np.outer(structure.active_local, structure.active_local), abs=1e-6
+        p.stiffness_matrices() * np.outer(structure.active_local, structure.active_local), abs=1e-6
     )
 
 
 def test_rigid_modes_leave_of_nobari_the_physical_parameters() -> None:
-    family = nobari_family(NOMINAL.frame_structure)
+    family = ElementFamily.nobari(NOMINAL.frame_structure)
     basis = rigid_basis(NOMINAL, family, rigid_modes_of(NOMINAL))
     assert basis.shape == (112, 56)
     k1, k2, k3, _ = basis.reshape(28, 4, 56).transpose(1, 0, 2)
@@ -331,13 +328,13 @@ def test_a_truth_of_the_family_is_found_from_shapes_at_all_dofs(
     name: Any, orthogonality: Any
 ) -> None:
     make = {
-        "physical": physical_family,
-        "nobari": nobari_family,
-        "generic": generic_family,
-        "adjusted": lambda s: generic_family(s, tied=True),
+        "physical": ElementFamily.physical,
+        "nobari": ElementFamily.nobari,
+        "generic": ElementFamily.generic,
+        "adjusted": lambda s: ElementFamily.generic(s, tied=True),
     }[name]
     family = make(NOMINAL.frame_structure)
-    physical = physical_family(NOMINAL.frame_structure)
+    physical = ElementFamily.physical(NOMINAL.frame_structure)
     if name == "nobari":  # the truth must have real modes: EI and GJ alone
         x = 0.2 * RNG.uniform(-1, 1, len(physical))
         x = x.reshape(28, 2)[:, [0, 0, 0, 1]].ravel()
@@ -351,7 +348,7 @@ def test_a_truth_of_the_family_is_found_from_shapes_at_all_dofs(
 
 
 def test_few_equations_give_the_smallest_change() -> None:
-    family = nobari_family(NOMINAL.frame_structure)
+    family = ElementFamily.nobari(NOMINAL.frame_structure)
     matrix = sp.csr_array(RNG.standard_normal((30, len(family))))
     right = RNG.standard_normal(30)
     found = solve_least_change(matrix, right, family, None)
@@ -364,12 +361,12 @@ def test_few_equations_give_the_smallest_change() -> None:
 
 
 def small_family() -> Any:
-    return generic_family(one_member(False, "out-of-plane").frame_structure, tied=True)
+    return ElementFamily.generic(one_member(False, "out-of-plane").frame_structure, tied=True)
 
 
 def test_bounded_factors_solve_the_convex_problem() -> None:
     # With diagonal A'A and scalar cores the answer is known: every factor on its own.
-    family = physical_family(one_member(False, "out-of-plane").frame_structure)
+    family = ElementFamily.physical(one_member(False, "out-of-plane").frame_structure)
     best = np.linspace(-3.0, 0.5, len(family))
     normal = np.diag(np.linspace(1.0, 5.0, len(family)))
     x = nearest_positive(family, normal, best)
@@ -475,7 +472,7 @@ def test_stiffness_stays_positive_and_free_with_noisy_shapes(
 def test_cores_stay_positive_where_plain_least_squares_is_indefinite() -> None:
     # Frequencies that no frame like this has: modes 1 and 3 stiffened, mode 2 softened.
     contradiction = measured(TRUTH, at_13_points(), (300.0, 170.0, 700.0))
-    quasi = quasi_measured_modes(NOMINAL, contradiction)
+    quasi = QuasiModes.of(NOMINAL, contradiction)
     for family in all_families(NOMINAL.frame_structure):
         a, b, _ = equations(NOMINAL, family, quasi, orthogonality=True)
         free = solve_least_change(a, b, replace(family, cores=None), None)
@@ -522,5 +519,5 @@ def test_reasons_why_a_case_does_not_apply() -> None:
 def test_a_joint_type_called_plain_is_a_set_of_its_own() -> None:
     frame = ladder()
     joints = tuple(replace(j, type="plain") if j.type == "T" else j for j in frame.joints)
-    family = generic_family(Structure.build(replace(frame, joints=joints)), tied=True)
+    family = ElementFamily.generic(Structure.build(replace(frame, joints=joints)), tied=True)
     assert len(family) == 16

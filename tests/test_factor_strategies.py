@@ -19,7 +19,7 @@ from femubench import (
     read_case,
     solve_modes,
 )
-from femubench.core.update.l_curve import l_curve_curvature
+from femubench.core.update.change_lists import element_sets
 from femubench.fem import (
     Frame,
     Joint,
@@ -35,21 +35,18 @@ from femubench.modal import mac, rigid_modes_of
 from femubench.plugins.strategies.bayesian import Bayesian
 from femubench.plugins.strategies.cma_es import CmaEs
 from femubench.plugins.strategies.cross_model import CrossModel, cross_equations
-from femubench.plugins.strategies.eigensensitivity import Eigensensitivity
-from femubench.plugins.strategies.multi_start import MultiStart
-from femubench.plugins.strategies.secant import Secant
-from femubench.plugins.strategies.sparse import Sparse
-from femubench.plugins.strategies.strain_energy import StrainEnergy, energy_change_index
-from femubench.scenarios import HERE
-from femubench.update import (
-    element_sets,
+from femubench.plugins.strategies.eigensensitivity import (
+    Eigensensitivity,
     l_curve_corner,
-    lasso,
-    modal_space,
-    parameterise,
-    quasi_measured_modes,
+    l_curve_curvature,
     tikhonov,
 )
+from femubench.plugins.strategies.multi_start import MultiStart
+from femubench.plugins.strategies.secant import Secant
+from femubench.plugins.strategies.sparse import Sparse, lasso
+from femubench.plugins.strategies.strain_energy import StrainEnergy, energy_change_index
+from femubench.scenarios import HERE
+from femubench.update import Changes, ModalSpace, QuasiModes
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
 BAR = Section(4e-4, 1.2e-8, 1.2e-8, 2e-8, 2.4e-8)
@@ -114,7 +111,7 @@ def planted(
 ) -> tuple[Model, Measurement]:
     """Return a frame and exact modes of the same with one member softer, seen everywhere."""
     model = Model.of(frame)
-    parts = parameterise(model, "members")
+    parts = Changes(model).parameterise("members")
     factors = np.where(np.array(parts.names) == f"E {member}", factor, 1.0)
     return model, exact(parts.at(np.log(factors)), everywhere(model), count)
 
@@ -150,7 +147,7 @@ def test_no_equation_asks_for_what_the_expanded_shapes_cannot_have() -> None:
     Such modes had equations of their own, with a zero on the right for any measured shape.
     """
     model, measurement = planted(frame_of_five(), "m-CD", 6)
-    parts, quasi = parameterise(model, "own"), quasi_measured_modes(model, measurement)
+    parts, quasi = Changes(model).parameterise("own"), QuasiModes.of(model, measurement)
     own = solve_modes(model).elastic
     every = own.take(np.arange(18))
     _, right = cross_equations(parts, every, quasi.shapes, measurement.eigenvalues)
@@ -235,10 +232,10 @@ def test_results_keep_rigid_motion_and_positive_stiffness_far_from_any_fit() -> 
 def test_slopes_are_those_of_differences_and_few_shapes_give_the_same_frequencies() -> None:
     case = femubench.cases["frame"]
     measurement = case.used_measurement()
-    parts = parameterise(case.model, "members")
+    parts = Changes(case.model).parameterise("members")
     log, step = 0.2 * np.sin(np.arange(len(parts))), 1e-5
-    whole = modal_space(parts, measurement, shape_weight=0.1)
-    few = modal_space(parts, measurement, shape_weight=0.1, size=40)
+    whole = ModalSpace.of(parts, measurement, shape_weight=0.1)
+    few = ModalSpace.of(parts, measurement, shape_weight=0.1, size=40)
     for space in (whole, few):
         ahead, behind = (
             [space.fit(log + sign * step * unit).residual for unit in np.eye(len(parts))]
@@ -263,8 +260,8 @@ def test_a_model_that_loses_a_mode_fits_no_better_than_before() -> None:
     model = Model.of(cantilever())
     first = exact(model, everywhere(model), 1)
     bare = replace(first, shapes=np.full_like(first.shapes, np.nan))
-    parts = parameterise(model, "members")
-    space = modal_space(parts, bare, shape_weight=0.0)
+    parts = Changes(model).parameterise("members")
+    space = ModalSpace.of(parts, bare, shape_weight=0.0)
     fits = [space.fit(np.full(len(parts), 2.0 * np.log(r))) for r in (0.9, 0.8, 0.73, 0.7, 0.5)]
     assert [fit.paired for fit in fits] == [1, 1, 1, 0, 0]
     costs = [fit.cost for fit in fits]
@@ -277,8 +274,8 @@ def test_modes_of_one_frequency_turn_by_no_rounding() -> None:
     model, measurement = planted(tower(), "m-N", 6)
     hertz = solve_modes(model).natural_frequencies
     assert hertz[[1, 3]] == pytest.approx(hertz[[0, 2]], rel=1e-9)
-    parts = parameterise(model, "members")
-    space = modal_space(parts, exact(model, everywhere(model), 4), shape_weight=1.0)
+    parts = Changes(model).parameterise("members")
+    space = ModalSpace.of(parts, exact(model, everywhere(model), 4), shape_weight=1.0)
     slope = space.fit(np.zeros(len(parts))).slope
     assert slope[:4].sum(axis=1) == pytest.approx([-0.5] * 4)
     assert slope[4:].sum(axis=1) == pytest.approx(np.zeros(len(slope) - 4), abs=1e-9)
@@ -348,7 +345,7 @@ def test_the_secant_adjustment_is_that_of_quasi_newton_methods() -> None:
 def test_parts_make_the_stiffness_and_sets_name_what_the_frame_has() -> None:
     frame = frame_of_five()
     model = Model.of(frame)
-    parts = parameterise(model, "members")
+    parts = Changes(model).parameterise("members")
     every = np.eye(model.size)
     matrices = parts.energies(every, every)
     np.testing.assert_allclose(
@@ -364,7 +361,7 @@ def test_parts_make_the_stiffness_and_sets_name_what_the_frame_has() -> None:
     assert (
         np.abs(parts.at(np.log(factors)).stiffness - summed).max() < 1e-9 * np.abs(stiffness).max()
     )
-    assert len(parameterise(model, "elements")) == 10
+    assert len(Changes(model).parameterise("elements")) == 10
     ring = MemberSet("ring", ("m-AB", "m-BC", "m-CD", "m-DA"))
     sets = replace(frame, sets=(ring, MemberSet("mast", ("m-DE",))))
     assert list(element_sets(Structure.build(sets), "sets")) == ["set:ring", "set:mast"]
@@ -379,7 +376,7 @@ def test_parts_make_the_stiffness_and_sets_name_what_the_frame_has() -> None:
 
 def test_groups_of_matrices_have_factors_too() -> None:
     model, measurement = planted(frame_of_five(), "m-CD", 6)
-    parts = parameterise(model, "members")
+    parts = Changes(model).parameterise("members")
     energies = parts.energies(np.eye(model.size), np.eye(model.size))
     groups = {"mast": sp.csc_array(energies[4]), "back": sp.csc_array(energies[2])}
     matrices = replace(model, structure=None, groups=groups)

@@ -24,7 +24,7 @@ from femubench.core.fem.frame import (
     Support,
 )
 from femubench.core.fem.model import LowRank, Model
-from femubench.core.fem.sections import round_tube
+from femubench.core.fem.sections import Section
 from femubench.core.modal import sparse_eigen, superlu_pivots
 from femubench.core.modal.eigen import dense_matrices, solve_dense
 from femubench.core.modal.factorisation import LU, Cholesky, cholmod_obstacle
@@ -33,7 +33,7 @@ from femubench.core.modal.sparse_eigen import ShiftedModel, lowest_eigenpairs
 from femubench.core.modal.superlu_pivots import pivots
 
 FrameBuilder = Callable[..., Frame]
-TUBE, ALUMINIUM = round_tube(0.02, 0.002), Material(70e9, 0.3, 2700.0)
+TUBE, ALUMINIUM = Section.round_tube(0.02, 0.002), Material(70e9, 0.3, 2700.0)
 BACK_ENDS = ("SuperLU", "CHOLMOD")
 
 

@@ -10,12 +10,7 @@ import pytest
 from scipy.optimize import brentq
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.beam import (
-    BeamProperties,
-    eccentric_mass_parts,
-    mass_matrices,
-    shape_functions,
-)
+from femubench.core.fem.beam import BeamProperties, shape_functions
 from femubench.core.fem.frame import (
     Brace,
     Coupling,
@@ -34,14 +29,14 @@ from femubench.core.fem.frame import (
 )
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.parameters import QUANTITIES, Property
-from femubench.core.fem.sections import Section, constant_kappa
+from femubench.core.fem.sections import Section
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
 from femubench.core.typing import FloatArray
 
 STEEL = Material(210e9, 0.3, 7850.0)
-SECTION = Section(4e-4, 3e-9, 5e-8, 2e-9, 5.3e-8, constant_kappa(0.8))
+SECTION = Section(4e-4, 3e-9, 5e-8, 2e-9, 5.3e-8, Section.constant_kappa(0.8))
 LENGTH = 1.3
 EI, GJ, RHO_A = STEEL.E * SECTION.Iy, STEEL.G * SECTION.J, STEEL.rho * SECTION.A
 MIDDLE = Place(member="m", s=0.5)
@@ -101,7 +96,7 @@ class TestFactors:
         wiry = replace(plain, factors=(Factor("GJ", ("m", "m/2"), 1.5),))
         same(wiry, edited(plain, section=lambda s: replace(s, J=1.5 * s.J)))
         soft = replace(plain, factors=(Factor("shear", ("all",), 4.0),))
-        same(soft, edited(plain, section=lambda s: replace(s, kappa=constant_kappa(0.2))))
+        same(soft, edited(plain, section=lambda s: replace(s, kappa=Section.constant_kappa(0.2))))
         rigid = replace(plain, factors=(Factor("shear", ("all",), 0.0),))
         same(rigid, replace(plain, beam="euler-bernoulli", rotary_inertia=theory == "timoshenko"))
 
@@ -194,9 +189,9 @@ class TestEccentricMass:
             change = moved.T @ moved - rows[:3].T @ rows[:3]
             expected += 0.5 * weight * length * 2.8 * change
         shifted = replace(p, ecc_y=np.full(2, y), ecc_z=np.full(2, z))
-        change = mass_matrices(shifted) - mass_matrices(p)
+        change = shifted.mass_matrices() - p.mass_matrices()
         assert change[1] == pytest.approx(expected, rel=1e-11, abs=1e-12)
-        parts = eccentric_mass_parts(p)
+        parts = p.eccentric_mass_parts()
         total = y * parts["y"] + z * parts["z"] + y * y * parts["yy"] + z * z * parts["zz"]
         assert total + y * z * parts["yz"] == pytest.approx(change, abs=1e-15)
 

@@ -16,19 +16,19 @@ import scipy.sparse as sp
 from femubench import InputError, Measurement, Model, Sensors, cases, read_case, solve_modes
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.writing import write_case
-from femubench.core.change.change import Change, proportional
+from femubench.core.change.change import Change
 from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.change.terms import RowOperator, Term
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.diagnosis.serial import diagnosis_to_json
-from femubench.core.effect.attachments import point_motion
+from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.fem.frame import Place
 from femubench.core.fem.model import Dofs
 from femubench.core.inference.examine import examine
 from femubench.core.look.look import look
 from femubench.diagnosis import list_effects
 from femubench.effect import Parameter
-from femubench.fem import Property, with_group_factors
+from femubench.fem import Groups, Property
 
 CASES = Path(__file__).parent / "cases"
 
@@ -45,9 +45,9 @@ class Tether:
         return (Parameter("stiffness", "N m/rad", 10.0),)
 
     def change(self, model: Model, place: str) -> Change:
-        points = [point_motion(model, Place(joint=name))[[3]] for name in place.split("-")]
+        points = [ModelPlaces(model).motion(Place(joint=name))[[3]] for name in place.split("-")]
         row = points[0] if len(points) == 1 else points[0] - points[1]
-        return proportional(Term("stiffness", RowOperator(row, np.eye(1))))
+        return Change.proportional(Term("stiffness", RowOperator(row, np.eye(1))))
 
 
 TETHER: Any = (Tether(),)
@@ -154,7 +154,7 @@ def test_floors_on_rails_keep_their_springs_as_causes(weights: tuple[float, ...]
 def test_damage_is_no_matter_of_tolerance_where_there_is_a_reference() -> None:
     model, (wanted,) = row_of_masses(), [e for e in list_effects() if e.name == "member-stiffness"]
     storey = [Property("storey-2", "E", ("group:storey-2",))]
-    broken = frequencies_of(with_group_factors(model, storey, [0.56]), 0.03)
+    broken = frequencies_of(Groups(model).with_factors(storey, [0.56]), 0.03)
 
     def loss(reference: Measurement | None) -> float:
         seen = examine(model, broken, [wanted], tolerance=0.0, pairs=False, reference=reference)

@@ -19,12 +19,13 @@ from femubench.core.case.reducing import expand_model, reduce_case
 from femubench.core.case.writing import write_case
 from femubench.core.change.terms import ElementOperator
 from femubench.core.errors import ModelError
-from femubench.core.fem.beam import BeamProperties, mass_matrices, stiffness_matrices
+from femubench.core.fem.beam import BeamProperties
 from femubench.core.modal.grouped_reduction import reduce_groups
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.typing import FloatArray, SparseArray
 from femubench.fem import (
     Frame,
+    Groups,
     Joint,
     Material,
     Member,
@@ -33,7 +34,6 @@ from femubench.fem import (
     Property,
     Section,
     matrix_model,
-    with_group_factors,
 )
 from femubench.plugins.readers import solid_elements
 
@@ -66,11 +66,13 @@ def large() -> Model:
     rows = {m: tuple(range(30 * i, 30 * i + 30)) for i, m in enumerate(("left", "beam", "right"))}
     joints = {JOINT: 29, "joint C": 60}
     groups = {
-        name: part(stiffness_matrices, *sorted({*own}.difference(joints.values())))
+        name: part(BeamProperties.stiffness_matrices, *sorted({*own}.difference(joints.values())))
         for name, own in rows.items()
     }
-    groups |= {name: part(stiffness_matrices, element) for name, element in joints.items()}
-    heavy = {name: part(mass_matrices, *own) for name, own in rows.items()}
+    groups |= {
+        name: part(BeamProperties.stiffness_matrices, element) for name, element in joints.items()
+    }
+    heavy = {name: part(BeamProperties.mass_matrices, *own) for name, own in rows.items()}
     mass, stiffness = sum(heavy.values()), sum(groups.values())
     kinds = structure.mesh.node_keys(4)
     label = ["ABCD"[w] if p == -1 else f"{frame().members[p].name} {n}" for n, (p, w, _) in
@@ -110,8 +112,7 @@ def measured(truth: Model, count: int = 8) -> Measurement:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a case in which a joint is softer by a third and a leg lighter."""
-    truth = with_group_factors(
-        MODEL,
+    truth = Groups(MODEL).with_factors(
         [Property("k", "E", (f"group:{JOINT}",)), Property("m", "density", (f"group:{PART}",))],
         [0.02, 0.9],
     )

@@ -22,6 +22,7 @@ from femubench.effect import Parameter
 from femubench.fem import (
     Frame,
     GroundSpring,
+    Groups,
     Joint,
     Material,
     Member,
@@ -30,9 +31,8 @@ from femubench.fem import (
     Property,
     Section,
     matrix_model,
-    with_group_factors,
 )
-from femubench.modal import eigenvalue_sensitivities, group_prior_std, support_groups
+from femubench.modal import GroupPriors, eigenvalue_sensitivities
 from femubench.plugins.effects.interface_spring import InterfaceSpring
 from femubench.plugins.effects.material import GroupMass, MemberStiffness
 from femubench.plugins.strategies.bayesian import Bayesian
@@ -43,7 +43,7 @@ from femubench.plugins.strategies.physical import Physical
 from femubench.plugins.strategies.sampling import BayesianSampling
 from femubench.scenarios.matlab_footbridge import TEST, VARIABLE
 from femubench.scenarios.nodes_from_stiffness import label_rows
-from femubench.update import parameterise, scale_groups, scale_groups_within
+from femubench.update import Changes
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
 BAR = Section(4e-4, 1.2e-8, 1.2e-8, 2e-8, 2.4e-8)
@@ -78,7 +78,7 @@ def grouped(frame: Frame) -> Model:
     model = Model.of(frame)
     structure = model.frame_structure
     names = [found.name for found in frame.sets]
-    factors = parameterise(model, "sets").properties
+    factors = Changes(model).parameterise("sets").properties
     twice = [structure.with_values([factor], [2.0]).matrices()[1] for factor in factors]
     parts = {n: m - structure.matrices()[1] for n, m in zip(names, twice, strict=True)}
     for name, springs in (("foot", frame.springs[:2]), ("head", frame.springs[2:])):
@@ -105,7 +105,7 @@ def measured(truth: Model, count: int) -> Measurement:
 def changed(factors: dict[str, float]) -> Model:
     """Return the beam with other groups."""
     parameters = [Property(name, "E", (f"group:{name}",)) for name in factors]
-    return with_group_factors(MODEL, parameters, list(factors.values()))
+    return Groups(MODEL).with_factors(parameters, list(factors.values()))
 
 
 DATA = measured(changed(TRUTH), 5)
@@ -127,7 +127,7 @@ def test_strategies_find_the_factors_of_groups(strategy: femubench.Strategy) -> 
 
 def test_the_whole_stiffness_always_has_a_factor() -> None:
     bare = replace(MODEL, groups={}, mass_groups={})
-    stiffer = measured(with_group_factors(bare, [Property("K", "E", ("all",))], [1.21]), 3)
+    stiffer = measured(Groups(bare).with_factors([Property("K", "E", ("all",))], [1.21]), 3)
     for strategy in (Global(), Bayesian(stiffness_std=10.0)):
         (parameter,) = strategy.update(bare, stiffer, RNG).parameters
         assert (parameter.name, parameter.after) == ("stiffness all", pytest.approx(1.21, rel=1e-4))
@@ -147,7 +147,7 @@ def test_reasons_say_what_would_make_a_strategy_applicable() -> None:
 def test_few_frequencies_merge_groups_into_levels() -> None:
     counts = {}
     for count in (1, 2, 3, 4):
-        changes = scale_groups_within(MODEL, count)
+        changes = Changes(MODEL).groups_within(count)
         counts[count] = [change.name.removeprefix("stiffness ") for change in changes]
     assert counts[4] == [f"group:{name}" for name in TRUTH]
     assert counts[3] == ["group:foot", "group:head", "structure"]
@@ -155,22 +155,22 @@ def test_few_frequencies_merge_groups_into_levels() -> None:
 
 
 def test_supports_are_what_rigid_motions_strain() -> None:
-    assert support_groups(MODEL) == {"foot", "head"}
+    assert GroupPriors(MODEL).supports == {"foot", "head"}
     # A pier of beams couples dofs; that it holds the structure is seen from its rigid motions.
     pier = {**MODEL.groups, "foot": MODEL.groups["foot"] + 1e-6 * MODEL.groups["left"]}
-    assert support_groups(replace(MODEL, groups=pier)) == {"foot", "head"}
+    assert GroupPriors(replace(MODEL, groups=pier)).supports == {"foot", "head"}
     # With positions that are not true nothing is free of force, and springs alone are known.
     lost = replace(MODEL.dofs, xyz=np.zeros((MODEL.size, 3)))
-    assert support_groups(replace(MODEL, dofs=lost, groups=pier)) == {"head"}
+    assert GroupPriors(replace(MODEL, dofs=lost, groups=pier)).supports == {"head"}
 
 
 def test_a_prior_is_a_factor_as_likely_as_not() -> None:
     stated = replace(MODEL, group_priors={"left": 2.0})
-    draws = np.exp(group_prior_std(stated, "left") * RNG.standard_normal(200_000))
+    draws = np.exp(GroupPriors(stated).std("left") * RNG.standard_normal(200_000))
     assert np.mean((draws > 0.5) & (draws < 2.0)) == pytest.approx(0.5, abs=0.005)
     stds = {
         change.name: change.parameters[0].std
-        for change in scale_groups(stated, "stiffness", own_prior=True)
+        for change in Changes(stated).groups("stiffness", own_prior=True)
     }
     assert stds["stiffness group:right"] == 0.1
     assert stds["stiffness group:foot"] == pytest.approx(np.log(5.0) / 0.67449, rel=1e-4)
@@ -181,7 +181,7 @@ def test_a_prior_is_a_factor_as_likely_as_not() -> None:
 
 
 def test_masses_of_groups_change_too() -> None:
-    heavier = with_group_factors(MODEL, [Property("m", "density", ("group:half",))], [1.2])
+    heavier = Groups(MODEL).with_factors([Property("m", "density", ("group:half",))], [1.2])
     result = Bayesian().update(
         replace(MODEL, groups={"none": 1e-12 * MODEL.groups["left"]}), measured(heavier, 4), RNG
     )
@@ -221,13 +221,13 @@ def test_wide_priors_are_not_sampled_over_useless_polynomials() -> None:
 
 def test_what_a_group_is_says_how_far_it_may_change() -> None:
     joint = replace(MODEL, group_kinds={"left": "joint"})
-    assert group_prior_std(joint, "left") == pytest.approx(group_prior_std(MODEL, "foot"))
+    assert GroupPriors(joint).std("left") == pytest.approx(GroupPriors(MODEL).std("foot"))
     (stiffer,) = MemberStiffness().parameters(joint, "group:left")
     assert stiffer.value(stiffer.range[1]) == pytest.approx(1.0)
     assert stiffer.value(stiffer.range[0]) < -0.999
     uppers = {
         change.places[0]: change.parameters[0].upper
-        for change in scale_groups(joint, "stiffness", own_prior=True)
+        for change in Changes(joint).groups("stiffness", own_prior=True)
     }
     assert uppers["group:left"] == 2.0
     assert uppers["group:foot"] > 20.0
@@ -243,7 +243,9 @@ def test_groups_are_classes_of_model_error() -> None:
     ):
         for name, slope in zip(names, slopes[kind].T, strict=True):
             ends = [
-                with_group_factors(MODEL, [Property(name, quantity, (f"group:{name}",))], [1.0 + s])
+                Groups(MODEL).with_factors(
+                    [Property(name, quantity, (f"group:{name}",))], [1.0 + s]
+                )
                 for s in (step, -step)
             ]
             raw = [state_at(problem_of(m, DATA, ()), (), np.zeros(0)).raw for m in ends]
@@ -363,7 +365,7 @@ def test_the_footbridge_is_where_it_stands(bridge: Case) -> None:
     model = bridge.model
     assert model.total_mass == pytest.approx(34_178, rel=1e-3)
     assert np.ptp(model.dofs.xyz, axis=0) == pytest.approx([30.18, 2.13, 2.74], abs=0.01)
-    assert support_groups(model) == {"K_y1", "K_y2", "K_z1", "K_z2"}
+    assert GroupPriors(model).supports == {"K_y1", "K_y2", "K_z1", "K_z2"}
 
 
 def test_bearings_of_the_footbridge_foretell_its_unseen_modes(bridge: Case) -> None:

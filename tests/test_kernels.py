@@ -21,7 +21,7 @@ from femubench.core.modal.correlation import find_seen_modes
 from femubench.core.modal.eigen import Modes, count_evaluations, solve_modes
 from femubench.core.ties import alike, by_probability, in_order, least
 from femubench.core.update import residuals
-from femubench.core.update.change_lists import scale_all_stiffness
+from femubench.core.update.change_lists import Changes
 from femubench.modal import pair_modes
 from femubench.scenarios import HERE
 from femubench.update import sensitivity_update
@@ -83,7 +83,7 @@ def test_the_sensitivity_method_stops_where_it_would_without_rounding(
 
     def run() -> tuple[int, float]:
         with count_evaluations() as counter:
-            result = sensitivity_update(structure, [scale_all_stiffness(structure)], used)
+            result = sensitivity_update(structure, [Changes(structure).stiffness()], used)
         assert result.diagnostics["converged"] == 1.0
         return counter.count, result.parameters[0].after
 

@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from femubench.core.effect.attachments import total_mass
 from femubench.core.fem.frame import (
     Factor,
     Frame,
@@ -26,13 +25,7 @@ from femubench.core.fem.frame import (
 from femubench.core.fem.joints import whole_members
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
-from femubench.core.fem.sections import (
-    Section,
-    constant_kappa,
-    rectangular_tube,
-    round_tube,
-    solid_rectangle,
-)
+from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.mesh_error import mesh_bias, refine_mesh
@@ -68,7 +61,7 @@ def clean(ladder: FrameBuilder) -> Frame:
 
 def test_nothing_is_found_in_a_good_model(clean: Frame) -> None:
     model = Model.of(clean)
-    assert look(model, replace(measured(model), total_mass=(total_mass(model), 0.001))) == ()
+    assert look(model, replace(measured(model), total_mass=(model.total_mass, 0.001))) == ()
 
 
 def test_a_polar_moment_for_a_torsion_constant_is_found(ladder: FrameBuilder) -> None:
@@ -76,14 +69,16 @@ def test_a_polar_moment_for_a_torsion_constant_is_found(ladder: FrameBuilder) ->
     model = Model.of(frame)
     warning = of_effect(look(model, measured(model)), "torsion-constant")
     assert warning.where == "all"
-    tube = rectangular_tube(0.0254, 0.0254, 0.00238)
+    tube = Section.rectangular_tube(0.0254, 0.0254, 0.00238)
     repaired = frequencies(with_section(frame, tube), 5) / frequencies(frame, 5) - 1.0
     assert [mode for mode, _ in warning.changes] == [1, 2, 3, 4, 5]
     np.testing.assert_allclose([p for _, p in warning.changes], 100.0 * repaired, rtol=1e-9)
     assert min(repaired) < -0.1  # 0.113 at the first mode
 
 
-@pytest.mark.parametrize("section", [round_tube(0.03, 0.002), rectangular_tube(0.03, 0.02, 0.002)])
+@pytest.mark.parametrize(
+    "section", [Section.round_tube(0.03, 0.002), Section.rectangular_tube(0.03, 0.02, 0.002)]
+)
 def test_sections_with_their_own_constant_raise_no_warning(
     ladder: FrameBuilder, section: Section
 ) -> None:
@@ -97,7 +92,10 @@ def numbers(section: Section, J: float) -> Section:
 
 @pytest.mark.parametrize(
     ("section", "accuracy"),
-    [(rectangular_tube(0.0254, 0.0254, 0.00238), 1e-9), (solid_rectangle(0.04, 0.02), 0.10)],
+    [
+        (Section.rectangular_tube(0.0254, 0.0254, 0.00238), 1e-9),
+        (Section.solid_rectangle(0.04, 0.02), 0.10),
+    ],
 )
 def test_numbers_alone_give_nearly_the_constant_of_the_shape(
     section: Section, accuracy: float
@@ -108,25 +106,25 @@ def test_numbers_alone_give_nearly_the_constant_of_the_shape(
 
 
 def test_numbers_alone_tell_circles_as_far_as_they_can() -> None:
-    full, hollow = round_tube(0.03, 0.015), round_tube(0.03, 0.002)
+    full, hollow = Section.round_tube(0.03, 0.015), Section.round_tube(0.03, 0.002)
     assert is_round(numbers(full, full.J)) is True
     assert is_round(numbers(hollow, hollow.J)) is None  # a square tube has the same A, Iy, Iz
-    assert is_round(numbers(solid_rectangle(0.02, 0.02), 1.0)) is False
-    assert is_round(numbers(rectangular_tube(0.06, 0.03, 0.001), 1.0)) is False
+    assert is_round(numbers(Section.solid_rectangle(0.02, 0.02), 1.0)) is False
+    assert is_round(numbers(Section.rectangular_tube(0.06, 0.03, 0.001), 1.0)) is False
 
 
 @pytest.mark.parametrize(("factor", "word"), [(5.0, "exceeds"), (0.2, "times that of its shape")])
 def test_impossible_and_far_off_constants_are_found(
     ladder: FrameBuilder, factor: float, word: str
 ) -> None:
-    tube = rectangular_tube(0.0254, 0.0254, 0.00238)
+    tube = Section.rectangular_tube(0.0254, 0.0254, 0.00238)
     model = Model.of(with_section(ladder(), replace(tube, J=factor * tube.J)))
     assert texts(look(model, measured(model)), word)
 
 
 def test_the_weighed_mass_is_compared(clean: Frame) -> None:
     model = Model.of(clean)
-    mass = total_mass(model)
+    mass = model.total_mass
     for weighed, expected in ((mass + 0.029, 0), (mass + 0.1, 1), (mass - 0.1, 1)):
         data = replace(measured(model), total_mass=(weighed, 0.01))
         assert len(texts(look(model, data), "on the scales")) == expected
@@ -135,18 +133,18 @@ def test_the_weighed_mass_is_compared(clean: Frame) -> None:
 def test_what_rests_on_supports_is_weighed_too(clean: Frame) -> None:
     held = Support(Place(joint=clean.joints[0].name), ("z", "rx", "ry"))
     model = Model.of(replace(clean, supports=(held,)))
-    mass = total_mass(Model.of(clean))
+    mass = Model.of(clean).total_mass
     data = replace(measured(model), total_mass=(mass, 1e-4 * mass))
     assert texts(look(model, data), "on the scales") == []
-    assert total_mass(model) == pytest.approx(mass, rel=1e-12)
+    assert model.total_mass == pytest.approx(mass, rel=1e-12)
 
 
 def test_the_mass_warning_scales_members_and_not_lumps(clean: Frame) -> None:
     model = Model.of(clean)
     lump = sum(item.mass for item in clean.masses)
-    data = replace(measured(model), total_mass=(1.1 * total_mass(model), 0.01))
+    data = replace(measured(model), total_mass=(1.1 * model.total_mass, 0.01))
     warning = of_effect(look(model, data), "density")
-    factor = (data.total_mass[0] - lump) / (total_mass(model) - lump)  # type: ignore[index]
+    factor = (data.total_mass[0] - lump) / (model.total_mass - lump)  # type: ignore[index]
     material = replace(clean.members[0].material, rho=factor * clean.members[0].material.rho)
     heavier = replace(clean, members=tuple(replace(m, material=material) for m in clean.members))
     expected = frequencies(heavier, 5) / frequencies(clean, 5) - 1.0
@@ -173,7 +171,7 @@ def test_an_assumed_shear_coefficient_is_said(hframe: FrameBuilder) -> None:
     model = Model.of(frame)
     warning = of_effect(look(model, measured(model, 5)), "shear-deformation")
     assert "kappa = 5/6" in warning.what
-    section = replace(frame.members[0].section, kappa=constant_kappa(5.0 / 6.0))
+    section = replace(frame.members[0].section, kappa=Section.constant_kappa(5.0 / 6.0))
     whole = replace(with_section(frame, section), beam="timoshenko", rotary_inertia=False)
     expected = 100.0 * (frequencies(whole, 5) / frequencies(frame, 5) - 1.0)
     got = [p for _, p in warning.changes]
@@ -199,7 +197,7 @@ def test_large_models_are_not_solved_anew(
 
 
 def test_stubby_members_are_named(hframe: FrameBuilder) -> None:
-    section = rectangular_tube(0.05, 0.05, 0.003)
+    section = Section.rectangular_tube(0.05, 0.05, 0.003)
     model = Model.of(with_section(hframe(mesh=(6, 3, 5), accelerometers=False), section))
     (warning,) = texts(look(model, measured(model, 3)), "times their height")
     assert warning.where == "lower1, lower2"
@@ -211,7 +209,7 @@ def wing(cuts: int, width: float, height: float, *, link: bool = False) -> Frame
     joints = [Joint(n, (0.0, 2.0 * k / cuts - 1.0, 0.1 * link)) for k, n in enumerate(names)]
     middle = names[cuts // 2]
     joints += [Joint("nose", (1.0, 0.0, 0.0)), Joint("tail", (-1.0, 0.0, 0.0))]
-    spar, rod = solid_rectangle(width, height), solid_rectangle(0.04, 0.04)
+    spar, rod = Section.solid_rectangle(width, height), Section.solid_rectangle(0.04, 0.04)
     metal = Material(72e9, 0.3, 2700.0)
     members = [
         Member(f"m{k}", (a, b), 1, spar, metal, (0.0, 0.0, 1.0))
@@ -260,7 +258,7 @@ def test_materials_that_do_not_exist(clean: Frame, material: Material, word: str
 
 
 def test_a_shear_coefficient_above_one(clean: Frame) -> None:
-    section = replace(clean.members[0].section, kappa=constant_kappa(1.3))
+    section = replace(clean.members[0].section, kappa=Section.constant_kappa(1.3))
     model = Model.of(with_section(clean, section))
     assert len(texts(look(model, measured(model)), "shear coefficient")) == len(clean.members)
 
@@ -268,7 +266,7 @@ def test_a_shear_coefficient_above_one(clean: Frame) -> None:
 def test_a_pair_of_matrices_is_weighed_and_nothing_else(clean: Frame) -> None:
     frame = Model.of(clean)
     model = replace(frame, structure=None)
-    mass = total_mass(frame)
+    mass = frame.total_mass
     data = replace(measured(frame), total_mass=(1.21 * mass, 0.01))
     (warning,) = look(model, data)
     assert warning.effect == "density"
@@ -333,7 +331,7 @@ def test_a_finer_mesh_keeps_factors_springs_ends_and_changes(fitted_portal: Fram
         for label, rows in structure.label_index.items():
             values = getattr(finer.properties, name)[finer.label_index[label]]
             np.testing.assert_allclose(values, getattr(structure.properties, name)[rows[0]])
-    assert total_mass(Model.of(finer)) == pytest.approx(total_mass(Model.of(structure)), rel=1e-9)
+    assert Model.of(finer).total_mass == pytest.approx(Model.of(structure).total_mass, rel=1e-9)
     bias = mesh_bias(Model.of(structure), 6)
     assert bias is not None
     assert np.abs(bias).max() < 0.01

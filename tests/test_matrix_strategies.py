@@ -34,7 +34,7 @@ from femubench.core.update.entries import (
     smallest_change,
 )
 from femubench.core.update.promise import check_used_modes, measure_residuals
-from femubench.core.update.quasi import QuasiModes, quasi_measured_modes
+from femubench.core.update.quasi import QuasiModes
 from femubench.fem import Frame, JointSpring, Place, Support
 from femubench.plugins.strategies import baruch
 from femubench.plugins.strategies.baruch import Baruch
@@ -161,7 +161,7 @@ def test_baruch_promises(cases: dict[str, Case], name: str) -> None:
     assert result.model.stiffness_change is not None
     assert result.model.stiffness_change.basis.shape == (model.size, len(data))
     # All other modes are left alone.
-    quasi = quasi_measured_modes(model, data)
+    quasi = QuasiModes.of(model, data)
     after = solve_modes(result.model)
     others = np.delete(quasi.modes.natural_frequencies, quasi.partners)
     expected = np.sort(np.concatenate([others, data.frequencies]))
@@ -170,7 +170,7 @@ def test_baruch_promises(cases: dict[str, Case], name: str) -> None:
 
 def test_baruch_change_is_equation_18_for_any_orthonormal_shapes(frame_case: Case) -> None:
     model, data = frame_case
-    quasi = quasi_measured_modes(model, data)
+    quasi = QuasiModes.of(model, data)
     rng = np.random.default_rng(5)
     shapes = quasi.modes.shapes[:, 3:12] @ np.linalg.qr(rng.standard_normal((9, 3)))[0]
     for given in (quasi.shapes, shapes):
@@ -289,7 +289,7 @@ def test_kabe_takes_the_smallest_change_there_is(frame_case: Case) -> None:
     """Any direction that changes no equation only makes the relative changes larger."""
     model, data = frame_case
     pattern = EntryPattern.of(model)
-    quasi = quasi_measured_modes(model, data)
+    quasi = QuasiModes.of(model, data)
     equations = entry_update.equations_of(pattern, model, quasi)
     change, _ = smallest_change(equations, np.eye(len(pattern)))
     stacked = np.vstack([equations.exact, equations.fitted.toarray()])
@@ -328,7 +328,7 @@ def test_pattern_knows_no_stored_zeros(frame_case: Case) -> None:
 def test_the_dual_problem_of_kabe_has_the_answer_of_the_dense_one(frame_case: Case) -> None:
     model, data = frame_case
     pattern = EntryPattern.of(model)
-    posed = entry_update.equations_of(pattern, model, quasi_measured_modes(model, data), 0.03)
+    posed = entry_update.equations_of(pattern, model, QuasiModes.of(model, data), 0.03)
     fitted, free = posed.fitted.toarray(), entry_update.null_space(posed.exact)
     start = np.linalg.lstsq(posed.exact, posed.exact_right)[0]
     rows = np.vstack([fitted, posed.cutoff * np.eye(len(pattern))])
@@ -359,7 +359,7 @@ def test_kabe_states_by_how_much_a_used_frequency_is_off_where_no_matrix_has_the
 ) -> None:
     model, data = cases["hframe"]
     result = update(KabeRigid, (model, data))
-    partners = quasi_measured_modes(result.model, data)
+    partners = QuasiModes.of(result.model, data)
     own = partners.modes.natural_frequencies[partners.partners]
     worst = np.abs(own / data.frequencies - 1.0).max()
     assert result.diagnostics["used_frequency_error"] == pytest.approx(worst, rel=1e-9)
@@ -386,7 +386,7 @@ def test_least_squares_is_the_least_among_what_keeps_the_rigid_modes(
     rigid = rigid_modes_of(model)
     rows = pattern.products(rigid, np.ones(model.size)).toarray()
     free = null_space(pattern.products(rigid, entry_update.force_scale(model)).toarray())
-    quasi = quasi_measured_modes(model, data)
+    quasi = QuasiModes.of(model, data)
     equations = replace(entry_update.equations_of(pattern, model, quasi), cutoff=1e-9)
     change, rank = least_squares_change(equations, free)
     assert rank == free.shape[1] < len(equations.exact_right) + len(equations.fitted_right)
@@ -428,14 +428,14 @@ def test_kabe_turns_to_least_squares_where_singular_values_do_not_converge(
 def test_kabe_tells_on_which_step_least_squares_lose_a_mode(
     cases: dict[str, Case], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    model, data = cases["hframe"]
+    (model, data), own = cases["hframe"], QuasiModes.of
 
     def blind_after_the_first(current: Model, wanted: Measurement) -> QuasiModes:
         if current is not model:
             raise StrategyFailure("no mode of the model matches measured mode 3")
-        return quasi_measured_modes(current, wanted)
+        return own(current, wanted)
 
-    monkeypatch.setattr(entry_update, "quasi_measured_modes", blind_after_the_first)
+    monkeypatch.setattr(QuasiModes, "of", blind_after_the_first)
     with pytest.raises(StrategyFailure, match=r"after step 1 of least squares .* measured mode 3"):
         update(KabeRigid, (model, data))
 
@@ -450,11 +450,13 @@ def test_kabe_without_least_squares_fails_with_its_residual(
 
 
 def test_a_broken_expansion_is_found(frame_case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    own = QuasiModes.of
+
     def stretched(model: Model, data: Measurement) -> QuasiModes:
-        quasi = quasi_measured_modes(model, data)
+        quasi = own(model, data)
         return replace(quasi, shapes=1.001 * quasi.shapes)
 
-    monkeypatch.setattr(baruch, "quasi_measured_modes", stretched)
+    monkeypatch.setattr(QuasiModes, "of", stretched)
     shown = r"measured mode at 226.8 Hz comes out at 227.03 Hz in the updated model \(\+0.1 %\)"
     with pytest.raises(SelfCheckFailed, match=shown) as caught:
         update(Baruch, frame_case)
@@ -463,7 +465,7 @@ def test_a_broken_expansion_is_found(frame_case: Case, monkeypatch: pytest.Monke
 
 def test_mixed_shapes_are_found(frame_case: Case) -> None:
     updated = update(Baruch, frame_case).model
-    quasi = quasi_measured_modes(*frame_case)
+    quasi = QuasiModes.of(*frame_case)
     mixed = np.column_stack([quasi.shapes[:, 0] + 1e-3 * quasi.shapes[:, 1], quasi.shapes[:, 1:]])
     with pytest.raises(SelfCheckFailed, match=r"226.8 Hz"):
         check_used_modes(updated, mixed, quasi.eigenvalues)
@@ -511,6 +513,6 @@ def test_kabe_solves_thousands_of_entries(ladder: FrameBuilder, frame_case: Case
     result = update(Kabe, (model, data))
     assert result.diagnostics["entries"] > entry_update.DENSE_UNKNOWNS
     same_pattern(model, result.model)
-    quasi = quasi_measured_modes(result.model, data)
+    quasi = QuasiModes.of(result.model, data)
     found = measure_residuals(result.model, quasi.shapes, quasi.eigenvalues)
     assert found.frequencies <= 1e-7

@@ -26,7 +26,6 @@ from femubench.core.inference.model_error import (
 )
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.prior import Base
-from femubench.effect import member_length, total_mass
 from femubench.fem import FloatArray, Frame, PointMass
 
 FRAME = structure_named("portal").frame
@@ -36,7 +35,7 @@ NOTHING = np.zeros(0)
 WIDTHS = class_widths()
 MEMBER = FRAME.members[0]
 FOOT, JOINT = MEMBER.ends
-LENGTH = member_length(FRAME, MEMBER.name)
+LENGTH = FRAME.member_length(MEMBER.name)
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +64,7 @@ def stiffer(step: float) -> Frame:
 
 
 def heavier(step: float) -> Frame:
-    lump = PointMass(Place(JOINT), step * total_mass(MODEL))
+    lump = PointMass(Place(JOINT), step * MODEL.total_mass)
     return replace(FRAME, masses=(*FRAME.masses, lump))
 
 
@@ -165,7 +164,7 @@ def test_everything_stiffer_raises_all_frequencies_alike(
     )
     assert TEST.total_mass is not None
     weighed = slopes["density of everything"][-1, 0]
-    assert weighed == pytest.approx(total_mass(MODEL) / TEST.total_mass[1])
+    assert weighed == pytest.approx(MODEL.total_mass / TEST.total_mass[1])
     # All elements together are everything; ends together are their types.
     together = slopes["element stiffness"].sum(axis=1)
     np.testing.assert_allclose(together[:count], slopes["stiffness of everything"][:count, 0])

@@ -94,7 +94,7 @@ def ways() -> Iterator[tuple[str, object]]:
         lambda f: replace(
             f,
             members=tuple(
-                replace(m, section=fem.rectangular_tube(0.04, 0.02, 0.002))
+                replace(m, section=fem.Section.rectangular_tube(0.04, 0.02, 0.002))
                 if m.name != "strut"
                 else replace(m, material=fem.Material(114e9, 0.33, 4500.0))
                 for m in f.members

@@ -13,6 +13,9 @@ import pytest
 import scored
 from synthetic_run import synthetic_run
 
+from femubench.core.schema.results import Block
+from femubench.core.score.leaderboard import leaderboard
+from femubench.core.score.ranking import rank_results
 from femubench.papers.printed import read_printed
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.page import data as page
@@ -21,16 +24,7 @@ from femubench.reports.page.document import SCRIPTS, STYLES, asset, embed_json
 from femubench.reports.page.papers import papers_of
 from femubench.reports.page.rounding import compact_json
 from femubench.reports.runs import MarkdownReporter
-from femubench.results import (
-    Block,
-    JobResult,
-    PairedMode,
-    Rule,
-    Run,
-    leaderboard,
-    rank_results,
-    run_to_json,
-)
+from femubench.results import JobResult, PairedMode, Rule, Run, run_to_json
 
 SMALL = synthetic_run(6, 8, seeds=2)
 

@@ -22,6 +22,7 @@ from femubench.papers.frame.receptances import (
 from femubench.reproduction import Workbench
 from femubench.results import stiffness_difference
 from femubench.scenarios import HERE
+from femubench.update import ElementFamily
 
 
 @pytest.fixture(scope="module")
@@ -92,12 +93,11 @@ def test_difference_matrix_is_symmetric_and_in_one_unit(bench: Workbench) -> Non
 
 @pytest.mark.parametrize("words", SOLUTIONS.values())
 def test_element_matrices_are_recovered_from_the_parameters(bench: Workbench, words: str) -> None:
-    from femubench.update import generic_family
 
     model = bench.cases["frame"].model
     structure = model.frame_structure
     result = bench.update("frame", words)
-    family = generic_family(structure, tied=words == "generic-adjusted")
+    family = ElementFamily.generic(structure, tied=words == "generic-adjusted")
     assembled = structure.plan.assemble(recover_change(family, result))
     expected = result.model.stiffness - model.stiffness
     assert abs(assembled - expected).max() < 1e-9 * abs(expected).max()

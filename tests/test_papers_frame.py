@@ -26,7 +26,8 @@ from femubench.papers.frame import (
 )
 from femubench.papers.frame.common import CASE, TRUTH, rigid_modes, strain_modes
 from femubench.papers.printed import read_printed
-from femubench.reproduction import Cell, Extra, Study, Workbench, under
+from femubench.reproduction import Cell, Extra, Study, Workbench
+from femubench.update import QuasiModes
 
 pytestmark = pytest.mark.slow(20)
 
@@ -114,7 +115,7 @@ def test_no_accusation_stands_where_shapes_decide(bench: Workbench, rerun: Study
     0.95: no accused cell comes into reach.
     """
     case = bench.cases[CASE]
-    quasi = readings.quasi_measured_modes(case.model, case.used_measurement())
+    quasi = QuasiModes.of(case.model, case.used_measurement())
     own = case.model.observe(case.measurement.sensors) @ quasi.modes.shapes[:, quasi.partners]
     found: dict[str, list[list[float]]] = {}
     for axis in ((1, 1, 1), (-1, 1, 1), (1, 0, 0), (0, 0, -1)):
@@ -138,7 +139,7 @@ def test_no_accusation_stands_where_shapes_decide(bench: Workbench, rerun: Study
 def test_no_accusation_of_a_convention_stands_where_shapes_decide(rerun: Study) -> None:
     for convention in rerun.conventions():
         for choice in convention.choices:
-            for cell in under(choice, rerun.cells).values():
+            for cell in choice.under(rerun.cells).values():
                 if cell.verdict == "does-not-follow":
                     reach = [cell.ours, *cell.others()]
                     known = [value for value in reach if value is not None]

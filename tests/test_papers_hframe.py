@@ -15,6 +15,7 @@ from femubench.core.library.report import rendering
 from femubench.core.library.reproduce import studies_of
 from femubench.core.pace import Advance
 from femubench.core.plugin.loader import load_plugins
+from femubench.core.reproduction.ground import VERDICTS
 from femubench.papers import DONE, study
 from femubench.papers.hframe.beyond import compare
 from femubench.papers.hframe.meshes import frequencies, mesh_cells
@@ -23,7 +24,7 @@ from femubench.papers.hframe.rows import FREE_EI, ROWS, at_printed, parameter_va
 from femubench.papers.hframe.shapes import compute_expanded_mac, shape_cells
 from femubench.papers.hframe.updates import springs_by_rule
 from femubench.papers.printed import read_printed
-from femubench.reproduction import VERDICTS, Cell, Study, Workbench, count_different
+from femubench.reproduction import Cell, Study, Workbench
 from femubench.scenarios import HERE
 
 pytestmark = pytest.mark.slow(20)
@@ -280,7 +281,7 @@ def test_docs_count_the_cells_of_both_papers(done: Study) -> None:
     verdicts = [cell["verdict"] for cell in json.loads(rendering(studies, "json"))]
     assert headline.startswith(f"{verdicts.count('independent')} of {len(verdicts)} printed cells")
     as_stated = {int(number) for number in re.findall(r"\d+", headline)}
-    different = count_different([cell for one in studies for cell in one.cells])
+    different = Cell.count_different([cell for one in studies for cell in one.cells])
     assert as_stated == {len(verdicts), different, *map(verdicts.count, VERDICTS)}
     assert different < verdicts.count("independent")
     for page in ("README.md", "docs/reproduce.md"):

@@ -30,10 +30,10 @@ from femubench import (
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import InputError
 from femubench.core.schema.diagnosis import LocationRow, ResidualRow
-from femubench.core.schema.results import JobResult
+from femubench.core.schema.results import Block, JobResult
 from femubench.modal import mac
 from femubench.plot import wireframe_of
-from femubench.results import Block, PairedMode
+from femubench.results import PairedMode
 from femubench.scenarios import HERE
 
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from femubench import Measurement, StrategyFailure, UpdateResult
+from femubench.core.fit.discrepancy import Discrepancy
 from femubench.core.typing import FloatArray
 from femubench.core.update import posterior_sampling
 from femubench.core.update.posterior_sampling import StretchMove
 from femubench.core.update.quadratic_fit import QuadraticFit, coefficients_of
 from femubench.plugins.strategies.sampling import BayesianSampling
-from femubench.update import Discrepancy
 
 CASE = toys.tiny_case()
 

@@ -30,14 +30,12 @@ from femubench.core.fem.frame import (
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.preload import (
+    GeometricStiffness,
     StressState,
     geometric_matrices,
-    gravity_stiffness,
-    preload_stiffness,
-    redundant_members,
     statics_of,
 )
-from femubench.core.fem.sections import Section, rectangular_tube
+from femubench.core.fem.sections import Section
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.rigid import rigid_modes_of
@@ -98,7 +96,7 @@ def test_a_beam_buckles_at_its_euler_load(plane: str, fixed: Any, multiple: floa
     def critical(elements: int) -> float:
         structure = Structure.build(beam(plane, fixed, elements=elements))
         stiffness = structure.matrices()[1].toarray()
-        tension = preload_stiffness(structure, "m", 1.0).toarray()
+        tension = GeometricStiffness(structure).of_preload("m", 1.0).toarray()
         return float(1.0 / la.eigh(tension, stiffness, eigvals_only=True)[-1])
 
     errors = np.array([critical(n) / (multiple * EULER) - 1.0 for n in (4, 8)])
@@ -170,10 +168,10 @@ def test_rigid_motions_cost_nothing(
     structure = Structure.build(frame)
     rigid = rigid_modes_of(Model.of(structure))
     assert rigid.shape[1] == (6 if frame.plane == "3d" else 3)
-    members = redundant_members(structure)
+    members = GeometricStiffness(structure).redundant_members()
     assert members == tuple(member.name for member in frame.members)
     for member in members:
-        matrix = preload_stiffness(structure, member, 1.0)
+        matrix = GeometricStiffness(structure).of_preload(member, 1.0)
         assert abs(matrix - matrix.T).max() < 1e-13 * abs(matrix).max()
         scale = (abs(matrix) @ np.abs(rigid)).max()
         assert np.abs(matrix @ rigid).max() < 2e-12 * scale
@@ -205,8 +203,8 @@ def test_changed_parameters_leave_the_stress_alone(asymmetric_ladder: Any) -> No
     structure = Structure.build(frame)
     soft = Property("E", "E", ("AB/1", "EF/2"))
     changed = structure.with_values([soft], [0.5])
-    direct = preload_stiffness(changed, "BE", 2e3)
-    assert abs(direct - preload_stiffness(structure, "BE", 2e3)).max() == 0.0
+    direct = GeometricStiffness(changed).of_preload("BE", 2e3)
+    assert abs(direct - GeometricStiffness(structure).of_preload("BE", 2e3)).max() == 0.0
     model = Model.of(structure)
     modes = solve_modes(model, 9).elastic
     slope = eigenvalue_sensitivities(model, modes, [soft])[:, 0]
@@ -219,25 +217,29 @@ def test_changed_parameters_leave_the_stress_alone(asymmetric_ladder: Any) -> No
 
 
 def test_a_clamp_out_of_plane_holds_the_frame_in_its_plane_and_a_ground_spring_its_own() -> None:
-    assert redundant_members(Structure.build(beam("out-of-plane", CLAMPED_OUT))) == ("m",)
+    assert GeometricStiffness(
+        Structure.build(beam("out-of-plane", CLAMPED_OUT))
+    ).redundant_members() == ("m",)
     pinned = beam("out-of-plane", (("z", "rx"), ("z", "rx")))
-    assert redundant_members(Structure.build(pinned)) == ()
+    assert GeometricStiffness(Structure.build(pinned)).redundant_members() == ()
     spring = (GroundSpring(Place(joint="B"), "x", 1e6),)
     sprung = beam("in-plane", (("x", "z"), ("z",)), springs=spring)
-    assert redundant_members(Structure.build(sprung)) == ("m",)
-    assert redundant_members(Structure.build(replace(sprung, springs=()))) == ()
+    assert GeometricStiffness(Structure.build(sprung)).redundant_members() == ("m",)
+    assert (
+        GeometricStiffness(Structure.build(replace(sprung, springs=()))).redundant_members() == ()
+    )
 
 
 def test_what_cannot_be_stressed_is_refused(hframe: Any, ladder: Any) -> None:
     structure = Structure.build(hframe())
     with pytest.raises(ModelError, match=r"'lower1'.* not redundant"):
-        preload_stiffness(structure, "lower1", 1.0)
-    assert redundant_members(structure) == ()
+        GeometricStiffness(structure).of_preload("lower1", 1.0)
+    assert GeometricStiffness(structure).redundant_members() == ()
     with pytest.raises(ModelError, match="no member 'XY'"):
-        preload_stiffness(Structure.build(ladder()), "XY", 1.0)
+        GeometricStiffness(Structure.build(ladder())).of_preload("XY", 1.0)
     with pytest.raises(ModelError, match="not redundant"):
         Model.of(replace(hframe(), preloads=(Preload("horizontal", 1.0),)))
-    flat = replace(rectangular_tube(0.0254, 0.0254, 0.00238), Iz=0.0)
+    flat = replace(Section.rectangular_tube(0.0254, 0.0254, 0.00238), Iz=0.0)
     members = tuple(replace(member, section=flat) for member in ladder().members)
     with pytest.raises(ModelError, match="needs Iz"):
         Model.of(replace(ladder(), members=members, preloads=(Preload("BE", 1.0),)))
@@ -258,7 +260,7 @@ class TestWeight:
         """Greenhill (1881): q L^3 / EI = 7.8373, the square of 1.5 times the zero of J_-1/3."""
         frame = upright(plane, 40)
         structure = Structure.build(frame)
-        weight = gravity_stiffness(structure).toarray()
+        weight = GeometricStiffness(structure).of_weight().toarray()
         stiffness = structure.matrices()[1].toarray()
         factors = la.eigh(-weight, stiffness, eigvals_only=True)
         q = 9.80665 * STEEL.rho * SECTION.A
@@ -310,10 +312,10 @@ class TestWeight:
     def test_what_falls_or_has_no_weight_in_its_plane_is_refused(self, ladder: Any) -> None:
         free = Structure.build(beam("in-plane", ((), ())))
         with pytest.raises(ModelError, match="nothing holds"):
-            gravity_stiffness(free)
+            GeometricStiffness(free).of_weight()
         tipping = beam("in-plane", (("x", "z"), ()))  # a bar on one hinge, lying
         with pytest.raises(ModelError, match="nothing holds"):
-            gravity_stiffness(Structure.build(tipping))
+            GeometricStiffness(Structure.build(tipping)).of_weight()
         with pytest.raises(ModelError, match="out of plane"):
             Structure.build(replace(ladder(), gravity=1.0)).matrices()
 
@@ -334,5 +336,6 @@ def slender(elements: int) -> Frame:
     """Return a portal on clamps with a mass at either corner."""
     masses = tuple(PointMass(Place(joint=j), 4.0) for j in ("el", "er"))
     return replace(
-        clamped_portal(elements, rectangular_tube(0.012, 0.012, 0.001), STEEL), masses=masses
+        clamped_portal(elements, Section.rectangular_tube(0.012, 0.012, 0.001), STEEL),
+        masses=masses,
     )

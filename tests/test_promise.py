@@ -15,7 +15,7 @@ from femubench.core.conformance.results import Given, find_missing_mode
 from femubench.core.errors import SelfCheckFailed
 from femubench.core.fem.frame import Frame, Joint, Material, Member, Place, PointMass
 from femubench.core.fem.model import Model
-from femubench.core.fem.sections import Section, solid_rectangle
+from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import Modes, solve_dense, solve_modes
 from femubench.core.modal.measurement import Measurement
@@ -37,7 +37,7 @@ def aeroplane(stiffer: float) -> Model:
         Joint("right", (0.0, -1.0, 0.1)),
     )
     metal, light = Material(72e9, 0.3, 2700.0), Material(2e11 * stiffer, 0.3, 1.0)
-    rod, spar = solid_rectangle(0.05, 0.15), solid_rectangle(0.1, 0.01)
+    rod, spar = Section.solid_rectangle(0.05, 0.15), Section.solid_rectangle(0.1, 0.01)
     short = Section(0.01, 1e-5, 1e-5, 2e-5, 2e-5)
     members = (
         Member("front", ("body", "nose"), 2, rod, metal),

@@ -20,7 +20,7 @@ from femubench.core.publish import publishing
 from femubench.core.publish.submissions import slug
 from femubench.core.run.runner import run_jobs
 from femubench.core.schema.records import read_run, run_from_json, run_to_json
-from femubench.results import leaderboard
+from femubench.core.score.leaderboard import leaderboard
 
 Data = dict[str, Any]
 HOSTILE = "../../<script>alert(1)</script>\"'\x1b[2J"

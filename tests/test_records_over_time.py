@@ -15,7 +15,7 @@ import femubench
 from femubench import Identification, Sensors, identify
 from femubench.core.cli.main import bench
 from femubench.core.identify.averaging import average_records, guess_excitation
-from femubench.modal import TimeSignals, join_records, mac
+from femubench.modal import TimeSignals, mac
 from tests.hammer_problems import RATE, Structure, cantilever, frame, hit, write_mat
 
 
@@ -50,10 +50,10 @@ def test_a_roving_hammer_a_roving_sensor_and_hits_in_one_record() -> None:
     assert "3 hits" in found.said
     assert len(found) == 3
     check(found, structure)
-    hammer = join_records([record(structure, p, p, [3]) for p in range(4)])
+    hammer = TimeSignals.joined([record(structure, p, p, [3]) for p in range(4)])
     check(identify(hammer), structure)
     assert identify(hammer).sensors.labels == tuple(structure.labels)
-    sensor = join_records([record(structure, 0, p, [p]) for p in range(4)])
+    sensor = TimeSignals.joined([record(structure, 0, p, [p]) for p in range(4)])
     check(identify(sensor, estimator="h2"), structure)
 
 
@@ -74,7 +74,7 @@ def test_free_decays_need_no_force() -> None:
     parts = [record(structure, p, p) for p in (0, 2)]
     nothing: dict[str, Any] = {"forces": Sensors((), np.zeros((0, 3)), ())}
     nothing["force_values"] = np.zeros((0, 0))
-    motions = join_records([replace(part, **nothing) for part in parts])
+    motions = TimeSignals.joined([replace(part, **nothing) for part in parts])
     assert guess_excitation(motions) == "decay"
     found = identify(motions)
     assert len(found) == 3
@@ -249,7 +249,7 @@ def test_from_hammer_records_to_the_cause_in_four_commands(
 def test_a_hammer_that_roves_along_a_cantilever_gives_its_modes_and_no_others() -> None:
     for structure in (cantilever(), cantilever(softer=0.44), cantilever(added=1.2)):
         records = [record(structure, p, p, [2], hits=2, gap=5.0) for p in range(8)]
-        found = identify(join_records(records))
+        found = identify(TimeSignals.joined(records))
         hertz, shapes = (part[..., :4] for part in structure.modes())
         assert found.frequencies == pytest.approx(hertz, rel=3e-4)
         assert np.diag(mac(shapes, found.shapes.real)).min() > 0.99

@@ -16,9 +16,9 @@ from femubench import InputError, Measurement, Sensors, read_case
 from femubench.core.case.case import Case
 from femubench.core.case.writing import write_case
 from femubench.core.fit.residuals import Data as DiagnosisData
+from femubench.core.modal.correlated_errors import shrunk_correlation
 from femubench.core.update.posterior_sampling import Target
 from femubench.core.update.residuals import Targets as UpdateData
-from femubench.modal import shrunk_correlation
 
 CASES = Path(__file__).parent / "cases"
 HERTZ = np.array([10.0, 25.0, 60.0])

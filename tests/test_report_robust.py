@@ -17,10 +17,11 @@ from synthetic_run import synthetic_run
 from test_page_data import data_in
 
 from femubench.core.cli.main import bench
+from femubench.core.run.frames import results_frame
 from femubench.core.run.record_file import read_records, write_file
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.runs import MarkdownReporter
-from femubench.results import Run, Store, results_frame, run_to_json
+from femubench.results import Run, Store, run_to_json
 
 RUN = synthetic_run(4, 6)
 RUN_ID = RUN.meta["run"]

@@ -16,22 +16,16 @@ from synthetic_run import synthetic_run
 from femubench.core.library.report import render_report
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import check_reporter
+from femubench.core.schema.results import Block
+from femubench.core.score.leaderboard import leaderboard, list_rows
+from femubench.core.score.scoring import frequency_error
 from femubench.reports import femubench_reporters
 from femubench.reports.csvs import CsvReporter
 from femubench.reports.jsons import JsonReporter
 from femubench.reports.markdown import escape
 from femubench.reports.runs import MarkdownReporter, TerminalReporter
 from femubench.reports.summary import finding, shortfalls
-from femubench.results import (
-    Block,
-    JobResult,
-    PairedMode,
-    Rule,
-    Run,
-    frequency_error,
-    leaderboard,
-    list_rows,
-)
+from femubench.results import JobResult, PairedMode, Rule, Run
 
 
 def mode(

@@ -14,8 +14,9 @@ from click.testing import CliRunner, Result
 import femubench.papers
 from femubench.core.cli.main import bench
 from femubench.core.errors import StrategyFailure
+from femubench.core.reproduction.ground import VERDICTS
 from femubench.core.reproduction.study import cells_to_json
-from femubench.reproduction import VERDICTS, Study, Workbench
+from femubench.reproduction import Study, Workbench
 
 Invoke = Callable[..., Result]
 KEYS = [

@@ -7,7 +7,7 @@ import reproduction_toys as toys
 
 from femubench import InputError
 from femubench.papers.printed import equations
-from femubench.reproduction import Choice, Convention, Equation, under
+from femubench.reproduction import Choice, Convention, Equation
 
 CELLS = toys.study().cells
 MATH = "<math><mi>x</mi></math>"
@@ -16,7 +16,7 @@ MATH = "<math><mi>x</mi></math>"
 class TestConvention:
     def test_cells_are_judged_by_their_own_bars(self) -> None:
         (choice,) = toys.convention().choices
-        found = under(choice, CELLS)
+        found = choice.under(CELLS)
         verdicts = {key[1]: cell.verdict for key, cell in found.items()}
         assert verdicts == {"mode 3": "does-not-follow", "mode 4": "under-convention"}
         assert found["1", "mode 4", "FE"].note.endswith("; with | it")
@@ -24,7 +24,7 @@ class TestConvention:
 
     def test_unknown_cell(self) -> None:
         with pytest.raises(InputError, match="no judged cell"):
-            under(Choice("x", {("1", "mode 99", "FE"): 1.0}), CELLS)
+            Choice("x", {("1", "mode 99", "FE"): 1.0}).under(CELLS)
 
     def test_nothing_to_see(self) -> None:
         with pytest.raises(InputError, match="changes nothing"):

@@ -7,8 +7,9 @@ from itertools import permutations
 import pytest
 
 from femubench import InputError
+from femubench.core.reproduction.ground import VERDICTS
 from femubench.reports.reproduction import counts_line
-from femubench.reproduction import VERDICTS, Ground, Page, Verdict, count_different, verdict_counts
+from femubench.reproduction import Cell, Ground, Page, Verdict
 from tests.toys import reproduction_toys as toys
 
 FREE = Ground("independent", "nothing is chosen")
@@ -86,8 +87,8 @@ def test_a_figure_printed_again_is_no_further_evidence() -> None:
     cells = [ratio.cell(mesh, f"mode {k}", 1.0, 1.0) for mesh in "BCD" for k in range(4)]
     cells += [ratio.cell(mesh, "mode 5", 0.999, 0.999) for mesh in "BCD"]
     cells += [hertz.cell("B", "mode 1", 1.0, 1.0), hertz.cell("B", "mode 2", 2.0, 7.0)]
-    assert verdict_counts(cells)["independent"] == 16
-    assert count_different(cells) == 3
+    assert Cell.verdict_counts(cells)["independent"] == 16
+    assert Cell.count_different(cells) == 3
 
 
 def test_the_note_names_every_ground_once_and_a_fault_alone() -> None:
@@ -129,7 +130,7 @@ def test_a_page_without_grounds_is_refused(grounds: tuple[Ground, ...], fault: G
 
 def test_the_headline_is_the_number_of_independent_cells() -> None:
     study = toys.study()
-    counts = verdict_counts(study.cells)
+    counts = Cell.verdict_counts(study.cells)
     assert set(counts) == set(VERDICTS)
     assert all(counts.values())
     assert sum(counts.values()) == len(study.cells)

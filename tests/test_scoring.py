@@ -19,7 +19,7 @@ from femubench.core.modal import eigen
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Run
-from femubench.core.score.leaderboard import leaderboard
+from femubench.core.score.leaderboard import find_basis, leaderboard
 from femubench.core.score.ranking import rank_items, rank_results
 from femubench.core.score.scoring import (
     Reference,
@@ -29,7 +29,6 @@ from femubench.core.score.scoring import (
     reference_of,
     score_model,
 )
-from femubench.results import find_basis
 
 
 @pytest.fixture(scope="module")

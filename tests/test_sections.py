@@ -7,18 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from femubench.core.fem.sections import (
-    SHAPES,
-    rectangular_tube,
-    round_tube,
-    saint_venant_rectangle,
-    solid_rectangle,
-    wall_of,
-)
+from femubench.core.fem.sections import SHAPES, Section, saint_venant_rectangle
 
 
 def test_tube_of_the_first_paper() -> None:
-    tube = rectangular_tube(0.0254, 0.0254, 0.00238)
+    tube = Section.rectangular_tube(0.0254, 0.0254, 0.00238)
     assert pytest.approx(219.15e-6, rel=1e-5) == tube.A
     assert tube.Iy == pytest.approx(19562e-12, rel=3e-5)
     assert tube.Jp == pytest.approx(39125e-12, rel=3e-5)
@@ -26,7 +19,7 @@ def test_tube_of_the_first_paper() -> None:
 
 
 def test_tube_of_the_second_paper() -> None:
-    tube = rectangular_tube(0.040, 0.040, 0.0025)
+    tube = Section.rectangular_tube(0.040, 0.040, 0.0025)
     assert tube.kappa is not None
     assert tube.kappa(0.3)[1] == pytest.approx(0.4355, abs=5e-5)
 
@@ -43,7 +36,7 @@ def integrate(width: float, height: float, wall: float) -> tuple[float, float, f
 
 
 def test_rectangular_tube_by_integration_with_the_axes_the_right_way_round() -> None:
-    tube = rectangular_tube(0.04, 0.08, 0.004)
+    tube = Section.rectangular_tube(0.04, 0.08, 0.004)
     area, iy, iz = integrate(0.04, 0.08, 0.004)
     assert iy > 2 * iz
     np.testing.assert_allclose([tube.A, tube.Iy, tube.Iz], [area, iy, iz], rtol=1e-4)
@@ -65,7 +58,7 @@ def test_torsion_of_a_foil_is_a_third_of_width_times_thickness_cubed(thickness: 
 
 
 def test_round_sections() -> None:
-    solid, tube = round_tube(0.02, 0.01), round_tube(0.05, 0.002)
+    solid, tube = Section.round_tube(0.02, 0.01), Section.round_tube(0.05, 0.002)
     np.testing.assert_allclose([solid.A, solid.Iy], [np.pi * 1e-4, np.pi * 1e-8 / 4], rtol=1e-12)
     assert tube.Iy == pytest.approx(np.pi / 64 * (0.05**4 - 0.046**4), rel=1e-12)
     assert tube.J == tube.Jp == pytest.approx(2 * tube.Iy)
@@ -73,10 +66,10 @@ def test_round_sections() -> None:
 
 @pytest.mark.parametrize("wall", [0.0001, 0.0199])
 def test_the_wall_follows_from_the_area(wall: float) -> None:
-    assert wall_of(rectangular_tube(0.04, 0.08, wall)) == pytest.approx(wall, rel=1e-9)
-    assert wall_of(round_tube(0.04, wall)) == pytest.approx(wall, rel=1e-9)
-    assert wall_of(solid_rectangle(0.04, 0.08)) == 0.0
-    assert wall_of(replace(rectangular_tube(0.04, 0.08, wall), shape="")) == 0.0
+    assert Section.rectangular_tube(0.04, 0.08, wall).wall == pytest.approx(wall, rel=1e-9)
+    assert Section.round_tube(0.04, wall).wall == pytest.approx(wall, rel=1e-9)
+    assert Section.solid_rectangle(0.04, 0.08).wall == 0.0
+    assert replace(Section.rectangular_tube(0.04, 0.08, wall), shape="").wall == 0.0
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.33])
@@ -84,8 +77,8 @@ def test_cowpers_coefficients(nu: float) -> None:
     # Cowper 1966, table 1: closed forms of the special sections.
     square = SHAPES["square-tube"][0](0.04, 0.002).kappa
     disc = SHAPES["solid-circle"][0](0.03).kappa
-    thin_circle = round_tube(1.0, 1e-9).kappa
-    block = solid_rectangle(0.02, 0.05).kappa
+    thin_circle = Section.round_tube(1.0, 1e-9).kappa
+    block = Section.solid_rectangle(0.02, 0.05).kappa
     expected = {
         square: 20 * (1 + nu) / (48 + 39 * nu),
         disc: 6 * (1 + nu) / (7 + 6 * nu),

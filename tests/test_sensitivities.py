@@ -21,12 +21,11 @@ from femubench.core.fem.frame import (
 )
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import QUANTITIES, Property
-from femubench.core.fem.sections import rectangular_tube
+from femubench.core.fem.sections import Section
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import Modes, solve_modes
 from femubench.core.modal.sensitivity import (
     eigenvalue_sensitivities,
-    frequency_sensitivities,
     shape_sensitivities,
 )
 
@@ -181,8 +180,6 @@ def test_a_factor_on_all_stiffness_moves_every_eigenvalue_alike(portal: Any) -> 
     slope = eigenvalue_sensitivities(model, modes, [stiffness, density])
     np.testing.assert_allclose(slope[:, 0], modes.eigenvalues, rtol=1e-9)
     np.testing.assert_allclose(slope[:, 1], -modes.eigenvalues, rtol=1e-9)
-    hertz = frequency_sensitivities(model, modes, [stiffness])
-    np.testing.assert_allclose(hertz[:, 0], modes.natural_frequencies / 2.0, rtol=1e-9)
     doubled = Model.of(structure.with_values([stiffness], [2.0]))
     np.testing.assert_allclose(
         solve_modes(doubled).elastic.eigenvalues[:8], 2.0 * modes.eigenvalues, rtol=1e-9
@@ -190,7 +187,7 @@ def test_a_factor_on_all_stiffness_moves_every_eigenvalue_alike(portal: Any) -> 
 
 
 def test_a_repeated_eigenvalue_leaves_out_what_turns_inside_its_space() -> None:
-    tube = rectangular_tube(0.04, 0.04, 0.002)
+    tube = Section.rectangular_tube(0.04, 0.04, 0.002)
     steel = Material(207e9, 0.3, 7850.0)
     joints = (Joint("foot", (0.0, 0.0, 0.0)), Joint("top", (1.0, 0.0, 0.0)))
     clamp = Support(Place(joint="foot"), ("x", "y", "z", "rx", "ry", "rz"))

@@ -23,7 +23,6 @@ from femubench import (
 )
 from femubench.core.conformance.problems import problem
 from femubench.core.fem.model_parameters import matrix_slopes
-from femubench.core.fem.sections import constant_kappa
 from femubench.core.modal.eigen import count_evaluations
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
 from femubench.core.update.residuals import Targets, predict
@@ -38,21 +37,19 @@ from femubench.fem import (
     PointMass,
     Property,
     Section,
+    Structure,
 )
 from femubench.plugins.strategies.bayesian import Bayesian
 from femubench.plugins.strategies.factors import Global, Local
 from femubench.plugins.strategies.offset import Offset
 from femubench.plugins.strategies.spring import Spring
 from femubench.update import (
+    Changes,
+    Joints,
     UpdateOptions,
     all_elements,
-    groups_within,
-    half_depth,
-    joint_groups,
     scale_property,
-    select_determined,
     sensitivity_update,
-    spring_estimates,
 )
 
 RNG = np.random.default_rng(0)
@@ -79,7 +76,8 @@ def measured(
 
 def with_shear(frame: Frame) -> Frame:
     members = tuple(
-        replace(m, section=replace(m.section, kappa=constant_kappa(0.4355))) for m in frame.members
+        replace(m, section=replace(m.section, kappa=Section.constant_kappa(0.4355)))
+        for m in frame.members
     )
     return replace(frame, beam="timoshenko", members=members)
 
@@ -123,7 +121,7 @@ def test_global_gives_the_factor_that_its_residual_asks_for(ladder: Any, residua
 def test_initial_springs_are_twice_those_of_the_element_behind(hframe_case: Any) -> None:
     """The printed values come from elements of 0.0450 m, mesh C has 0.04625 m."""
     frame = hframe_case[0].frame_structure.frame
-    found = spring_estimates(frame, ("horizontal@T1", "horizontal@T2"))
+    found = Joints(Structure.build(frame)).spring_estimates(("horizontal@T1", "horizontal@T2"))
     longer = 0.04625 / 0.0450
     powers = {"x": 1, "z": 3, "ry": 1}
     expected = {name: PAPER_SPRINGS[name] / longer**power for name, power in powers.items()}
@@ -274,7 +272,7 @@ def test_no_more_parameters_than_frequencies(hframe_case: Any) -> None:
         return scale_property(name, "EI", ())
 
     levels = [[some("a"), some("b")], [], [some("c"), some("d")], [some("e")]]
-    counts = {n: [change.name for change in select_determined(levels, n)] for n in (1, 2, 3, 4, 9)}
+    counts = {n: [change.name for change in Changes.determined(levels, n)] for n in (1, 2, 3, 4, 9)}
     assert counts == {1: ["a"], 2: ["a", "b"], 3: ["a", "b"], 4: list("abcd"), 9: list("abcde")}
 
 
@@ -340,18 +338,23 @@ def test_the_softer_joint_of_the_asymmetric_frame_comes_out_softer(cases: Any) -
 
 
 def test_joint_groups(hframe: Any, ladder: Any) -> None:
-    groups = {group.name: group.ends for group in joint_groups(hframe())}
+    groups = {group.name: group.ends for group in Joints(Structure.build(hframe())).groups()}
     assert groups == {
         "T through": ("lower1@T1", "upper1@T1", "lower2@T2", "upper2@T2"),
         "T branch": ("horizontal@T1", "horizontal@T2"),
     }
-    found = {group.name: len(group.ends) for group in joint_groups(ladder())}
+    found = {group.name: len(group.ends) for group in Joints(Structure.build(ladder())).groups()}
     assert found == {"L": 8, "T through": 4, "T branch": 2}
     untyped = replace(ladder(), joints=tuple(replace(j, type="") for j in ladder().joints))
-    assert len(joint_groups(untyped)) == 8
-    assert [g.name for g in groups_within(untyped, 3)] == ["all", "all through", "all branch"]
-    assert [g.name for g in groups_within(untyped, 2)] == ["all"]
-    assert half_depth(ladder(), "BE@B") == pytest.approx(0.0127)
+    joints = Joints(Structure.build(untyped))
+    assert len(joints.groups()) == 8
+    assert [g.name for g in joints.groups_within(3)] == [
+        "all",
+        "all through",
+        "all branch",
+    ]
+    assert [g.name for g in joints.groups_within(2)] == ["all"]
+    assert Joints(Structure.build(ladder())).half_depth("BE@B") == pytest.approx(0.0127)
 
 
 def test_the_springs_of_a_ladder_sit_at_the_faces(cases: Any) -> None:

@@ -16,16 +16,16 @@ from femubench.core.errors import InputError
 from femubench.core.run.runner import run_jobs
 from femubench.core.schema.results import Run
 from femubench.core.score.comparison import Against, compare_runs
+from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.statistics import (
     Significance,
     flip_signs,
     interval_of_mean,
-    structures_of,
     tell_apart,
     weigh_evidence,
 )
 from femubench.core.typing import FloatArray
-from femubench.results import interval_kind, leaderboard, run_from_json, run_to_json
+from femubench.results import Standings, run_from_json, run_to_json
 
 TRIALS = 400
 # Spread of a gain between structures, cases of one, and seeds.
@@ -190,7 +190,7 @@ class TestGain:
         """Gains that are normal, so that the interval of Student is the right one."""
         own = np.random.default_rng(1).normal(0.5, 0.1, 20)
         run = run_of({"a": own[:, None] + np.zeros((1, 2))}, TWENTY)
-        assert interval_kind(run) == "structures"
+        assert Standings.interval_of(run) == "structures"
         (row,) = leaderboard(run).to_dict("records")
         assert row["gain"] == pytest.approx(own.mean())
         half = student.ppf(0.975, 19) * own.std(ddof=1) / np.sqrt(20)
@@ -206,7 +206,7 @@ class TestLabels:
         data = run_to_json(run)
         assert [result["structure"] for result in data["results"]] == ["angle", "other"]
         back = run_from_json(data)
-        assert structures_of(back) == run.meta["structures"]
+        assert back.structures == run.meta["structures"]
         assert back.results == run.results
 
     def test_of_a_stored_run_are_checked(self) -> None:

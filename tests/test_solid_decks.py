@@ -212,7 +212,7 @@ def test_an_updated_model_is_a_deck_with_a_material_for_each_group(tmp_path: Pat
     assert set(model.groups) == {"PLATES", "LEFT", "RIGHT"}
     assert model.group_kinds == {"LEFT": "joint", "RIGHT": "joint"}
     factors = [fem.Property(n, "E", (f"group:{n}",)) for n in ("LEFT", "PLATES")]
-    updated = fem.with_group_factors(model, factors, [0.4, 1.02])
+    updated = fem.Groups(model).with_factors(factors, [0.4, 1.02])
     femubench.write_model(updated, tmp_path, like=source, unit="mm")
     assert [file.name for file in tmp_path.iterdir()] == ["plates.inp"]
     again = femubench.read_model(tmp_path / "plates.inp", unit="mm")

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame, Joint, JointSpring, Material, Member, Place, PointMass
 from femubench.core.fem.model import LowRank, Model
-from femubench.core.fem.sections import round_tube
+from femubench.core.fem.sections import Section
 from femubench.core.modal.eigen import dense_matrices, solve_dense, solve_modes
 from femubench.core.modal.sparse_eigen import ShiftedModel, lowest_eigenpairs
 from femubench.core.typing import FloatArray
@@ -72,7 +72,7 @@ def test_indefinite_sparse_stiffness(ladder: FrameBuilder) -> None:
 
 
 def test_repeated_eigenvalues_are_all_found() -> None:
-    section = round_tube(0.02, 0.002)
+    section = Section.round_tube(0.02, 0.002)
     joints = (Joint("A", (0.0, 0.0, 0.0)), Joint("B", (0.3, 0.4, 0.5)))
     member = Member("m", ("A", "B"), 40, section, Material(70e9, 0.3, 2700.0))
     model = Model.of(Frame("3d", "euler-bernoulli", joints, (member,)))

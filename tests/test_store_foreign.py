@@ -18,7 +18,7 @@ import pytest
 
 from femubench.core.errors import InputError
 from femubench.core.run.record_file import Record, write_file
-from femubench.core.run.store import Store, note_missing_jobs
+from femubench.core.run.store import Store
 from femubench.core.run.upkeep import find_store_faults
 from femubench.core.schema.records import encode_result
 from femubench.core.schema.results import JobResult
@@ -170,7 +170,7 @@ def test_jobs_that_a_file_claims_are_counted_not_made() -> None:
     many = {f"case-{n}": {} for n in range(10**4)}
     meta = {"cases": many, "strategies": [f"s-{n}" for n in range(10**3)], "seeds": [*range(10**3)]}
     there = [JobResult("case-0", "s-0", 0, "ok"), JobResult("other", "s-0", 0, "ok")]
-    assert note_missing_jobs(meta, there) == (
+    assert Store.note_missing_jobs(meta, there) == (
         "9999999999 of 10000000000 jobs are missing and count as the model that was given: "
         "case-0 s-1 seed 0 drawn, case-0 s-2 seed 0 drawn, case-0 s-3 seed 0 drawn,"
         " case-0 s-4 seed 0 drawn,"

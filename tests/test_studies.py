@@ -24,9 +24,10 @@ from femubench.core.run.recording import Progress
 from femubench.core.run.runner import Receivers
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult
+from femubench.core.score.leaderboard import leaderboard
 from femubench.core.study.conditions import vary_case
+from femubench.core.study.gain import gain_by
 from femubench.core.study.study_file import read_study
-from femubench.results import gain_by, leaderboard
 
 ROD = """\
 [case]

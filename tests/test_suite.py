@@ -12,9 +12,10 @@ from printed_boards import as_printed, assert_board_is_that_of, assert_same_erro
 
 import femubench
 from femubench import Run, read_case
+from femubench.core.score.leaderboard import leaderboard, list_rows
 from femubench.core.score.scoring import reference_of
 from femubench.reports.summary import finding, lead
-from femubench.results import PredictiveBoard, leaderboard, list_rows
+from femubench.results import PredictiveBoard
 from truths.published import write_garteur
 
 ROOT = Path(__file__).parents[1]

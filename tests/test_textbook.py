@@ -16,9 +16,10 @@ from femubench import NotApplicable
 from femubench.core.cli.main import bench
 from femubench.core.plugin.loader import list_effects, load_plugins
 from femubench.core.run.store import Store
+from femubench.core.score.scoring import score_model
 from femubench.effect import textbook_model
-from femubench.fem import bredt
-from femubench.results import run_from_json, run_to_json, score_model
+from femubench.fem import Section
+from femubench.results import run_from_json, run_to_json
 from tests.test_cli import put_distribution
 
 EFFECTS = list_effects()
@@ -29,7 +30,7 @@ def test_it_has_bredts_torsion_constant_shear_and_rotary_inertia() -> None:
     frame = textbook_model(case.model, EFFECTS).frame_structure.frame
     tube = frame.members[0].section
     wall = (0.0254 - np.sqrt(0.0254**2 - tube.A)) / 2.0
-    assert pytest.approx(bredt(0.0254 - wall, 0.0254 - wall, wall), rel=2e-3) == tube.J
+    assert pytest.approx(Section.bredt(0.0254 - wall, 0.0254 - wall, wall), rel=2e-3) == tube.J
     assert frame.beam == "timoshenko"
     assert frame.rotary_share == pytest.approx(1.0)
 

@@ -41,7 +41,7 @@ from femubench.core.fem.frame import (
     Support,
 )
 from femubench.core.fem.model import Model
-from femubench.core.fem.sections import rectangular_tube, round_tube
+from femubench.core.fem.sections import Section
 from femubench.core.library.rank import plan_again, plan_run, rank, request_of, textbook_of
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
@@ -51,6 +51,7 @@ from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
 from femubench.core.schema.records import run_from_json, run_to_json
 from femubench.core.schema.results import JobResult, Run
+from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.repeatability import unsteady
 from femubench.core.score.scoring import judge, reference_of
 from femubench.core.score.twin_gain import twin_gains
@@ -58,7 +59,6 @@ from femubench.core.twin.disguise import disguise_case
 from femubench.core.twin.similarity import Similarity, matrix_factors, similar_case, similar_frame
 from femubench.core.twin.twins import FAMILIES, Twin, again, twin_of, twins_of
 from femubench.core.typing import SparseArray
-from femubench.results import leaderboard
 
 BY = Similarity(length=1.3, modulus=0.7, density=1.4)
 COMPUTED = ["frame-solid", "suite/bracket", "suite/tower"]
@@ -66,7 +66,7 @@ COMPUTED = ["frame-solid", "suite/bracket", "suite/tower"]
 
 def everything() -> Frame:
     """A frame in space with one of each thing that a frame can have."""
-    tube, pipe = rectangular_tube(0.03, 0.05, 0.002), round_tube(0.04, 0.003)
+    tube, pipe = Section.rectangular_tube(0.03, 0.05, 0.002), Section.round_tube(0.04, 0.003)
     steel, light = Material(2.1e11, 0.3, 7850.0), Material(7e10, 0.33, 2700.0)
     joints = [("A", (0, 0, 0)), ("B", (0, 0, 1)), ("C", (0.8, 0.1, 1)), ("D", (0.9, 0.2, 0))]
     joints += [("E", (0.8, 0.9, 1.1)), ("F", (0.9, 0.9, 1.1)), ("G", (0.4, 0.9, 1.2))]

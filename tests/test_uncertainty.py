@@ -23,7 +23,7 @@ from femubench.core.run.jobs import Job, JobOutcome, execute, seed_words
 from femubench.core.run.judging import judge_outcome
 from femubench.core.schema.paired_modes import PairedMode, PartnerCandidate
 from femubench.core.schema.results import Block, JobResult, Run
-from femubench.core.score.leaderboard import GainTable
+from femubench.core.score.leaderboard import GainTable, leaderboard
 from femubench.core.score.predicted_spread import Spread
 from femubench.core.score.predictive import (
     Forecasts,
@@ -34,7 +34,6 @@ from femubench.core.score.predictive import (
 from femubench.core.score.ranking import list_models
 from femubench.core.score.scoring import judge, reference_of
 from femubench.fem import FloatArray
-from femubench.results import leaderboard
 from femubench.update import Uncertainty
 
 CASE = toys.tiny_case()

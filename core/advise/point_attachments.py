@@ -11,8 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from femubench.core.advise.prediction import Outlook, Points, Predicted
-from femubench.core.effect.attachments import free_translations, point_in
-from femubench.core.effect.places import point_places
+from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.fem.model import Model
 from femubench.core.fit.modal_fit import signed_hz
 from femubench.core.inference.settings import settings
@@ -23,14 +22,14 @@ def points_of(model: Model) -> Points:
     """Return joints and the middles of members, at most 48 spread over the model."""
     chosen = _chosen(model)
     chosen = chosen[:: -(-len(chosen) // settings.points)] if chosen else chosen
-    pairs = [(label, free_translations(model, point_in(model, label))) for label in chosen]
+    pairs = [(label, ModelPlaces(model).free(ModelPlaces(model).point(label))) for label in chosen]
     moving = [(label, free) for label, free in pairs if free]
     return Points(tuple(label for label, _ in moving), tuple(free for _, free in moving))
 
 
 def _chosen(model: Model) -> list[str]:
     """Return joints, and of every member the point nearest to its middle."""
-    places = point_places(model)
+    places = ModelPlaces(model).points()
     if model.structure is None:
         return list(places)
     joints = model.structure.frame.joint_index

@@ -11,7 +11,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from femubench.core.change.hypothesis import Hypothesis
-from femubench.core.effect.attachments import point_in, translation_rows
+from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.reading import Reading
 from femubench.core.fem.model import Model
 from femubench.core.fit.modal_basis import nominal_space
@@ -80,7 +80,10 @@ class Points:
     def rows(self, model: Model) -> SparseArray:
         """Return the translations from the dofs of a model, sparse (n_sensors, n)."""
         pairs = zip(self.labels, self.directions, strict=True)
-        rows = [translation_rows(model, point_in(model, label), d) for label, d in pairs]
+        rows = [
+            ModelPlaces(model).translations(ModelPlaces(model).point(label), d)
+            for label, d in pairs
+        ]
         return sp.csr_array(sp.vstack(rows)) if rows else sp.csr_array((0, model.size))
 
 

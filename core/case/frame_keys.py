@@ -18,14 +18,7 @@ from femubench.core.case.schema import FrameSpec, MaterialSpec, MemberSpec, Sect
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Factor, Frame, Member, Place, Plane, RigidEnd
 from femubench.core.fem.nominal import MAY_VANISH
-from femubench.core.fem.sections import (
-    SHAPES,
-    BoxKappa,
-    CircleKappa,
-    Section,
-    ShearCoefficients,
-    wall_of,
-)
+from femubench.core.fem.sections import SHAPES, BoxKappa, CircleKappa, Section, ShearCoefficients
 from femubench.core.fem.structure import Structure
 from femubench.core.files import read_text
 
@@ -316,7 +309,7 @@ def _recover_sizes(section: Section) -> Iterator[tuple[str, dict[str, float]]]:
 
 def _walls(section: Section, width: float, height: float) -> Iterator[float]:
     """Yield wall thicknesses that the shear coefficient or the area of a tube tells of."""
-    walls, kappa = [wall_of(section)], section.kappa
+    walls, kappa = [section.wall], section.kappa
     if isinstance(kappa, BoxKappa):
         # It knows the centre-line sizes; the wall is what both of them round from.
         pairs = [(width, kappa.b), (height, kappa.h)]

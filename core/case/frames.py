@@ -50,7 +50,7 @@ from femubench.core.fem.frame import (
     Vector,
 )
 from femubench.core.fem.mesh import ON_MEMBER, locate, nearest_place, place_xyz
-from femubench.core.fem.sections import SHAPES, Section, constant_kappa
+from femubench.core.fem.sections import SHAPES, Section
 from femubench.core.fem.sensors import moved_names
 from femubench.core.typing import FloatArray
 
@@ -72,7 +72,7 @@ def section_of(spec: SectionSpec, plane: Plane, beam: BeamTheory) -> Section:
     shape = spec.shape
     section = _from_numbers(spec, plane) if shape is None else _from_shape(spec, shape)
     if spec.kappa is not None:
-        section = replace(section, kappa=constant_kappa(spec.kappa))
+        section = replace(section, kappa=Section.constant_kappa(spec.kappa))
     if beam == "timoshenko" and section.kappa is None:
         raise BadKey(("kappa",), "missing key", "the shear coefficient of a timoshenko beam, > 0")
     return section

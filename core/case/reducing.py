@@ -12,7 +12,7 @@ from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Dofs, Model
 from femubench.core.modal.eigen import DENSE_LIMIT
-from femubench.core.modal.group_prior import support_groups
+from femubench.core.modal.group_prior import GroupPriors
 from femubench.core.modal.grouped_reduction import GroupedReduction, reduce_groups
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
@@ -95,7 +95,7 @@ def _small_model(model: Model, found: GroupedReduction) -> Model:
         dofs=small,
         geometry=MatrixGeometry(names, small, mesh=mesh),
         # What holds to ground is not to be seen in coordinates that lie nowhere.
-        group_kinds={**dict.fromkeys(support_groups(model), "support"), **model.group_kinds},
+        group_kinds={**dict.fromkeys(GroupPriors(model).supports, "support"), **model.group_kinds},
         groups=sparse(found.groups),
         mass_groups=sparse(found.mass_groups),
     )

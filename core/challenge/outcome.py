@@ -17,7 +17,7 @@ from femubench.core.challenge.score import (
     group_size,
 )
 from femubench.core.challenge.truth_file import KnownCase, TrueCause
-from femubench.core.effect.places import match
+from femubench.core.effect.places import Places
 from femubench.core.fem.frame import Frame
 
 OUTCOMES = (
@@ -53,7 +53,7 @@ def same_place(frame: Frame | None) -> Same:
 
     def same(first: str, second: str) -> bool:
         one, two = _in_order(first), _in_order(second)
-        return one == two if frame is None else match(frame, one, two)
+        return one == two if frame is None else Places(frame).match(one, two)
 
     return same
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from femubench.core.challenge.answer import Answer, AnswerParameter
 from femubench.core.challenge.structures import structure_named
 from femubench.core.challenge.truth import HiddenCause, Truth
-from femubench.core.effect.places import match
+from femubench.core.effect.places import Places
 from femubench.core.fem.frame import Frame, split_half
 
 TOO_SMALL = 12.0  # of chi-square: what lowers it by less cannot be seen
@@ -158,7 +158,7 @@ def group_size(answer: Answer) -> int:
 def _sit_right(frame: Frame, parts: Parts, causes: Sequence[HiddenCause]) -> bool:
     """Tell whether every effect named sits where it truly sits."""
     return all(
-        any(effect == cause.effect and match(frame, place, cause.place) for cause in causes)
+        any(effect == cause.effect and Places(frame).match(place, cause.place) for cause in causes)
         for effect, place in parts
     )
 
@@ -172,7 +172,7 @@ def _sizes(frame: Frame, answer: Answer, causes: Sequence[HiddenCause]) -> tuple
         SizeError.of(cause.effect, value, unit, parameter)
         for cause in causes
         for said in answer.causes
-        if said.effect == cause.effect and match(frame, said.place, cause.place)
+        if said.effect == cause.effect and Places(frame).match(said.place, cause.place)
         if not split_half(said.place)[1]
         for name, value, unit in zip(cause.names, cause.values, cause.units, strict=True)
         for parameter in said.parameters

@@ -21,7 +21,7 @@ from femubench.core.fem.frame import (
     Vector,
 )
 from femubench.core.fem.model import Model
-from femubench.core.fem.sections import rectangular_tube
+from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
 
 ALUMINIUM = Material(E=70e9, nu=0.33, rho=2700.0)
@@ -109,7 +109,7 @@ def _ladder(name: str, stretch: float = 1.0) -> Specimen:
         stretch: factor on the half side ``front-left``.
     """
     half, rung = 0.2921, 0.2794  # m, centre lines
-    tube = rectangular_tube(0.0254, 0.0254, 0.00238)
+    tube = Section.rectangular_tube(0.0254, 0.0254, 0.00238)
     joints = (
         Joint("J1", (2 * half, rung, 0.0), "L"),
         Joint("J3", (2 * half, 0.0, 0.0), "L"),
@@ -139,7 +139,7 @@ def _hframe(name: str) -> Specimen:
 
     Source: geometry as in Horton, Gurgenci, Veidt & Friswell (1999).
     """
-    tube = rectangular_tube(0.040, 0.040, 0.0025)
+    tube = Section.rectangular_tube(0.040, 0.040, 0.0025)
     joints = [Joint("T1", (0.0, 0.0, 0.0), "T"), Joint("T2", (0.74, 0.0, 0.0), "T")]
     members = [Member("horizontal", ("T1", "T2"), 8, tube, STEEL)]
     words = ["T1:x", "T1:z", "T2:z", *(f"horizontal@{s}:z" for s in (0.25, 0.5, 0.75))]
@@ -156,8 +156,8 @@ def _hframe(name: str) -> Specimen:
 
 def _portal(name: str) -> Specimen:
     """Return a two-storey portal on clamped feet, in plane; 78 dofs."""
-    column = rectangular_tube(0.040, 0.040, 0.003)
-    beam = rectangular_tube(0.030, 0.050, 0.003)
+    column = Section.rectangular_tube(0.040, 0.040, 0.003)
+    beam = Section.rectangular_tube(0.030, 0.050, 0.003)
     joints = (
         Joint("A", (0.0, 0.0, 0.0), "foot"),
         Joint("B", (1.1, 0.0, 0.0), "foot"),
@@ -185,8 +185,8 @@ def _portal(name: str) -> Specimen:
 
 def _table(name: str) -> Specimen:
     """Return a table of four legs on hinged feet with a rail, in space; 168 dofs."""
-    leg = rectangular_tube(0.030, 0.030, 0.002)
-    rim = rectangular_tube(0.020, 0.040, 0.002)
+    leg = Section.rectangular_tube(0.030, 0.030, 0.002)
+    rim = Section.rectangular_tube(0.020, 0.040, 0.002)
     corners = {"1": (0.0, 0.0), "2": (0.9, 0.0), "3": (0.9, 0.6), "4": (0.0, 0.6)}
     joints = [Joint(f"F{k}", (x, y, 0.0), "foot") for k, (x, y) in corners.items()]
     joints += [Joint(f"C{k}", (x, y, 0.7), "corner") for k, (x, y) in corners.items()]

@@ -90,11 +90,23 @@ class Change:
         """Return the same with nothing known of its values but their range.
 
         Examples:
-            >>> float(update.scale_all_stiffness(model, 0.1).without_prior().parameters[0].std)
+            >>> float(update.Changes(model).stiffness(0.1).without_prior().parameters[0].std)
             inf
         """
         free = tuple(replace(p, std=np.inf) for p in map(parameter_of, self.parameters))
         return replace(self, parameters=free)
+
+    @classmethod
+    def proportional(cls, *terms: Term, neutral: float = 0.0) -> Change:
+        """Return a change that grows with the distance of one value from its neutral one.
+
+        Examples:
+            >>> mass = effect.ModelPlaces(model).mass_term([fem.Place(joint="J1")])
+            >>> print(effect.Change.proportional(mass).coefficients(np.array([[0.5]])))
+            [[0.5]]
+        """
+        count = len(terms)
+        return cls(terms, lambda values: np.repeat(values[:, :1] - neutral, count, axis=1))
 
 
 def parameter_of(parameter: EffectParameter) -> Parameter:
@@ -104,18 +116,6 @@ def parameter_of(parameter: EffectParameter) -> Parameter:
     p = parameter
     given = p.name, p.unit, p.scale, p.neutral, p.lower, p.upper, p.scaling, p.one_sided
     return Parameter(*given, p.textbook, p.wording)
-
-
-def proportional(*terms: Term, neutral: float = 0.0) -> Change:
-    """Return a change that grows with the distance of one value from its neutral one.
-
-    Examples:
-        >>> mass = effect.proportional(effect.mass_term(model, [fem.Place(joint="J1")]))
-        >>> print(mass.coefficients(np.array([[0.5]])))
-        [[0.5]]
-    """
-    count = len(terms)
-    return Change(terms, lambda values: np.repeat(values[:, :1] - neutral, count, axis=1))
 
 
 def scale_property(

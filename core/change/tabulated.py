@@ -10,9 +10,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core import roles
-from femubench.core.change.change import Change, proportional
-from femubench.core.change.interpolation import barycentric, chebyshev_nodes
-from femubench.core.change.terms import Term, sparse_term
+from femubench.core.change.change import Change
+from femubench.core.change.interpolation import ChebyshevPoints
+from femubench.core.change.terms import Term
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model, common_dofs
 from femubench.core.modal.factorisation import LU
@@ -62,19 +62,19 @@ def tabulate_change(
     if affine is not None:
         return affine
     ranges = [_within(parameter) for parameter in parameters]
-    nodes = [chebyshev_nodes(*bounds, count) for bounds in ranges]
+    nodes = [ChebyshevPoints(*bounds, count) for bounds in ranges]
     terms: list[Term] = []
-    for point in product(*nodes):
+    for point in product(*(own.points for own in nodes)):
         values = [float(p.value(np.array(x))) for p, x in zip(parameters, point, strict=True)]
         mass, stiffness = _difference(model, effect.extend(model, place, values))
-        terms += [sparse_term("mass", mass), sparse_term("stiffness", stiffness)]
+        terms += [Term.of("mass", mass), Term.of("stiffness", stiffness)]
 
     def coefficients(values: FloatArray) -> FloatArray:
         share = np.ones((len(values), 1))
         for i, parameter in enumerate(parameters):
             x = np.array([parameter.coordinate(float(v)) for v in values[:, i]])
             x = np.clip(x, *ranges[i])
-            own = barycentric(nodes[i], x)
+            own = nodes[i].shares(x)
             share = (share[:, :, None] * own[:, None, :]).reshape(len(values), -1)
         return np.repeat(share, 2, axis=1)
 
@@ -99,8 +99,8 @@ def _affine(
         size = abs(two).max() if two.nnz else 0.0
         if size > 0.0 and abs(one / first - two / second).max() > _AFFINE * size / abs(second):
             return None
-    terms = (sparse_term("mass", far[0] / second), sparse_term("stiffness", far[1] / second))
-    return proportional(*terms, neutral=parameter.neutral)
+    terms = (Term.of("mass", far[0] / second), Term.of("stiffness", far[1] / second))
+    return Change.proportional(*terms, neutral=parameter.neutral)
 
 
 def _within(parameter: EffectParameter) -> tuple[float, float]:

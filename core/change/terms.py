@@ -136,15 +136,15 @@ class Term:
     operator: Operator
     weight: float | None = None
 
+    @classmethod
+    def of(cls, matrix: Literal["mass", "stiffness"], change: SparseArray) -> Term:
+        """Return the term of any symmetric matrix, sparse or of low rank.
 
-def sparse_term(matrix: Literal["mass", "stiffness"], change: SparseArray) -> Term:
-    """Return a term of a sparse matrix.
-
-    Examples:
-        >>> effect.sparse_term("stiffness", model.stiffness).matrix
-        'stiffness'
-    """
-    return Term(matrix, MatrixOperator(sp.csr_array(change)))
+        Examples:
+            >>> effect.Term.of("stiffness", model.stiffness).matrix
+            'stiffness'
+        """
+        return cls(matrix, MatrixOperator(sp.csr_array(change) if sp.issparse(change) else change))
 
 
 def sparse_matrix(operator: Operator, size: int) -> SparseArray:

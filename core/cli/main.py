@@ -24,25 +24,29 @@ from femubench.core.version import __version__
 DONE, FAILED, WRONG_INPUT = 0, 1, 2
 
 # A verb, which is a click command of that name in a module of that name, and its help in one line,
-# which stands here so that `bench --help` imports none of them.
-VERBS = {
+# which stands here so that `bench --help` imports none of them; in the order in which one meets
+# them, and then those that one seldom needs.
+_OFTEN = {
     "run": "Run strategies on cases and rank them.",
     "study": "Run strategies under conditions that vary: noise, sensors, options.",
     "report": "Write a report on a stored run.",
     "compare": "Compare run B with run A; exit with 1 if B is worse.",
-    "store": "Check or repair stored runs.",
-    "submit": "Check, run and compare a strategy for a leaderboard.",
-    "publish": "Merge result files into a static site in DIR.",
     "update": "Write the updated model of CASE in the format that it came in.",
     "diagnose": "Find what a model lacks, and extend it.",
     "identify": "Find modes in measured responses, without a click.",
-    "reproduce": "Recompute the tables of the papers, cell by cell.",
     "init": "Write a case folder into FOLDER, which must be new or empty.",
-    "challenge": "Write blind cases with a hidden fault, and score answers.",
     "help": "Explain a key of a case, an effect, a verdict or a setting.",
     "scenarios": "List the built-in scenarios, or show one.",
     "plugins": "List, show and check plugins, or write a new one.",
 }
+_SELDOM = {
+    "store": "Check or repair stored runs.",
+    "submit": "Check, run and compare a strategy for a leaderboard.",
+    "publish": "Merge result files into a static site in DIR.",
+    "reproduce": "Recompute the tables of the papers, cell by cell.",
+    "challenge": "Write blind cases with a hidden fault, and score answers.",
+}
+VERBS = {**_OFTEN, **_SELDOM}
 
 
 class VerbGroup(click.Group):
@@ -89,8 +93,9 @@ class VerbGroup(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of verbs without importing them."""
-        with formatter.section("Commands"):
-            formatter.write_dl(list(VERBS.items()))
+        for title, verbs in (("Commands", _OFTEN), ("Seldom needed", _SELDOM)):
+            with formatter.section(title):
+                formatter.write_dl(list(verbs.items()))
 
     def invoke(self, ctx: click.Context) -> Any:  # noqa: ANN401 - as click has it
         """Run a verb; print one line for an error that the user can act upon."""

@@ -3,20 +3,11 @@
 from __future__ import annotations
 
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.effect.interfaces import node_pairs
-from femubench.core.effect.places import (
-    bare_place,
-    elements_of,
-    joints_of,
-    pair_of,
-    point_of,
-    split_direction,
-    supports_of,
-)
+from femubench.core.effect.model_places import ModelPlaces
+from femubench.core.effect.places import Places, bare_place, split_direction
 from femubench.core.errors import ModelError
-from femubench.core.fem.group_factors import group_places
+from femubench.core.fem.group_factors import Groups
 from femubench.core.fem.model import Model
-from femubench.core.fem.structure import Structure
 
 
 def has_place(model: Model, place: str) -> bool:
@@ -24,8 +15,8 @@ def has_place(model: Model, place: str) -> bool:
     bare = split_direction(bare_place(place).removesuffix(":branch"))[0]
     if model.structure is not None:
         words = (bare, place)
-        return any(_in_frame(model.structure, w) for w in words) or _is_interface(model, bare)
-    known = {"all", *group_places(model, "stiffness"), *group_places(model, "mass")}
+        return any(_in_frame(model, w) for w in words) or _is_interface(model, bare)
+    known = {"all", *Groups(model).places("stiffness"), *Groups(model).places("mass")}
     if isinstance(model.geometry, MatrixGeometry):
         known |= set(model.geometry.names)
     return place in known or bare in known or _is_interface(model, bare)
@@ -33,20 +24,20 @@ def has_place(model: Model, place: str) -> bool:
 
 def _is_interface(model: Model, place: str) -> bool:
     try:
-        return bool(node_pairs(model, place))
+        return bool(ModelPlaces(model).node_pairs(place))
     except ModelError:
         return False
 
 
-def _in_frame(structure: Structure, place: str) -> bool:
-    frame = structure.frame
-    if joints_of(frame, place):
+def _in_frame(model: Model, place: str) -> bool:
+    words = Places(model.frame_structure.frame)
+    if words.joints_of(place):
         return True
     reads = (
-        lambda: elements_of(structure, place),
-        lambda: point_of(frame, place),
-        lambda: pair_of(frame, place),
-        lambda: supports_of(frame, place),
+        lambda: ModelPlaces(model).elements(place),
+        lambda: words.point(place),
+        lambda: words.pair(place),
+        lambda: words.supports_of(place),
     )
     for read in reads:
         try:

@@ -25,7 +25,7 @@ from femubench.core.fem.frame import (
 )
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
-from femubench.core.fem.sections import rectangular_tube
+from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.measurement import Measurement
@@ -78,7 +78,7 @@ def small_frame(
             the joints' own rotations without mass.
         torsion: factor on the torsion constant.
     """
-    tube = rectangular_tube(0.024, 0.032, 0.002)
+    tube = Section.rectangular_tube(0.024, 0.032, 0.002)
     section = replace(tube, J=torsion * tube.J)
     material = Material(modulus, 0.33, 2700.0)
     names = sorted({joint for member in members for joint in member})

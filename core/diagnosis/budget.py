@@ -26,9 +26,9 @@ from femubench.core.change.change import Change
 from femubench.core.change.hypothesis import Hypothesis
 from femubench.core.change.parameter import Parameter
 from femubench.core.change.terms import ElementOperator, Term
-from femubench.core.effect.attachments import mass_term
+from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.textbook import textbook_values
-from femubench.core.fem.beam import BEND_XY, BEND_XZ, TWIST, mass_matrices, stiffness_matrices
+from femubench.core.fem.beam import BEND_XY, BEND_XZ, TWIST
 from femubench.core.fem.frame import ACTIVE, MADE, Factor, Frame, Place, PointMass
 from femubench.core.fem.joints import half_depth, joint_groups, whole_members
 from femubench.core.fem.model import Model
@@ -227,7 +227,8 @@ def list_entries(model: Model) -> list[Entry]:
     """Return all that the drawing of a frame leaves open: joint zones, E, density, masses."""
     structure = model.frame_structure
     frame = structure.frame
-    stiff, heavy = (f(structure.properties) for f in (stiffness_matrices, mass_matrices))
+    p = structure.properties
+    stiff, heavy = p.stiffness_matrices(), p.mass_matrices()
     found, (unknown, passing, correlation, _) = [], settings.budget_joints
     widths = dict(zip(MADE, settings.budget_made, strict=True))
     made = {kind.type: widths[kind.made] for kind in frame.joint_kinds}
@@ -267,7 +268,7 @@ def list_entries(model: Model) -> list[Entry]:
     for place, alike_joints in kinds.items():
         std = mass * model.total_mass / np.sqrt(len(alike_joints))
         for name in alike_joints:
-            term = mass_term(model, [Place(joint=name)])
+            term = ModelPlaces(model).mass_term([Place(joint=name)])
             found.append(_alone(place, "joint mass", term, std, (), (name,)))
     return found
 

@@ -10,18 +10,7 @@ from functools import cache
 import numpy as np
 
 from femubench.core.change.change import parameter_of
-from femubench.core.effect.places import (
-    ALL,
-    bare_place,
-    ends_of,
-    joints_of,
-    members_of,
-    point_of,
-    set_places,
-    split_direction,
-    supports_of,
-    type_places,
-)
+from femubench.core.effect.places import ALL, Places, bare_place, split_direction
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame
 from femubench.core.fit.modal_basis import place_parts
@@ -140,8 +129,8 @@ def list_regions(frame: Frame | None, place: str) -> list[tuple[str, frozenset[s
     own, found = list_atoms(frame, place), []
     if frame is not None and place != ALL:
         ends = [f"{member.name}@{joint}" for member in frame.members for joint in member.ends]
-        families = set_places(frame, ("set", "section", "material"))
-        words = [*ends, *frame.joint_index, *type_places(frame), *frame.member_index, *families]
+        families = Places(frame).sets(("set", "section", "material"))
+        words = [*ends, *frame.joint_index, *Places(frame).types(), *frame.member_index, *families]
         reach = [(word, list_atoms(frame, word, around=True)) for word in words if word != place]
         found = sorted((r for r in reach if own <= r[1]), key=lambda r: len(r[1]))
     return [*([(place, own)] if place != ALL else []), *found, (ALL, None)]
@@ -159,7 +148,7 @@ def list_atoms(frame: Frame | None, place: str, *, around: bool = False) -> froz
     """
     if frame is None:
         return frozenset({place})
-    if named := members_of(frame, place):
+    if named := Places(frame).members(place):
         members = [frame.members[frame.member_index[name]] for name in named]
         words = [f"{m.name}/{k}" for m in members for k in range(1, m.elements + 1)]
         joints = [joint for m in members for joint in m.ends]
@@ -171,14 +160,16 @@ def list_atoms(frame: Frame | None, place: str, *, around: bool = False) -> froz
         return frozenset(f"{name}@{joint}" for joint, k in ends if k == number) or frozenset(
             {place}
         )
-    if (found := joints_of(frame, place)) and not around:
+    if (found := Places(frame).joints_of(place)) and not around:
         return frozenset(found)
     with suppress(ModelError):
-        return frozenset({*found, *ends_of(frame, place)})
+        return frozenset({*found, *Places(frame).ends_of(place)})
     with suppress(ModelError):
-        return frozenset().union(*(list_atoms(frame, at) for at in supports_of(frame, place)))
+        return frozenset().union(
+            *(list_atoms(frame, at) for at in Places(frame).supports_of(place))
+        )
     with suppress(ModelError):
-        point = point_of(frame, place)
+        point = Places(frame).point(place)
         along = (
             float(point.s or 0.0) * frame.members[frame.member_index[str(point.member)]].elements
         )

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from femubench.core.fem.beam import stiffness_matrices
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import FloatArray
@@ -33,9 +32,9 @@ def relative_changes(nominal: Model, updated: Model) -> list[float | None] | Non
     structure = nominal.structure
     if structure is None or updated.structure is None:
         return None
-    before = _scaled(structure, stiffness_matrices(structure.properties))
+    before = _scaled(structure, structure.properties.stiffness_matrices())
     size = np.linalg.norm(before, axis=(1, 2))
-    after = _scaled(updated.structure, stiffness_matrices(updated.structure.properties))
+    after = _scaled(updated.structure, updated.structure.properties.stiffness_matrices())
     place = {label: k for k, label in enumerate(updated.structure.labels) if label}
     rows = [place.get(label) for label in structure.labels]
     found = np.array(
@@ -57,7 +56,7 @@ def element_norms(structure: Structure, matrices: FloatArray) -> FloatArray:
         matrices: (n, 12, 12).
 
     Examples:
-        >>> results.element_norms(structure, fem.stiffness_matrices(properties)).shape
+        >>> results.element_norms(structure, properties.stiffness_matrices()).shape
         (28,)
     """
     return np.asarray(np.linalg.norm(_scaled(structure, matrices), axis=(1, 2)))

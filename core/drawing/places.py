@@ -11,17 +11,7 @@ from msgspec import Meta
 
 from femubench.core.case.case import Case
 from femubench.core.drawing.wireframe import Point, Wireframe, check_within, to_point, wireframe_of
-from femubench.core.effect.places import (
-    ALL,
-    bare_place,
-    ends_of,
-    joints_of,
-    members_of,
-    pair_of,
-    point_of,
-    split_direction,
-    supports_of,
-)
+from femubench.core.effect.places import ALL, Places, bare_place, split_direction
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame, Place
 from femubench.core.fem.mesh import place_xyz
@@ -113,29 +103,29 @@ def _plain_place(wireframe: Wireframe, word: str, head: str) -> DrawnPlace:
 def _place(wireframe: Wireframe, frame: Frame | None, word: str) -> DrawnPlace:
     head, _ = split_direction(bare_place(word))
     plain = _plain_place(wireframe, word, head)
-    if frame is not None and plain.kind != "all" and (joints := joints_of(frame, head)):
+    if frame is not None and plain.kind != "all" and (joints := Places(frame).joints_of(head)):
         return DrawnPlace(word, "joint", points=_points(frame, joints))
     if frame is None or plain.kind in ("all", "member", "element"):
         return plain
-    if frame is not None and (named := members_of(frame, head)):
+    if frame is not None and (named := Places(frame).members(head)):
         spans = tuple(Span(frame.member_index[name], 0.0, 1.0) for name in named)
         return DrawnPlace(word, "member", spans)
     with suppress(ModelError):
-        held = [point_of(frame, at) for at in supports_of(frame, word)]
+        held = [Places(frame).point(at) for at in Places(frame).supports_of(word)]
         return DrawnPlace(word, "point", points=tuple(to_point(place_xyz(frame, p)) for p in held))
     with suppress(ModelError):
         parts = []
-        for end in ends_of(frame, head):
+        for end in Places(frame).ends_of(head):
             name, _, joint = end.rpartition("@")
             member = frame.member_index[name]
             first = frame.members[member].ends[0] == joint
             parts.append(Span(member, *((0.0, _END) if first else (1.0 - _END, 1.0))))
         return DrawnPlace(word, "end", tuple(parts))
     with suppress(ModelError):
-        at = to_point(place_xyz(frame, point_of(frame, head)))
+        at = to_point(place_xyz(frame, Places(frame).point(head)))
         return DrawnPlace(word, "point", points=(at,))
     with suppress(ModelError):
-        return DrawnPlace(word, "pair", points=_points(frame, pair_of(frame, head)))
+        return DrawnPlace(word, "pair", points=_points(frame, Places(frame).pair(head)))
     return plain
 
 

@@ -6,7 +6,9 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from typing import ClassVar
 
+from femubench.core.change.change import Change
 from femubench.core.change.parameter import Parameter
+from femubench.core.change.tabulated import tabulate_change
 from femubench.core.effect.reading import Reading
 from femubench.core.effect.sizes import Size
 from femubench.core.errors import NotApplicable
@@ -57,6 +59,14 @@ class FrameEffect(Effect):
     @abstractmethod
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the effect in it, written as ordinary keys of a case."""
+
+    def tabulate(self, model: Model, place: str) -> Change:
+        """Return what it does there, interpolated between values, as where there is no `change`.
+
+        Raises:
+            ModelError: for more than two parameters, or when the extended model has lost dofs.
+        """
+        return tabulate_change(self, model, place, self.parameters(model, place))
 
     def in_half(self, values: Sequence[float]) -> Sequence[float] | None:
         """Return what half an element needs for as much effect as `values` have in the whole.

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from femubench.core.effect.places import members_at
+from femubench.core.effect.places import Places
 from femubench.core.fem.frame import Frame, Member
 from femubench.core.fem.mesh import member_axes
 from femubench.core.typing import FloatArray
@@ -35,7 +35,7 @@ class Site:
     @cached_property
     def members(self) -> tuple[Member, ...]:
         """Return the members that the place names, or that end at the joint it names; else all."""
-        return members_at(self.frame, self.place)
+        return Places(self.frame).members_at(self.place)
 
     def mean(self, quantity: Callable[[Member], float]) -> float:
         """Return the mean of something over the members at the place."""

@@ -18,7 +18,7 @@ from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.frame import Frame, GroundSpring, Member, Place, PointMass, Support
 from femubench.core.fem.mesh import ON_MEMBER, locate, place_xyz
 from femubench.core.fem.model import Geometry, Model, carry_over
-from femubench.core.fem.sections import Section, constant_kappa
+from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
@@ -171,7 +171,7 @@ def alter_frame(frame: Frame, alteration: Alteration) -> Frame:
 def _exchanged(frame: Frame, member: Member, item: Exchange) -> Member:
     section = item.section or member.section
     if section.kappa is None and frame.beam == "timoshenko":
-        section = replace(section, kappa=constant_kappa(_KAPPA))
+        section = replace(section, kappa=Section.constant_kappa(_KAPPA))
     return replace(member, section=section, material=item.material or member.material)
 
 

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.core.fem.beam import BeamProperties, mass_matrices, stiffness_matrices
+from femubench.core.fem.beam import BeamProperties
 from femubench.core.fem.frame import GroundSpring, Oscillator, PointMass
 from femubench.core.fem.kinematics import Kinematics, node_at
 from femubench.core.fem.mesh import SHORTEST_PIECE
@@ -179,7 +179,7 @@ def _of_pieces(
         local = sp.csr_array(turn) @ frame.kinematics.transform[lines]
         local.resize((local.shape[0], size))
         batch = frame.properties.take(rows)
-        for k, matrices in ((0, mass_matrices(batch)), (1, stiffness_matrices(batch))):
+        for k, matrices in ((0, batch.mass_matrices()), (1, batch.stiffness_matrices())):
             part = local.T @ sp.block_diag(list(sign * matrices), format="csr") @ local
             mass, stiffness = (mass + part, stiffness) if k == 0 else (mass, stiffness + part)
     return sp.csc_array(mass), sp.csc_array(stiffness)

@@ -6,7 +6,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.beam import stiffness_matrices
 from femubench.core.fem.frame import ACTIVE, Frame
 from femubench.core.fem.kinematics import point_rows
 from femubench.core.fem.meshed_frame import MeshedFrame
@@ -87,7 +86,7 @@ def brace_rows(structure: MeshedFrame) -> SparseArray:
 def elastic_stiffness(structure: MeshedFrame) -> SparseArray:
     """Return the stiffness of elements, joint springs, springs to ground and braces, (n, n)."""
     properties = structure.properties
-    stiffness = structure.plan.assemble_from(lambda e: stiffness_matrices(properties.take(e)))
+    stiffness = structure.plan.assemble_from(lambda e: properties.take(e).stiffness_matrices())
     if len(structure.springs):
         rows = structure.spring_rows
         each = rows.data * np.repeat(structure.springs, np.diff(rows.indptr))

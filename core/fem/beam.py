@@ -159,6 +159,109 @@ class BeamProperties:
         )
         return first, kind
 
+    def stiffness_matrices(self) -> AnyArray:
+        """Return the local stiffness matrices in N, N m, (n, 12, 12).
+
+        Rigid ends follow Horton et al. (1999), equation (5): T' k(L - a) T, axial EA/(L - a).
+
+        Examples:
+            >>> twist = properties.stiffness_matrices()[:, 3, 3]
+            >>> np.allclose(twist, properties.GJ / properties.length)
+            True
+        """
+        L = _flexible(self)
+        dtype = np.result_type(*(getattr(self, f.name) for f in fields(self)))
+        k = np.zeros((len(self), 12, 12), dtype=dtype)
+        bar = np.array([[1.0, -1.0], [-1.0, 1.0]])
+        _place(k, AXIAL, bar * (self.EA / L)[:, None, None])
+        _place(k, TWIST, bar * (self.GJ / L)[:, None, None])
+        _place(k, BEND_XY, bending_stiffness(self.EIz, self.flex_y, L))
+        _place(k, BEND_XZ, bending_stiffness(self.EIy, self.flex_z, L), SLOPE_SIGN)
+        k = _add_rigid_ends(k, self.rigid_1, self.rigid_2)
+        if np.any(self.coupling):
+            k += self.coupling[:, None, None] * self.coupling_matrices()
+        return k
+
+    def coupling_matrices(self) -> AnyArray:
+        """Return what a bending-torsion coupling of coefficient 1 adds in N, N m, (n, 12, 12).
+
+        The strain energy is the integral of sqrt(EI GJ) d(ry)/dx d(rx)/dx; with a linear twist it
+        depends on the rotations of the ends alone, so that rigid ends change the length alone.
+
+        Examples:
+            >>> properties.coupling_matrices().shape
+            (28, 12, 12)
+        """
+        k = np.zeros(
+            (len(self), 12, 12), dtype=np.result_type(self.EIy, self.GJ, self.length, self.rigid_1)
+        )
+        block = np.array([[1.0, -1.0], [-1.0, 1.0]])
+        block = block * (np.sqrt(self.EIy * self.GJ) / _flexible(self))[:, None, None]
+        k[:, TWIST[:, None], _CURVE[None, :]] = block
+        k[:, _CURVE[:, None], TWIST[None, :]] = block
+        return k
+
+    def mass_matrices(self) -> AnyArray:
+        """Return the consistent local mass matrices in kg, kg m, kg m2, (n, 12, 12).
+
+        Cubic in bending, linear in axial motion and twist. With cubic functions the rotary inertia
+        belongs to the slope of the axis (Rayleigh); with those of the Timoshenko element it belongs
+        to the rotation of the section, as Timoshenko's theory has it.
+
+        Examples:
+            >>> axial = properties.mass_matrices()[:, 0, [0, 6]].sum(axis=1)
+            >>> np.allclose(axial, properties.rhoA * properties.length / 2)
+            True
+        """
+        L = self.length - self.rigid_mass_1 - self.rigid_mass_2
+        dtype = np.result_type(*(getattr(self, f.name) for f in fields(self)))
+        m = np.zeros((len(self), 12, 12), dtype=dtype)
+        bar = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
+        _place(m, AXIAL, bar * (self.rhoA * L)[:, None, None])
+        _place(m, TWIST, bar * (self.rhoJp * L)[:, None, None])
+        phi_y = self.shear_shape * 12 * self.EIz * self.flex_y / L**2
+        phi_z = self.shear_shape * 12 * self.EIy * self.flex_z / L**2
+        _place(m, BEND_XY, bending_mass(self.rhoA, self.rhoIz, phi_y, L))
+        _place(m, BEND_XZ, bending_mass(self.rhoA, self.rhoIy, phi_z, L), SLOPE_SIGN)
+        m = _add_rigid_ends(m, self.rigid_mass_1, self.rigid_mass_2)
+        if np.any(self.ecc_y) or np.any(self.ecc_z):
+            y, z = self.ecc_y[:, None, None], self.ecc_z[:, None, None]
+            parts = self.eccentric_mass_parts()
+            m += y * parts["y"] + z * parts["z"]
+            m += y * y * parts["yy"] + z * z * parts["zz"] + y * z * parts["yz"]
+        return m
+
+    def eccentric_mass_parts(self) -> dict[str, AnyArray]:
+        """Return what an eccentric mass centre adds to the mass matrices, each (n, 12, 12).
+
+        The mass with its centre at (y, z) is M0 + y My + z Mz + y^2 Myy + z^2 Mzz + y z Myz, under
+        the keys ``y``, ``z``, ``yy``, ``zz``, ``yz``: rho A acts on u + r x (0, y, z), and the
+        inertias about the mass centre stay. `ecc_y` and `ecc_z` do not enter.
+
+        Examples:
+            >>> list(properties.eccentric_mass_parts())
+            ['y', 'z', 'yy', 'zz', 'yz']
+        """
+        L = self.length - self.rigid_mass_1 - self.rigid_mass_2
+        phi_y = self.shear_shape * 12 * self.EIz * self.flex_y / L**2
+        phi_z = self.shear_shape * 12 * self.EIy * self.flex_z / L**2
+        parts: dict[str, AnyArray] = dict.fromkeys(("y", "z", "yy", "zz", "yz"), np.zeros(1))
+        for x, weight in GAUSS:
+            rows = interpolation(x, L, phi_y, phi_z)
+            by_y, by_z = np.zeros_like(rows[:, :3]), np.zeros_like(rows[:, :3])
+            by_y[:, 0], by_y[:, 2] = -rows[:, 5], rows[:, 3]
+            by_z[:, 0], by_z[:, 1] = rows[:, 4], -rows[:, 3]
+            share = (weight * self.rhoA * L)[:, None, None]
+            terms = {"y": (rows[:, :3], by_y), "z": (rows[:, :3], by_z), "yz": (by_y, by_z)}
+            for name, (left, right) in terms.items():
+                product = np.swapaxes(left, 1, 2) @ right
+                parts[name] = parts[name] + share * (product + np.swapaxes(product, 1, 2))
+            for name, one in (("yy", by_y), ("zz", by_z)):
+                parts[name] = parts[name] + share * (np.swapaxes(one, 1, 2) @ one)
+        return {
+            k: _add_rigid_ends(m, self.rigid_mass_1, self.rigid_mass_2) for k, m in parts.items()
+        }
+
 
 def bending_stiffness(EI: AnyArray, flexibility: AnyArray, L: AnyArray) -> AnyArray:
     """Return (n, 4, 4) for (w, slope) at both ends (Przemieniecki 1968, (5.116)).
@@ -235,109 +338,6 @@ def rigid_transform(first: AnyArray, second: AnyArray) -> AnyArray:
     transform[:, 1, 5], transform[:, 2, 4] = first, -first
     transform[:, 7, 11], transform[:, 8, 10] = -second, second
     return transform
-
-
-def stiffness_matrices(p: BeamProperties) -> AnyArray:
-    """Return the local stiffness matrices in N, N m, (n, 12, 12).
-
-    Rigid ends follow Horton et al. (1999), equation (5): T' k(L - a) T, axial EA/(L - a).
-
-    Examples:
-        >>> twist = fem.stiffness_matrices(properties)[:, 3, 3]
-        >>> np.allclose(twist, properties.GJ / properties.length)
-        True
-    """
-    L = _flexible(p)
-    dtype = np.result_type(*(getattr(p, f.name) for f in fields(p)))
-    k = np.zeros((len(p), 12, 12), dtype=dtype)
-    bar = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    _place(k, AXIAL, bar * (p.EA / L)[:, None, None])
-    _place(k, TWIST, bar * (p.GJ / L)[:, None, None])
-    _place(k, BEND_XY, bending_stiffness(p.EIz, p.flex_y, L))
-    _place(k, BEND_XZ, bending_stiffness(p.EIy, p.flex_z, L), SLOPE_SIGN)
-    k = _add_rigid_ends(k, p.rigid_1, p.rigid_2)
-    if np.any(p.coupling):
-        k += p.coupling[:, None, None] * coupling_matrices(p)
-    return k
-
-
-def coupling_matrices(p: BeamProperties) -> AnyArray:
-    """Return what a bending-torsion coupling of coefficient 1 adds in N, N m, (n, 12, 12).
-
-    The strain energy is the integral of sqrt(EI GJ) d(ry)/dx d(rx)/dx; with a linear twist it
-    depends on the rotations of the ends alone, so that rigid ends change nothing but the length.
-
-    Examples:
-        >>> fem.coupling_matrices(properties).shape
-        (28, 12, 12)
-    """
-    k = np.zeros((len(p), 12, 12), dtype=np.result_type(p.EIy, p.GJ, p.length, p.rigid_1))
-    block = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    block = block * (np.sqrt(p.EIy * p.GJ) / _flexible(p))[:, None, None]
-    k[:, TWIST[:, None], _CURVE[None, :]] = block
-    k[:, _CURVE[:, None], TWIST[None, :]] = block
-    return k
-
-
-def mass_matrices(p: BeamProperties) -> AnyArray:
-    """Return the consistent local mass matrices in kg, kg m, kg m2, (n, 12, 12).
-
-    Cubic in bending, linear in axial motion and twist. With cubic functions the rotary inertia
-    belongs to the slope of the axis (Rayleigh); with those of the Timoshenko element it belongs
-    to the rotation of the section, as Timoshenko's theory has it.
-
-    Examples:
-        >>> axial = fem.mass_matrices(properties)[:, 0, [0, 6]].sum(axis=1)
-        >>> np.allclose(axial, properties.rhoA * properties.length / 2)
-        True
-    """
-    L = p.length - p.rigid_mass_1 - p.rigid_mass_2
-    dtype = np.result_type(*(getattr(p, f.name) for f in fields(p)))
-    m = np.zeros((len(p), 12, 12), dtype=dtype)
-    bar = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
-    _place(m, AXIAL, bar * (p.rhoA * L)[:, None, None])
-    _place(m, TWIST, bar * (p.rhoJp * L)[:, None, None])
-    phi_y = p.shear_shape * 12 * p.EIz * p.flex_y / L**2
-    phi_z = p.shear_shape * 12 * p.EIy * p.flex_z / L**2
-    _place(m, BEND_XY, bending_mass(p.rhoA, p.rhoIz, phi_y, L))
-    _place(m, BEND_XZ, bending_mass(p.rhoA, p.rhoIy, phi_z, L), SLOPE_SIGN)
-    m = _add_rigid_ends(m, p.rigid_mass_1, p.rigid_mass_2)
-    if np.any(p.ecc_y) or np.any(p.ecc_z):
-        y, z = p.ecc_y[:, None, None], p.ecc_z[:, None, None]
-        parts = eccentric_mass_parts(p)
-        m += y * parts["y"] + z * parts["z"]
-        m += y * y * parts["yy"] + z * z * parts["zz"] + y * z * parts["yz"]
-    return m
-
-
-def eccentric_mass_parts(p: BeamProperties) -> dict[str, AnyArray]:
-    """Return what an eccentric mass centre adds to the mass matrices, each (n, 12, 12).
-
-    The mass with its centre at (y, z) is M0 + y My + z Mz + y^2 Myy + z^2 Mzz + y z Myz, under
-    the keys ``y``, ``z``, ``yy``, ``zz``, ``yz``: rho A acts on u + r x (0, y, z), and the inertias
-    about the mass centre stay. `ecc_y` and `ecc_z` do not enter.
-
-    Examples:
-        >>> list(fem.eccentric_mass_parts(properties))
-        ['y', 'z', 'yy', 'zz', 'yz']
-    """
-    L = p.length - p.rigid_mass_1 - p.rigid_mass_2
-    phi_y = p.shear_shape * 12 * p.EIz * p.flex_y / L**2
-    phi_z = p.shear_shape * 12 * p.EIy * p.flex_z / L**2
-    parts: dict[str, AnyArray] = dict.fromkeys(("y", "z", "yy", "zz", "yz"), np.zeros(1))
-    for x, weight in GAUSS:
-        rows = interpolation(x, L, phi_y, phi_z)
-        by_y, by_z = np.zeros_like(rows[:, :3]), np.zeros_like(rows[:, :3])
-        by_y[:, 0], by_y[:, 2] = -rows[:, 5], rows[:, 3]
-        by_z[:, 0], by_z[:, 1] = rows[:, 4], -rows[:, 3]
-        share = (weight * p.rhoA * L)[:, None, None]
-        terms = {"y": (rows[:, :3], by_y), "z": (rows[:, :3], by_z), "yz": (by_y, by_z)}
-        for name, (left, right) in terms.items():
-            product = np.swapaxes(left, 1, 2) @ right
-            parts[name] = parts[name] + share * (product + np.swapaxes(product, 1, 2))
-        for name, one in (("yy", by_y), ("zz", by_z)):
-            parts[name] = parts[name] + share * (np.swapaxes(one, 1, 2) @ one)
-    return {k: _add_rigid_ends(m, p.rigid_mass_1, p.rigid_mass_2) for k, m in parts.items()}
 
 
 def shape_functions(p: BeamProperties, element: int, xi: float) -> FloatArray:

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.beam import BeamProperties, mass_matrices, stiffness_matrices
+from femubench.core.fem.beam import BeamProperties
 from femubench.core.fem.meshed_frame import MeshedFrame
 from femubench.core.fem.parameters import QUANTITIES, Property
 from femubench.core.typing import FloatArray, IntArray, SparseArray
@@ -284,8 +284,8 @@ def derivatives(structure: MeshedFrame, parameters: Sequence[Property]) -> Deriv
                 values = {part.kind: getattr(structure.properties, part.kind) + 1j * _STEP}
             stepped = replace(structure.properties, **values)
             shear = part.kind in _BOTH and structure.properties.shear_shape.any()
-            k = None if part.kind in _MASS else stiffness_matrices(stepped).imag / _STEP
-            m = mass_matrices(stepped).imag / _STEP if part.kind in _MASS or shear else None
+            k = None if part.kind in _MASS else stepped.stiffness_matrices().imag / _STEP
+            m = stepped.mass_matrices().imag / _STEP if part.kind in _MASS or shear else None
             parts.append(ElementSlopes(part.incidence(size, count), k, m))
     return Derivatives(tuple(parts), structure.gather, structure.spring_rows, springs)
 

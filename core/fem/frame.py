@@ -327,6 +327,11 @@ class Frame:
         share = self.rotary_inertia
         return float(self.beam == "timoshenko" if share is None else share)
 
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Return the directions in which joints may move, of x, y, z, rx, ry, rz."""
+        return ACTIVE[self.plane]
+
     @cached_property
     def joint_index(self) -> Mapping[str, int]:
         """Return the position of every joint in `joints`."""
@@ -378,6 +383,11 @@ class Frame:
     def joint(self, name: str) -> Joint:
         """Return the joint of that name; raises KeyError."""
         return self.joints[self.joint_index[name]]
+
+    def member_length(self, name: str) -> float:
+        """Return the distance of a member's two joints in m."""
+        first, last = self.corners[self.member_ends[self.member_index[name]]]
+        return float(np.linalg.norm(last - first))
 
     def ends_at(self, joint: str) -> tuple[str, ...]:
         """Return the names of the members that end at a joint."""

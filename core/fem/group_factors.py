@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from operator import matmul
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,68 +21,79 @@ _ALL = "all"
 _MATRIX: dict[str, Matrix] = {"E": "stiffness", "density": "mass"}
 
 
-def group_places(model: Model, matrix: Matrix) -> tuple[str, ...]:
-    """Return ``group:NAME`` of every group of a model's stiffness or mass.
-
-    Examples:
-        >>> fem.group_places(model, "stiffness")
-        ()
-    """
-    groups = model.groups if matrix == "stiffness" else model.mass_groups
-    return tuple(f"{GROUP}{name}" for name in groups)
-
-
-def group_matrix(model: Model, matrix: Matrix, place: str) -> SparseArray:
-    """Return the part of a model's stiffness or mass at ``all`` or ``group:NAME``, sparse (n, n).
-
-    Raises:
-        ModelError: when there is no such group.
-
-    Examples:
-        >>> fem.group_matrix(model, "mass", "all").shape
-        (81, 81)
-    """
-    groups, whole = model.groups, model.stiffness
-    if matrix == "mass":
-        groups, whole = model.mass_groups, model.mass
-    if place == _ALL:
-        return whole
-    name = place.removeprefix(GROUP)
-    if not place.startswith(GROUP) or name not in groups:
-        raise ModelError(f"the {matrix} has no group {place!r}")
-    return groups[name]
-
-
-def with_group_factors(
-    model: Model, parameters: Sequence[Property], values: Sequence[float] | FloatArray
-) -> Model:
-    """Return a model from matrices with factors on its groups, which stay its groups.
+@dataclass(frozen=True)
+class Groups:
+    """The groups of a model from matrices, which are places: ``group:NAME``.
 
     Arguments:
-        model: whose groups are as large as they are now.
-        parameters: on E (the stiffness) or density (the mass), at ``all`` or groups.
-        values: factors, (p,).
-
-    Raises:
-        ModelError: when there is no such group, or for a parameter that matrices do not have.
-
-    Examples:
-        >>> factor = fem.Property("stiffness all", "E", ("all",))
-        >>> twice = fem.with_group_factors(model, [factor], [2.0])
-        >>> float(abs(twice.stiffness - 2.0 * model.stiffness).max())
-        0.0
+        model: any model; one of a frame has none.
     """
-    for parameter, value in zip(parameters, values, strict=True):
-        matrix, places, factor = _matrix(parameter), parameter.places, float(value)
-        own = "groups" if matrix == "stiffness" else "mass_groups"
-        groups, change = dict(getattr(model, own)), getattr(model, f"{matrix}_change")
-        names = groups if _ALL in places else [place.removeprefix(GROUP) for place in places]
-        whole = getattr(model, matrix) + (factor - 1.0) * _part(model, matrix, places)
-        groups |= {name: factor * groups[name] for name in names}
-        if change is not None and _ALL in places:
-            change = replace(change, core=factor * change.core)
-        model = replace(model, **{matrix: whole, f"{matrix}_change": change, own: groups})
-    return model
+
+    PREFIX: ClassVar[str] = GROUP
+
+    model: Model
+
+    def places(self, matrix: Matrix) -> tuple[str, ...]:
+        """Return ``group:NAME`` of every group of a model's stiffness or mass.
+
+        Examples:
+            >>> fem.Groups(model).places("stiffness")
+            ()
+        """
+        groups = self.model.groups if matrix == "stiffness" else self.model.mass_groups
+        return tuple(f"{GROUP}{name}" for name in groups)
+
+    def matrix(self, matrix: Matrix, place: str) -> SparseArray:
+        """Return the part of the stiffness or mass at ``all`` or ``group:NAME``, sparse (n, n).
+
+        Raises:
+            ModelError: when there is no such group.
+
+        Examples:
+            >>> fem.Groups(model).matrix("mass", "all").shape
+            (81, 81)
+        """
+        model = self.model
+        groups, whole = model.groups, model.stiffness
+        if matrix == "mass":
+            groups, whole = model.mass_groups, model.mass
+        if place == _ALL:
+            return whole
+        name = place.removeprefix(GROUP)
+        if not place.startswith(GROUP) or name not in groups:
+            raise ModelError(f"the {matrix} has no group {place!r}")
+        return groups[name]
+
+    def with_factors(
+        self, parameters: Sequence[Property], values: Sequence[float] | FloatArray
+    ) -> Model:
+        """Return a model from matrices with factors on its groups, which stay its groups.
+
+        Arguments:
+            parameters: on E (the stiffness) or density (the mass), at ``all`` or groups.
+            values: factors, (p,).
+
+        Raises:
+            ModelError: when there is no such group, or for a parameter that matrices do not have.
+
+        Examples:
+            >>> factor = fem.Property("stiffness all", "E", ("all",))
+            >>> twice = fem.Groups(model).with_factors([factor], [2.0])
+            >>> float(abs(twice.stiffness - 2.0 * model.stiffness).max())
+            0.0
+        """
+        model = self.model
+        for parameter, value in zip(parameters, values, strict=True):
+            matrix, places, factor = _matrix(parameter), parameter.places, float(value)
+            own = "groups" if matrix == "stiffness" else "mass_groups"
+            groups, change = dict(getattr(model, own)), getattr(model, f"{matrix}_change")
+            names = groups if _ALL in places else [place.removeprefix(GROUP) for place in places]
+            whole = getattr(model, matrix) + (factor - 1.0) * _part(model, matrix, places)
+            groups |= {name: factor * groups[name] for name in names}
+            if change is not None and _ALL in places:
+                change = replace(change, core=factor * change.core)
+            model = replace(model, **{matrix: whole, f"{matrix}_change": change, own: groups})
+        return model
 
 
 def _matrix(parameter: Property) -> Matrix:
@@ -91,7 +103,7 @@ def _matrix(parameter: Property) -> Matrix:
 
 
 def _part(model: Model, matrix: Matrix, places: Sequence[str]) -> SparseArray:
-    parts = [group_matrix(model, matrix, place) for place in places]
+    parts = [Groups(model).matrix(matrix, place) for place in places]
     return sum(parts[1:], start=parts[0])
 
 
@@ -99,7 +111,7 @@ def group_derivatives(model: Model, parameters: Sequence[Property]) -> TermSlope
     """Return the derivatives of stiffness and mass by factors on groups, which are now 1.
 
     Raises:
-        ModelError: as in `with_group_factors`.
+        ModelError: as in `Groups.with_factors`.
     """
     parts = tuple(
         (_matrix(p), partial(matmul, _part(model, _matrix(p), p.places))) for p in parameters

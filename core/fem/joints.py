@@ -96,10 +96,6 @@ def joint_groups(frame: Frame, *, merged: bool = False) -> tuple[JointGroup, ...
     Arguments:
         frame: any frame; an end without a second member is no joint.
         merged: take all joints for one type.
-
-    Examples:
-        >>> [group.name for group in update.joint_groups(frame)]
-        ['L', 'T through', 'T branch']
     """
     found: dict[tuple[str, str], list[str]] = {}
     for joint in frame.joints:
@@ -109,30 +105,6 @@ def joint_groups(frame: Frame, *, merged: bool = False) -> tuple[JointGroup, ...
             for member, role in roles.items():
                 found.setdefault((kind, role), []).append(f"{member}@{joint.name}")
     return tuple(JointGroup(kind, role, tuple(ends)) for (kind, role), ends in found.items())
-
-
-def groups_within(frame: Frame, count: int, *, passing: bool = True) -> tuple[JointGroup, ...]:
-    """Return the joint groups, at most so many: all joints as one type where types are too many.
-
-    Arguments:
-        frame: any frame.
-        count: how many groups there may be.
-        passing: whether the groups of passing ends count.
-
-    Raises:
-        NotApplicable: when the frame has no joint.
-
-    Examples:
-        >>> [group.name for group in update.groups_within(frame, 3)]
-        ['L', 'T through', 'T branch']
-    """
-    for merged in (False, True):
-        groups = joint_groups(frame, merged=merged)
-        if not groups:
-            raise NotApplicable("no two members meet in a joint")
-        if sum(passing or group.role != "through" for group in groups) <= count:
-            return groups
-    return (JointGroup("all", "end", tuple(end for group in groups for end in group.ends)),)
 
 
 def all_elements(structure: Structure) -> tuple[str, ...]:
@@ -179,38 +151,11 @@ def _bends(frame: Frame, member: str) -> bool:
     return max(section.Iy, section.Iz) > 0.0
 
 
-def flexible_ends(frame: Frame, group: JointGroup) -> tuple[str, ...]:
-    """Return the ends of a group that take a spring: all but one a joint where none passes.
-
-    At a joint of two members, a spring at one end or at the other is the same; with more, the
-    first member stays tied to the joint so that the joint keeps its inertia.
-
-    Examples:
-        >>> update.flexible_ends(frame, joints[0])
-        ('back-right@J1', 'front-right@J3', 'rung-left@J7', 'back-left@J9')
-    """
-    taken = {f"{spring.member}@{spring.joint}" for spring in frame.joint_springs}
-    ends = tuple(end for end in group.ends if _bends(frame, end.rpartition("@")[0]))
-    if group.role == "through":
-        return ()
-    if group.role == "end":
-        first: set[str] = set()
-        for joint in {end.rpartition("@")[2] for end in ends}:
-            bent = (m.name for m in _members_at(frame, joint) if _bends(frame, m.name))
-            first.add(f"{next(bent)}@{joint}")
-        ends = tuple(end for end in ends if end not in first)
-    return tuple(end for end in ends if end not in taken)
-
-
 def half_depth(frame: Frame, end: str) -> float:
     """Return half the depth of the member that crosses a member end, along that member, in m.
 
     Of several, the one that stands squarest on it counts; a member that only continues it has no
     depth to offer, nor has one whose section was given as numbers.
-
-    Examples:
-        >>> round(update.half_depth(frame, "rung-middle@J5"), 4)
-        0.0127
     """
     name, _, joint = end.rpartition("@")
     members = _members_at(frame, joint)
@@ -227,126 +172,203 @@ def half_depth(frame: Frame, end: str) -> float:
     return 0.5 * (depth or 0.0)
 
 
-def available_length(structure: Structure, end: str) -> float:
-    """Return the longest arm or rigid length that the element at a member end can take in m.
-
-    Examples:
-        >>> round(update.available_length(structure, "rung-middle@J5"), 4)
-        0.0629
-    """
-    element, name = structure.element_ends[end][0], end.rpartition("@")[0]
-    joints = structure.frame.members[structure.frame.member_index[name]].ends
-    both = sum(structure.element_ends[f"{name}@{joint}"][0] == element for joint in joints)
-    return _LARGEST_SHARE * float(structure.properties.length[element]) / both
-
-
-def spring_estimates(frame: Frame, ends: tuple[str, ...]) -> dict[str, float]:
-    """Return initial joint stiffnesses in local directions, N/m and N m/rad.
-
-    Twice EA/L, 12 EI/L^3, 4 EI/L and GJ/L of the element behind the spring, averaged over the
-    ends.
-
-    Source: Horton et al. (1999), section 7; GJ/L by analogy.
-
-    Examples:
-        >>> list(update.spring_estimates(frame, ("rung-middle@J5",)))
-        ['z', 'rx', 'ry']
-    """
-    rows = []
-    for end in ends:
-        member = frame.members[frame.member_index[end.rpartition("@")[0]]]
-        s, m = member.section, member.material
-        length = member_axes(frame, member)[1] / member.elements
-        rows.append(
-            {
-                "x": 2.0 * m.E * s.A / length,
-                "y": 24.0 * m.E * s.Iz / length**3,
-                "z": 24.0 * m.E * s.Iy / length**3,
-                "rx": 2.0 * m.G * s.J / length,
-                "ry": 8.0 * m.E * s.Iy / length,
-                "rz": 8.0 * m.E * s.Iz / length,
-            }
-        )
-    return {name: float(np.mean([row[name] for row in rows])) for name in ACTIVE[frame.plane]}
-
-
-def with_joint_springs(
-    structure: Structure,
-    stiffness: Mapping[str, Mapping[str, float]],
-    *,
-    arm: float | None = None,
-    arm_factor: float | None = 5.0,
-) -> Structure:
-    """Return the frame with a flexible connection at member ends, figure 1 of the source.
+@dataclass(frozen=True)
+class Joints:
+    """The joints of a meshed frame and the ends of members there, ``member@joint``.
 
     Arguments:
-        structure: the frame as it is.
-        stiffness: from ``member@joint`` to local directions to N/m or N m/rad.
-        arm: length of the massless arm in m; None for half the depth of the crossing member,
-            shortened where the end element is too short for it.
-        arm_factor: the arm's rigidities in those of the member; None for a rigid arm.
-
-    Source: Horton et al. (1999), section 3.1.
-
-    Examples:
-        >>> springs = {"rung-middle@J5": {"rx": 1e4, "ry": 1e4}}
-        >>> len(update.with_joint_springs(structure, springs).frame.joint_springs)
-        1
+        structure: a meshed frame.
     """
-    frame = structure.frame
-    arms = {
-        end: min(half_depth(frame, end), available_length(structure, end)) if arm is None else arm
-        for end in stiffness
-    }
-    return structure.rebuilt(spring_ends(frame, stiffness, arms, arm_factor))
 
+    structure: Structure
 
-def spring_ends(
-    frame: Frame,
-    stiffness: Mapping[str, Mapping[str, float]],
-    arms: Mapping[str, float],
-    arm_factor: float | None = None,
-) -> Frame:
-    """Return the frame with springs at member ends, in series with those that are there.
+    def groups(self, *, merged: bool = False) -> tuple[JointGroup, ...]:
+        """Return the member ends at joints, by joint type and role, as `joint_groups`.
 
-    Arguments:
-        frame: any frame.
-        stiffness: from ``member@joint`` to local directions to N/m or N m/rad; infinite ones are
-            rigid and leave the arm.
-        arms: length in m of the massless arm before a new spring, by end.
-        arm_factor: the arm's rigidities in those of the member; None for a rigid arm.
-    """
-    springs = {f"{s.member}@{s.joint}": s for s in frame.joint_springs}
-    for end, own in stiffness.items():
-        member, _, joint = end.rpartition("@")
-        fresh = JointSpring(joint, member, {}, arms[end], arm_factor if arms[end] > 0.0 else None)
-        spring = springs.get(end, fresh)
-        joined = dict(spring.stiffness)
-        for direction, value in own.items():
-            if np.isfinite(value):
-                there = joined.get(direction)
-                joined[direction] = value if there is None else value * there / (value + there)
-        springs[end] = replace(spring, stiffness=joined)
-    return replace(frame, joint_springs=tuple(springs.values()))
+        Examples:
+            >>> [group.name for group in update.Joints(structure).groups()]
+            ['L', 'T through', 'T branch']
+        """
+        return joint_groups(self.structure.frame, merged=merged)
 
+    def groups_within(self, count: int, *, passing: bool = True) -> tuple[JointGroup, ...]:
+        """Return the joint groups, at most so many: all joints as one type where need be.
 
-def with_rigid_ends(structure: Structure, lengths: Mapping[str, tuple[float, float]]) -> Structure:
-    """Return the frame with partly rigid elements at member ends, figure 2 of the source.
+        Arguments:
+            count: how many groups there may be.
+            passing: whether the groups of passing ends count.
 
-    Arguments:
-        structure: the frame as it is.
-        lengths: from ``member@joint`` to the rigid lengths a in the stiffness and a0 in the mass
-            matrix, in m.
+        Raises:
+            NotApplicable: when the frame has no joint.
 
-    Source: Horton et al. (1999), section 3.2, equation (5).
+        Examples:
+            >>> [group.name for group in update.Joints(structure).groups_within(3)]
+            ['L', 'T through', 'T branch']
+        """
+        for merged in (False, True):
+            groups = self.groups(merged=merged)
+            if not groups:
+                raise NotApplicable("no two members meet in a joint")
+            if sum(passing or group.role != "through" for group in groups) <= count:
+                return groups
+        return (JointGroup("all", "end", tuple(end for group in groups for end in group.ends)),)
 
-    Examples:
-        >>> len(update.with_rigid_ends(structure, {"rung-middle@J5": (0.01, 0.0)}).frame.rigid_ends)
-        1
-    """
-    rigid = []
-    for end, (a, a0) in lengths.items():
-        member, _, joint = end.rpartition("@")
-        rigid.append(RigidEnd(joint, member, a, a0))
-    frame = structure.frame
-    return structure.rebuilt(replace(frame, rigid_ends=frame.rigid_ends + tuple(rigid)))
+    def flexible_ends(self, group: JointGroup) -> tuple[str, ...]:
+        """Return the ends of a group that take a spring: all but one a joint where none passes.
+
+        At a joint of two members, a spring at one end or at the other is the same; with more, the
+        first member stays tied to the joint so that the joint keeps its inertia.
+
+        Examples:
+            >>> update.Joints(structure).flexible_ends(joints[0])
+            ('back-right@J1', 'front-right@J3', 'rung-left@J7', 'back-left@J9')
+        """
+        frame = self.structure.frame
+        taken = {f"{spring.member}@{spring.joint}" for spring in frame.joint_springs}
+        ends = tuple(end for end in group.ends if _bends(frame, end.rpartition("@")[0]))
+        if group.role == "through":
+            return ()
+        if group.role == "end":
+            first: set[str] = set()
+            for joint in {end.rpartition("@")[2] for end in ends}:
+                bent = (m.name for m in _members_at(frame, joint) if _bends(frame, m.name))
+                first.add(f"{next(bent)}@{joint}")
+            ends = tuple(end for end in ends if end not in first)
+        return tuple(end for end in ends if end not in taken)
+
+    def half_depth(self, end: str) -> float:
+        """Return half the depth of the member that crosses a ``member@joint`` end, as `half_depth`.
+
+        Examples:
+            >>> round(update.Joints(structure).half_depth("rung-middle@J5"), 4)
+            0.0127
+        """
+        return half_depth(self.structure.frame, end)
+
+    def available_length(self, end: str) -> float:
+        """Return the longest arm or rigid length that the element at a member end can take in m.
+
+        Examples:
+            >>> round(update.Joints(structure).available_length("rung-middle@J5"), 4)
+            0.0629
+        """
+        structure = self.structure
+        element, name = structure.element_ends[end][0], end.rpartition("@")[0]
+        joints = structure.frame.members[structure.frame.member_index[name]].ends
+        both = sum(structure.element_ends[f"{name}@{joint}"][0] == element for joint in joints)
+        return _LARGEST_SHARE * float(structure.properties.length[element]) / both
+
+    def spring_estimates(self, ends: tuple[str, ...]) -> dict[str, float]:
+        """Return initial joint stiffnesses in local directions, N/m and N m/rad.
+
+        Twice EA/L, 12 EI/L^3, 4 EI/L and GJ/L of the element behind the spring, averaged over the
+        ends.
+
+        Source: Horton et al. (1999), section 7; GJ/L by analogy.
+
+        Examples:
+            >>> list(update.Joints(structure).spring_estimates(("rung-middle@J5",)))
+            ['z', 'rx', 'ry']
+        """
+        frame, rows = self.structure.frame, []
+        for end in ends:
+            member = frame.members[frame.member_index[end.rpartition("@")[0]]]
+            s, m = member.section, member.material
+            length = member_axes(frame, member)[1] / member.elements
+            rows.append(
+                {
+                    "x": 2.0 * m.E * s.A / length,
+                    "y": 24.0 * m.E * s.Iz / length**3,
+                    "z": 24.0 * m.E * s.Iy / length**3,
+                    "rx": 2.0 * m.G * s.J / length,
+                    "ry": 8.0 * m.E * s.Iy / length,
+                    "rz": 8.0 * m.E * s.Iz / length,
+                }
+            )
+        return {name: float(np.mean([row[name] for row in rows])) for name in ACTIVE[frame.plane]}
+
+    def spring_ends(
+        self,
+        stiffness: Mapping[str, Mapping[str, float]],
+        arms: Mapping[str, float],
+        arm_factor: float | None = None,
+    ) -> Frame:
+        """Return the frame with springs at member ends, in series with those that are there.
+
+        Arguments:
+            stiffness: from ``member@joint`` to local directions to N/m or N m/rad; infinite ones
+                are rigid and leave the arm.
+            arms: length in m of the massless arm before a new spring, by end.
+            arm_factor: the arm's rigidities in those of the member; None for a rigid arm.
+
+        Examples:
+            >>> softer = update.Joints(structure).spring_ends(
+            ...     {"rung-middle@J5": {"ry": 1e4}}, {"rung-middle@J5": 0.01}
+            ... )
+            >>> dict(softer.joint_springs[0].stiffness)
+            {'ry': 10000.0}
+        """
+        frame = self.structure.frame
+        springs = {f"{s.member}@{s.joint}": s for s in frame.joint_springs}
+        for end, own in stiffness.items():
+            member, _, joint = end.rpartition("@")
+            fresh = JointSpring(
+                joint, member, {}, arms[end], arm_factor if arms[end] > 0.0 else None
+            )
+            spring = springs.get(end, fresh)
+            joined = dict(spring.stiffness)
+            for direction, value in own.items():
+                if np.isfinite(value):
+                    there = joined.get(direction)
+                    joined[direction] = value if there is None else value * there / (value + there)
+            springs[end] = replace(spring, stiffness=joined)
+        return replace(frame, joint_springs=tuple(springs.values()))
+
+    def with_springs(
+        self,
+        stiffness: Mapping[str, Mapping[str, float]],
+        *,
+        arm: float | None = None,
+        arm_factor: float | None = 5.0,
+    ) -> Structure:
+        """Return the frame with a flexible connection at member ends, figure 1 of the source.
+
+        Arguments:
+            stiffness: from ``member@joint`` to local directions to N/m or N m/rad.
+            arm: length of the massless arm in m; None for half the depth of the crossing member,
+                shortened where the end element is too short for it.
+            arm_factor: the arm's rigidities in those of the member; None for a rigid arm.
+
+        Source: Horton et al. (1999), section 3.1.
+
+        Examples:
+            >>> springs = {"rung-middle@J5": {"rx": 1e4, "ry": 1e4}}
+            >>> len(update.Joints(structure).with_springs(springs).frame.joint_springs)
+            1
+        """
+        arms = {
+            end: min(self.half_depth(end), self.available_length(end)) if arm is None else arm
+            for end in stiffness
+        }
+        return self.structure.rebuilt(self.spring_ends(stiffness, arms, arm_factor))
+
+    def with_rigid_ends(self, lengths: Mapping[str, tuple[float, float]]) -> Structure:
+        """Return the frame with partly rigid elements at member ends, figure 2 of the source.
+
+        Arguments:
+            lengths: from ``member@joint`` to the rigid lengths a in the stiffness and a0 in the
+                mass matrix, in m.
+
+        Source: Horton et al. (1999), section 3.2, equation (5).
+
+        Examples:
+            >>> rigid = update.Joints(structure).with_rigid_ends({"rung-middle@J5": (0.01, 0.0)})
+            >>> len(rigid.frame.rigid_ends)
+            1
+        """
+        rigid = []
+        for end, (a, a0) in lengths.items():
+            member, _, joint = end.rpartition("@")
+            rigid.append(RigidEnd(joint, member, a, a0))
+        frame = self.structure.frame
+        return self.structure.rebuilt(replace(frame, rigid_ends=frame.rigid_ends + tuple(rigid)))

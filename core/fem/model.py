@@ -89,26 +89,27 @@ class LowRank:
         dense: FloatArray = self.basis @ self.core @ self.basis.T
         return dense
 
+    @classmethod
+    def total(cls, parts: Sequence[LowRank | None]) -> LowRank | None:
+        """Return the sum of low-rank changes with the smallest rank that represents it.
 
-def total_change(parts: Sequence[LowRank | None]) -> LowRank | None:
-    """Return the sum of low-rank changes with the smallest rank that represents it.
+        Arguments:
+            parts: changes of one matrix; None stands for no change.
 
-    Arguments:
-        parts: changes of one matrix; None stands for no change.
-
-    Examples:
-        >>> change = fem.LowRank(np.eye(4, 2), np.eye(2))
-        >>> np.allclose(update.total_change([change, None, change]).toarray(), 2 * change.toarray())
-        True
-    """
-    changes = [part for part in parts if part is not None]
-    if not changes:
-        return None
-    q, r = la.qr(np.hstack([change.basis for change in changes]), mode="economic")
-    core = r @ la.block_diag(*(change.core for change in changes)) @ r.T
-    values, turn = la.eigh(0.5 * (core + core.T))
-    keep = np.abs(values) > _NEGLIGIBLE * np.abs(values).max(initial=0.0)
-    return LowRank(q @ turn[:, keep], np.diag(values[keep]))
+        Examples:
+            >>> change = fem.LowRank(np.eye(4, 2), np.eye(2))
+            >>> both = fem.LowRank.total([change, None, change])
+            >>> np.allclose(both.toarray(), 2 * change.toarray())
+            True
+        """
+        changes = [part for part in parts if part is not None]
+        if not changes:
+            return None
+        q, r = la.qr(np.hstack([change.basis for change in changes]), mode="economic")
+        core = r @ la.block_diag(*(change.core for change in changes)) @ r.T
+        values, turn = la.eigh(0.5 * (core + core.T))
+        keep = np.abs(values) > _NEGLIGIBLE * np.abs(values).max(initial=0.0)
+        return cls(q @ turn[:, keep], np.diag(values[keep]))
 
 
 class Geometry(Protocol):
@@ -227,6 +228,14 @@ class Model(Shown):
             raise NotApplicable("the model is a pair of matrices without elements")
         return self.structure
 
+    def dofs_in(self, other: Model) -> IntArray:
+        """Return the position of every dof of a frame among those of the frame meshed anew, (n,).
+
+        Raises:
+            ModelError: when one is not there.
+        """
+        return common_dofs(self.frame_structure, other.frame_structure)
+
     def observe(self, sensors: Sensors) -> SparseArray:
         """Return sensor readings from dofs, sparse (n_sensors, n).
 
@@ -246,6 +255,20 @@ class Model(Shown):
         product: FloatArray = self.mass @ vectors
         change = self.mass_change
         return product if change is None else product + change @ vectors
+
+    def mass_normalised(self, shapes: FloatArray) -> FloatArray:
+        """Return shapes with phi' M phi = 1 each, (n, m).
+
+        Arguments:
+            shapes: at all dofs, each with some mass in it, (n, m).
+
+        Examples:
+            >>> shapes = model.mass_normalised(3.0 * modes.shapes)
+            >>> np.allclose(np.diag(shapes.T @ model.mass_times(shapes)), 1.0)
+            True
+        """
+        mass = np.einsum("ij,ij->j", shapes, self.mass_times(shapes))
+        return np.asarray(shapes / np.sqrt(mass))
 
     def attach(self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]) -> Model:
         """Return the model with further masses and springs to ground.

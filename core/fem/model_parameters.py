@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from femubench.core.fem.derivatives import derivatives, element_masses
-from femubench.core.fem.group_factors import group_derivatives, with_group_factors
+from femubench.core.fem.group_factors import Groups, group_derivatives
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.slopes import MatrixSlopes
@@ -28,7 +28,7 @@ def with_values(
         ModelError: when there is no such place.
     """
     if model.structure is None:
-        return with_group_factors(model, parameters, values)
+        return Groups(model).with_factors(parameters, values)
     return Model.of(model.structure.with_values(parameters, values))
 
 

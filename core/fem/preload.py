@@ -31,14 +31,7 @@ from femubench.core.fem.attachments import (
     brace_rows,
     elastic_stiffness,
 )
-from femubench.core.fem.beam import (
-    GAUSS,
-    cubic_rates,
-    interpolation,
-    mass_matrices,
-    rigid_transform,
-    stiffness_matrices,
-)
+from femubench.core.fem.beam import GAUSS, cubic_rates, interpolation, rigid_transform
 from femubench.core.fem.frame import ACTIVE, Frame, Support
 from femubench.core.fem.kinematics import build_kinematics, node_at, point_rows, rigid_motions
 from femubench.core.fem.links import rigid_arm
@@ -138,7 +131,7 @@ class Statics:
         structure, mesh = self.structure, self.structure.mesh
         fall = np.zeros((len(mesh.ends), 12))
         fall[:, 0:3] = fall[:, 6:9] = -GRAVITY * mesh.axes[:, :, 2]
-        weight = (mass_matrices(structure.properties) @ fall[:, :, None])[:, :, 0]
+        weight = (structure.properties.mass_matrices() @ fall[:, :, None])[:, :, 0]
         load = structure.gather.T @ weight.ravel()
         hung = [(item.at, item.mass, item.offset) for item in frame.masses]
         hung += [(item.at, item.mass, (0.0, 0.0, 0.0)) for item in frame.oscillators]
@@ -277,101 +270,8 @@ def _prepare(structure: MeshedFrame) -> Statics:
         factor = splu(sp.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0)
     except RuntimeError:
         raise ModelError("the frame is a mechanism in its plane") from None
-    stiffness = stiffness_matrices(flat_structure.properties)
+    stiffness = flat_structure.properties.stiffness_matrices()
     return Statics(flat_structure, stiffness, factor, matrix, free, loose)
-
-
-def preload_stiffness(structure: MeshedFrame, member: str, force: float) -> SparseArray:
-    """Return the geometric stiffness of one preload on the free dofs, sparse (n, n), N/m, N, N m.
-
-    It is linear in the force. The state of stress is that of the frame as it is described:
-    parameters set by `Structure.with_values` leave it alone.
-
-    Arguments:
-        structure: a meshed frame.
-        member: the member with the lack of fit.
-        force: the normal force of largest magnitude anywhere in the frame in N, with the sign
-            of the force in `member`, tension positive.
-
-    Raises:
-        ModelError: when the member is unknown or the frame is not redundant there.
-
-    Examples:
-        >>> fem.preload_stiffness(structure, "rung-middle", 100.0).shape
-        (81, 81)
-    """
-    return force * _stiffness(structure, statics_of(structure).state(member))
-
-
-def preload_forces(structure: MeshedFrame, member: str) -> tuple[FloatArray, SparseArray | None]:
-    """Return the internal forces of a preload of 1 N, and its stiffness apart from the elements.
-
-    With `unit_preload_matrices`, they are the `preload_stiffness` with fewer numbers.
-
-    Arguments:
-        structure: a meshed frame.
-        member: as for `preload_stiffness`.
-
-    Returns:
-        (N, Vy, Vz, T, My, Mz) of every element in N and N m, (n_elements, 6), and the geometric
-        stiffness of joint springs, rigid links and braces, sparse (n, n); None without these.
-
-    Raises:
-        ModelError: as for `preload_stiffness`.
-
-    Examples:
-        >>> forces, adjacent = fem.preload_forces(structure, "rung-middle")
-        >>> forces.shape[1], adjacent
-        (6, None)
-    """
-    state = statics_of(structure).state(member)
-    return np.hstack([state.force, state.moment]), _elements_next_to(structure, state)
-
-
-def unit_preload_matrices(structure: MeshedFrame) -> FloatArray:
-    """Return the local geometric stiffness of the elements by each unit of internal force.
-
-    Arguments:
-        structure: a meshed frame.
-
-    Returns:
-        a matrix each for N, Vy, Vz in 1/m and T, My, Mz in 1/m^2, (n_elements, 6, 12, 12).
-
-    Examples:
-        >>> fem.unit_preload_matrices(structure).shape[1:]
-        (6, 12, 12)
-    """
-    count, nothing = len(structure.mesh.ends), np.zeros((0, 3))
-    found = np.empty((count, 6, 12, 12))
-    for i, unit in enumerate(np.eye(6)):
-        force, moment = np.tile(unit, (count, 1)).reshape(count, 2, 3).swapaxes(0, 1)
-        state = StressState(force, moment, nothing, nothing, nothing, np.zeros(0))
-        found[:, i] = geometric_matrices(structure, state)
-    return found
-
-
-def gravity_stiffness(structure: MeshedFrame) -> SparseArray:
-    """Return the geometric stiffness of the weight, down along z, on the free dofs, sparse (n, n).
-
-    Arguments:
-        structure: a meshed frame in plane or in space that stands or hangs.
-
-    Raises:
-        ModelError: when the frame moves out of plane, or nothing holds it against its weight.
-
-    Examples:
-        >>> joints = fem.Joint("A", (0.0, 0.0, 0.0)), fem.Joint("B", (0.0, 0.0, 2.0))
-        >>> bar, steel = fem.solid_rectangle(0.05, 0.05), fem.Material(2.1e11, 0.3, 7850.0)
-        >>> mast = fem.Member("mast", ("A", "B"), 4, bar, steel)
-        >>> foot = fem.Support(fem.Place(joint="A"), ("x", "z", "ry"))
-        >>> standing = fem.Frame("in-plane", "euler-bernoulli", joints, (mast,), supports=(foot,))
-        >>> weight = fem.gravity_stiffness(fem.Structure.build(standing))
-        >>> bool(weight.trace() < 0.0)
-        True
-    """
-    if structure.frame.plane == "out-of-plane":
-        raise ModelError("out of plane the weight leaves no stress in the plane", "gravity")
-    return _stiffness(structure, statics_of(structure).under_weight(structure.frame))
 
 
 def _stiffness(structure: MeshedFrame, state: StressState) -> SparseArray:
@@ -400,21 +300,6 @@ def _elements_next_to(structure: MeshedFrame, state: StressState) -> SparseArray
         parts.append((brace_motion(structure), forms))
     found = [plan_assembly(rows, forms.shape[1]).assemble(forms) for rows, forms in parts]
     return sum(found[1:], start=found[0]) if found else None
-
-
-def redundant_members(structure: MeshedFrame) -> tuple[str, ...]:
-    """Return the members whose lack of fit the rest of the frame resists, in the frame's order.
-
-    Examples:
-        >>> len(fem.redundant_members(structure))
-        7
-    """
-    try:
-        resisting = statics_of(structure).resisting()
-    except ModelError:
-        return ()
-    members = structure.frame.members
-    return tuple(m.name for m, found in zip(members, resisting, strict=True) if found)
 
 
 def _skew(vectors: FloatArray) -> FloatArray:
@@ -499,3 +384,113 @@ def _behind_arms(
     blocks[:, 6:9, 3:6], blocks[:, 0:3, 3:6] = -2.0 * _skew(force), 2.0 * _skew(force)
     blocks[:, 9:12, 3:6] = -_skew(moment)
     return structure.kinematics.transform[rows], _symmetric(blocks)
+
+
+@dataclass(frozen=True)
+class GeometricStiffness:
+    """What the stress of a frame does to its stiffness: of preloads, of the weight.
+
+    The stress is that of the frame as it is described: parameters set by `Structure.with_values`
+    leave it alone.
+
+    Arguments:
+        structure: a meshed frame.
+    """
+
+    structure: MeshedFrame
+
+    def of_preload(self, member: str, force: float) -> SparseArray:
+        """Return what one preload does, on the free dofs, sparse (n, n), in N/m, N, N m.
+
+        It is linear in the force.
+
+        Arguments:
+            member: the member with the lack of fit.
+            force: the normal force of largest magnitude anywhere in the frame in N, with the sign
+                of the force in `member`, tension positive.
+
+        Raises:
+            ModelError: when the member is unknown or the frame is not redundant there.
+        """
+        return force * _stiffness(self.structure, statics_of(self.structure).state(member))
+
+    def forces(self, member: str) -> tuple[FloatArray, SparseArray | None]:
+        """Return the forces of a preload of 1 N, and its stiffness apart from the elements.
+
+        With `unit_matrices`, they are the `of_preload` with fewer numbers.
+
+        Arguments:
+            member: as for `of_preload`.
+
+        Returns:
+            (N, Vy, Vz, T, My, Mz) of every element in N and N m, (n_elements, 6), and the geometric
+            stiffness of joint springs, rigid links and braces, sparse (n, n); None without these.
+
+        Raises:
+            ModelError: as for `of_preload`.
+
+        Examples:
+            >>> forces, adjacent = fem.GeometricStiffness(structure).forces("rung-middle")
+            >>> forces.shape[1], adjacent
+            (6, None)
+        """
+        state = statics_of(self.structure).state(member)
+        return np.hstack([state.force, state.moment]), _elements_next_to(self.structure, state)
+
+    def unit_matrices(self) -> FloatArray:
+        """Return the local geometric stiffness of the elements by each unit of internal force.
+
+        Returns:
+            a matrix each for N, Vy, Vz in 1/m and T, My, Mz in 1/m^2, (n_elements, 6, 12, 12).
+
+        Examples:
+            >>> fem.GeometricStiffness(structure).unit_matrices().shape[1:]
+            (6, 12, 12)
+        """
+        count, nothing = len(self.structure.mesh.ends), np.zeros((0, 3))
+        found = np.empty((count, 6, 12, 12))
+        for i, unit in enumerate(np.eye(6)):
+            force, moment = np.tile(unit, (count, 1)).reshape(count, 2, 3).swapaxes(0, 1)
+            state = StressState(force, moment, nothing, nothing, nothing, np.zeros(0))
+            found[:, i] = geometric_matrices(self.structure, state)
+        return found
+
+    def of_weight(self) -> SparseArray:
+        """Return what the weight does, down along z, on the free dofs, sparse (n, n).
+
+        The frame lies in a plane or in space, and stands or hangs.
+
+        Raises:
+            ModelError: when the frame moves out of plane, or nothing holds it against its weight.
+
+        Examples:
+            >>> joints = fem.Joint("A", (0.0, 0.0, 0.0)), fem.Joint("B", (0.0, 0.0, 2.0))
+            >>> bar = fem.Section.solid_rectangle(0.05, 0.05)
+            >>> steel = fem.Material(2.1e11, 0.3, 7850.0)
+            >>> mast = fem.Member("mast", ("A", "B"), 4, bar, steel)
+            >>> foot = fem.Support(fem.Place(joint="A"), ("x", "z", "ry"))
+            >>> parts = {"joints": joints, "members": (mast,), "supports": (foot,)}
+            >>> standing = fem.Frame("in-plane", "euler-bernoulli", **parts)
+            >>> weight = fem.GeometricStiffness(fem.Structure.build(standing)).of_weight()
+            >>> bool(weight.trace() < 0.0)
+            True
+        """
+        if self.structure.frame.plane == "out-of-plane":
+            raise ModelError("out of plane the weight leaves no stress in the plane", "gravity")
+        return _stiffness(
+            self.structure, statics_of(self.structure).under_weight(self.structure.frame)
+        )
+
+    def redundant_members(self) -> tuple[str, ...]:
+        """Return the members whose lack of fit the rest of the frame resists, in the frame's order.
+
+        Examples:
+            >>> len(fem.GeometricStiffness(structure).redundant_members())
+            7
+        """
+        try:
+            resisting = statics_of(self.structure).resisting()
+        except ModelError:
+            return ()
+        members = self.structure.frame.members
+        return tuple(m.name for m, found in zip(members, resisting, strict=True) if found)

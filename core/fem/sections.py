@@ -44,27 +44,124 @@ class Section:
     def same_shape(self, width: float, height: float, wall: float) -> Section:
         """Return a section of the same shape with the constants of other outer sizes, in m."""
         if self.shape == "rectangular-tube":
-            return rectangular_tube(width, height, wall)
+            return Section.rectangular_tube(width, height, wall)
         if self.shape == "round-tube":
-            return round_tube(width, wall)
+            return Section.round_tube(width, wall)
         assert self.shape == "solid-rectangle"
-        return solid_rectangle(width, height)
+        return Section.solid_rectangle(width, height)
 
+    @classmethod
+    def rectangular_tube(cls, width: float, height: float, wall: float) -> Section:
+        """Return a tube with sharp corners; sizes are outer sizes in m.
 
-def constant_kappa(value: float, along_z: float | None = None) -> ShearCoefficients:
-    """Return shear coefficients that are the same for every material.
+        Examples:
+            >>> round(fem.Section.rectangular_tube(0.0254, 0.0254, 0.00238).A * 1e6, 1)
+            219.2
+        """
+        inner_w, inner_h = width - 2 * wall, height - 2 * wall
+        iy = (width * height**3 - inner_w * inner_h**3) / 12
+        iz = (height * width**3 - inner_h * inner_w**3) / 12
+        b, h = width - wall, height - wall
+        return cls(
+            A=width * height - inner_w * inner_h,
+            Iy=iy,
+            Iz=iz,
+            J=cls.bredt(b, h, wall),
+            Jp=iy + iz,
+            kappa=BoxKappa(b, h),
+            width=width,
+            height=height,
+            shape="rectangular-tube",
+        )
 
-    Arguments:
-        value: along both axes, or along y where `along_z` is given.
-        along_z: along z.
+    @classmethod
+    def solid_rectangle(cls, width: float, height: float) -> Section:
+        """Return a solid rectangle; sizes in m.
 
-    Examples:
-        >>> fem.constant_kappa(0.44)(0.33)
-        (0.44, 0.44)
-        >>> fem.constant_kappa(0.44, 0.85)(0.33)
-        (0.44, 0.85)
-    """
-    return ConstantKappa(value, value if along_z is None else along_z)
+        Examples:
+            >>> round(fem.Section.solid_rectangle(0.02, 0.01).A * 1e6, 1)
+            200.0
+        """
+        iy, iz = width * height**3 / 12, height * width**3 / 12
+        return cls(
+            A=width * height,
+            Iy=iy,
+            Iz=iz,
+            J=saint_venant_rectangle(width, height),
+            Jp=iy + iz,
+            kappa=_rectangle_kappa,
+            width=width,
+            height=height,
+            shape="solid-rectangle",
+        )
+
+    @classmethod
+    def round_tube(cls, diameter: float, wall: float) -> Section:
+        """Return a circular tube; `wall` of half the diameter makes it solid; sizes in m.
+
+        Examples:
+            >>> round(fem.Section.round_tube(0.02, 0.01).A * 1e6, 1)
+            314.2
+        """
+        outer, inner = diameter / 2, diameter / 2 - wall
+        second = np.pi / 4 * (outer**4 - inner**4)
+        return cls(
+            A=float(np.pi * (outer**2 - inner**2)),
+            Iy=float(second),
+            Iz=float(second),
+            J=float(2 * second),
+            Jp=float(2 * second),
+            kappa=CircleKappa(inner / outer),
+            width=diameter,
+            height=diameter,
+            shape="round-tube",
+        )
+
+    @staticmethod
+    def bredt(b: float, h: float, wall: float) -> float:
+        """Return the torsion constant of a thin closed rectangle in m4 (Bredt 1896).
+
+        Arguments:
+            b, h: centre-line width and height in m.
+            wall: wall thickness in m.
+
+        Examples:
+            >>> round(fem.Section.bredt(0.1, 0.05, 0.002) * 1e12)
+            666667
+        """
+        return 2.0 * wall * (b * h) ** 2 / (b + h)
+
+    @staticmethod
+    def constant_kappa(value: float, along_z: float | None = None) -> ShearCoefficients:
+        """Return shear coefficients that are the same for every material.
+
+        Arguments:
+            value: along both axes, or along y where `along_z` is given.
+            along_z: along z.
+
+        Examples:
+            >>> fem.Section.constant_kappa(0.44)(0.33)
+            (0.44, 0.44)
+            >>> fem.Section.constant_kappa(0.44, 0.85)(0.33)
+            (0.44, 0.85)
+        """
+        return ConstantKappa(value, value if along_z is None else along_z)
+
+    @property
+    def wall(self) -> float:
+        """Return the wall in m that follows from the shape and the area of a tube, 0 for no tube.
+
+        Examples:
+            >>> round(fem.Section.round_tube(0.05, 0.002).wall, 6)
+            0.002
+        """
+        width, height = self.width or 0.0, self.height or 0.0
+        if self.shape == "rectangular-tube":
+            root = max((width + height) ** 2 - 4.0 * self.A, 0.0)
+            return float(width + height - np.sqrt(root)) / 4.0
+        if self.shape == "round-tube":
+            return float(width - np.sqrt(max(width**2 - 4.0 * self.A / np.pi, 0.0))) / 2.0
+        return 0.0
 
 
 @dataclass(frozen=True)
@@ -95,20 +192,6 @@ class TabulatedKappa:
             if known == nu:
                 return along_y, along_z
         raise ModelError(f"no shear coefficient is known for a Poisson's ratio of {nu:g}")
-
-
-def bredt(b: float, h: float, wall: float) -> float:
-    """Return the torsion constant of a thin closed rectangle in m4 (Bredt 1896).
-
-    Arguments:
-        b, h: centre-line width and height in m.
-        wall: wall thickness in m.
-
-    Examples:
-        >>> round(fem.bredt(0.1, 0.05, 0.002) * 1e12)
-        666667
-    """
-    return 2.0 * wall * (b * h) ** 2 / (b + h)
 
 
 def saint_venant_rectangle(a: float, b: float) -> float:
@@ -160,99 +243,16 @@ class CircleKappa:
         return kappa, kappa
 
 
-def rectangular_tube(width: float, height: float, wall: float) -> Section:
-    """Return a tube with sharp corners; sizes are outer sizes in m.
-
-    Examples:
-        >>> round(fem.rectangular_tube(0.0254, 0.0254, 0.00238).A * 1e6, 1)
-        219.2
-    """
-    inner_w, inner_h = width - 2 * wall, height - 2 * wall
-    iy = (width * height**3 - inner_w * inner_h**3) / 12
-    iz = (height * width**3 - inner_h * inner_w**3) / 12
-    b, h = width - wall, height - wall
-    return Section(
-        A=width * height - inner_w * inner_h,
-        Iy=iy,
-        Iz=iz,
-        J=bredt(b, h, wall),
-        Jp=iy + iz,
-        kappa=BoxKappa(b, h),
-        width=width,
-        height=height,
-        shape="rectangular-tube",
-    )
-
-
-def solid_rectangle(width: float, height: float) -> Section:
-    """Return a solid rectangle; sizes in m.
-
-    Examples:
-        >>> round(fem.solid_rectangle(0.02, 0.01).A * 1e6, 1)
-        200.0
-    """
-    iy, iz = width * height**3 / 12, height * width**3 / 12
-    return Section(
-        A=width * height,
-        Iy=iy,
-        Iz=iz,
-        J=saint_venant_rectangle(width, height),
-        Jp=iy + iz,
-        kappa=_rectangle_kappa,
-        width=width,
-        height=height,
-        shape="solid-rectangle",
-    )
-
-
-def wall_of(section: Section) -> float:
-    """Return the wall in m that follows from the shape and the area of a tube, 0 for no tube.
-
-    Arguments:
-        section: with its outer sizes, if it has any.
-
-    Examples:
-        >>> round(fem.wall_of(fem.round_tube(0.05, 0.002)), 6)
-        0.002
-    """
-    width, height = section.width or 0.0, section.height or 0.0
-    if section.shape == "rectangular-tube":
-        root = max((width + height) ** 2 - 4.0 * section.A, 0.0)
-        return float(width + height - np.sqrt(root)) / 4.0
-    if section.shape == "round-tube":
-        return float(width - np.sqrt(max(width**2 - 4.0 * section.A / np.pi, 0.0))) / 2.0
-    return 0.0
-
-
-def round_tube(diameter: float, wall: float) -> Section:
-    """Return a circular tube; `wall` of half the diameter makes it solid; sizes in m.
-
-    Examples:
-        >>> round(fem.round_tube(0.02, 0.01).A * 1e6, 1)
-        314.2
-    """
-    outer, inner = diameter / 2, diameter / 2 - wall
-    second = np.pi / 4 * (outer**4 - inner**4)
-    return Section(
-        A=float(np.pi * (outer**2 - inner**2)),
-        Iy=float(second),
-        Iz=float(second),
-        J=float(2 * second),
-        Jp=float(2 * second),
-        kappa=CircleKappa(inner / outer),
-        width=diameter,
-        height=diameter,
-        shape="round-tube",
-    )
-
-
 # Name in case.toml -> (constructor, its keys); walls come last so that they can be checked.
 SHAPES: Mapping[str, tuple[Callable[..., Section], tuple[str, ...]]] = {
-    "square-tube": (lambda width, wall: rectangular_tube(width, width, wall), ("width", "wall")),
-    "rectangular-tube": (rectangular_tube, ("width", "height", "wall")),
-    "round-tube": (round_tube, ("diameter", "wall")),
-    "solid-square": (lambda width: solid_rectangle(width, width), ("width",)),
-    "solid": (solid_rectangle, ("width", "height")),
-    "solid-rectangle": (solid_rectangle, ("width", "height")),
-    "solid-circle": (lambda diameter: round_tube(diameter, diameter / 2), ("diameter",)),
+    "square-tube": (
+        lambda width, wall: Section.rectangular_tube(width, width, wall),
+        ("width", "wall"),
+    ),
+    "rectangular-tube": (Section.rectangular_tube, ("width", "height", "wall")),
+    "round-tube": (Section.round_tube, ("diameter", "wall")),
+    "solid-square": (lambda width: Section.solid_rectangle(width, width), ("width",)),
+    "solid": (Section.solid_rectangle, ("width", "height")),
+    "solid-rectangle": (Section.solid_rectangle, ("width", "height")),
+    "solid-circle": (lambda diameter: Section.round_tube(diameter, diameter / 2), ("diameter",)),
 }

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from femubench.core.fem.assembly import AT_ONCE, prune
 from femubench.core.fem.attachments import elastic_stiffness, oscillator_matrices
-from femubench.core.fem.beam import MASS_PROPERTIES, mass_matrices
+from femubench.core.fem.beam import MASS_PROPERTIES
 from femubench.core.fem.derivatives import apply_values
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.kinematics import point_block
@@ -19,7 +19,7 @@ from femubench.core.fem.mesh import SAME_STATION, locate
 from femubench.core.fem.meshed_frame import MeshedFrame
 from femubench.core.fem.nominal import mesh_frame
 from femubench.core.fem.parameters import Property
-from femubench.core.fem.preload import gravity_stiffness, preload_stiffness
+from femubench.core.fem.preload import GeometricStiffness
 from femubench.core.fem.sensors import Sensors
 from femubench.core.typing import FloatArray, SparseArray
 
@@ -68,9 +68,11 @@ class Structure(MeshedFrame):
     @cached_property
     def preload(self) -> SparseArray | None:
         """Return the geometric stiffness of preloads and weight, (n, n), or None."""
-        parts = [preload_stiffness(self, p.member, p.force) for p in self.frame.preloads]
+        parts = [
+            GeometricStiffness(self).of_preload(p.member, p.force) for p in self.frame.preloads
+        ]
         if self.frame.gravity:
-            parts.append(self.frame.gravity * gravity_stiffness(self))
+            parts.append(self.frame.gravity * GeometricStiffness(self).of_weight())
         return sum(parts[1:], start=parts[0]) if parts else None
 
     def matrices(self) -> tuple[SparseArray, SparseArray]:
@@ -95,7 +97,7 @@ class Structure(MeshedFrame):
         return mass, prune(stiffness)
 
     def _assembled_mass(self) -> SparseArray:
-        mass = self.plan.assemble_from(lambda rows: mass_matrices(self.properties.take(rows)))
+        mass = self.plan.assemble_from(lambda rows: self.properties.take(rows).mass_matrices())
         if self.frame.masses:
             mass = mass + self.once(
                 "masses",

@@ -15,7 +15,6 @@ import scipy.linalg as la
 
 from femubench.core.change.hypothesis import Hypothesis
 from femubench.core.errors import ModelError
-from femubench.core.fem.beam import mass_matrices, stiffness_matrices
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
@@ -296,6 +295,6 @@ def scatter_terms(
     rows = (12 * elements[:, None] + np.arange(12)).ravel()
     local = (structure.gather[rows] @ vectors).reshape(-1, 12, vectors.shape[1])
     near = local[:, :, :q]
-    stiff = np.swapaxes(stiffness_matrices(properties) @ near, 1, 2) @ local
-    heavy = np.swapaxes(mass_matrices(properties) @ near, 1, 2) @ local
+    stiff = np.swapaxes(properties.stiffness_matrices() @ near, 1, 2) @ local
+    heavy = np.swapaxes(properties.mass_matrices() @ near, 1, 2) @ local
     return np.concatenate([stiff, -eigenvalues[:, None] * heavy])

@@ -19,7 +19,6 @@ import numpy as np
 import scipy.linalg as la
 from scipy.optimize import minimize
 
-from femubench.core.fem.beam import mass_matrices, stiffness_matrices
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.discrepancy import Discrepancy
@@ -28,7 +27,7 @@ from femubench.core.fit.modal_fit import Problem, State, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import Modes
-from femubench.core.modal.group_prior import STRUCTURE_STD, group_prior_std
+from femubench.core.modal.group_prior import STRUCTURE_STD, GroupPriors
 from femubench.core.typing import FloatArray, IntArray
 
 
@@ -126,7 +125,7 @@ def _groups(nominal: State, shapes: FloatArray) -> dict[str, FloatArray]:
     """
     model, near = nominal.problem.model, nominal.vectors[: shapes.shape[1], nominal.partner]
     values = nominal.eigenvalues[nominal.partner]
-    sure = {n: group_prior_std(model, n) < 2.0 * STRUCTURE_STD for n in model.groups}
+    sure = {n: GroupPriors(model).std(n) < 2.0 * STRUCTURE_STD for n in model.groups}
     classes = {
         "group stiffness": [part for name, part in model.groups.items() if sure[name]],
         "joint groups": [part for name, part in model.groups.items() if not sure[name]],
@@ -238,7 +237,7 @@ def _end_moments(
         compliance, (p, N) each; joint type and direction, (p,).
     """
     frame, mesh = structure.frame, structure.mesh
-    matrices = stiffness_matrices(structure.properties), mass_matrices(structure.properties)
+    matrices = structure.properties.stiffness_matrices(), structure.properties.mass_matrices()
     kind = {joint.name: joint.family for joint in frame.joints}
     active = [d for d, word in enumerate(("rx", "ry", "rz")) if word in ACTIVE[frame.plane]]
     moments: tuple[list[FloatArray], list[FloatArray]] = [], []

@@ -32,7 +32,7 @@ from femubench.core.identify.identification import Identification
 from femubench.core.identify.output_only import MOST_ORDER, identify_signals
 from femubench.core.identify.responses import MOST_POLES, identify_responses
 from femubench.core.library.cases import usable_plugins, way_of
-from femubench.core.modal.signals import TimeSignals, join_records
+from femubench.core.modal.signals import TimeSignals
 from femubench.core.pace import Advance, OnAdvance
 from femubench.core.plugin.loader import Plugins
 
@@ -123,7 +123,7 @@ def identification_of(
         if len(read) > 1 and len(over_time) < len(read):
             expected = "records over time; of frequency responses one file, that has all of them"
             raise InputError("frequency responses", file=file, expected=expected)
-        measured = join_records(over_time) if over_time else read[0]
+        measured = TimeSignals.joined(over_time) if over_time else read[0]
     if known is not None:
         measured = locate_sensors(measured, known, Path(sensors or ""))
     said = ""

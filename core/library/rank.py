@@ -104,12 +104,34 @@ class Run(results.Run):
 
     @property
     def table(self) -> pd.DataFrame:
-        """Return one row a job: status, errors by block, counts, gain and rank."""
+        """Return one row a job: status, errors by block, counts, gain and rank.
+
+        Columns: case strategy seed nominal status reason seconds; ``used_percent``, ``used_mac``
+        and the same for ``higher`` and ``modified`` (nan where the case has no such block);
+        rigid_body_modes rigid_body_modes_expected negative_eigenvalues unphysical
+        parameter_count evaluations gain rank. Of a study also the values of its axes:
+        ``plain_case`` and ``plain_strategy``, noise, sensors_left_out, and every option as
+        ``STRATEGY.OPTION``.
+
+        Examples:
+            >>> list(femubench.Run.of(run).table.columns[:3])
+            ['case', 'strategy', 'seed']
+        """
         return results_frame(self)
 
     @property
     def modes(self) -> pd.DataFrame:
-        """Return one row a measured mode of every job that is ok."""
+        """Return one row a measured mode of every job that is ok.
+
+        Columns: case strategy seed nominal block modification mode measured_hz predicted_hz
+        error_percent counted_percent mac predicted_std_hz. The error is signed, (f_p / f_m - 1),
+        and nan for a mode without partner or with an imaginary one; `counted_percent` is what the
+        rms takes, 100 for such a mode.
+
+        Examples:
+            >>> list(femubench.Run.of(run).modes.columns[:3])
+            ['case', 'strategy', 'seed']
+        """
         return modes_frame(self)
 
     @property
@@ -137,7 +159,26 @@ class Run(results.Run):
         return Run(meta, rank_results(self.results, meta), self.companions)
 
     def gain_by(self, *axes: str) -> pd.DataFrame:
-        """Return one row a cell of a study; see `femubench.results.gain_by`."""
+        """Return one row a cell: the values of the axes, gain, and how many of its jobs failed.
+
+        The gain of a cell is that of the leaderboard with nothing else on it: cases are taken
+        together with every structure counted once, and so are the values of the axes left out; with
+        several seeds it is the mean over them. `gain_low` and `gain_high` are its 95 % interval,
+        over structures where there are six or more, else over seeds. A job that failed or is
+        missing counts as the model that was given. Of an axis of options there are the cells of its
+        strategy alone, unless ``strategy`` is an axis too: then the others have none there.
+
+        Arguments:
+            axes: ``noise``, ``sensors_left_out``, ``strategy``, ``STRATEGY.OPTION``, ``case``,
+                ``nominal``; without any, those with more than one value, cases taken together.
+
+        Raises:
+            InputError: for an axis that the run does not have.
+
+        Examples:
+            >>> femubench.Run.of(run).gain_by("strategy")["gain"].round(2).tolist()
+            [-0.67, 0.6]
+        """
         return gain_by(self, *axes)
 
     def rows(self) -> list[tuple[str, str]]:

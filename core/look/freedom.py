@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.effect.attachments import elastic_band
+from femubench.core.effect.model_places import elastic_band
 from femubench.core.inference.settings import settings
 from femubench.core.look.modes import Seen
 from femubench.core.modal.rigid import rigid_body_vectors

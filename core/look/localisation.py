@@ -11,8 +11,7 @@ import scipy.sparse as sp
 
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import ModelError
-from femubench.core.fem.beam import stiffness_matrices
-from femubench.core.fem.group_factors import group_places
+from femubench.core.fem.group_factors import Groups
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.inference.settings import settings
@@ -39,7 +38,7 @@ class Elements:
     @cached_property
     def stiffness(self) -> FloatArray:
         """Return the local stiffness matrices, (n_elements, 12, 12)."""
-        return stiffness_matrices(self.structure.properties)
+        return self.structure.properties.stiffness_matrices()
 
     @cached_property
     def labels(self) -> tuple[tuple[str, ...], SparseArray]:
@@ -144,7 +143,7 @@ def node_residual(comparison: ModalCorrelation, expansion: Expansion) -> list[Va
 def group_energy(comparison: ModalCorrelation, expansion: Expansion) -> list[Values]:
     """Return the error in constitutive relation of the groups of a model from files."""
     shapes, gaps = _weighted(expansion)
-    names = group_places(comparison.model, "stiffness")
+    names = Groups(comparison.model).places("stiffness")
     parts = comparison.model.groups.values()
     error = np.array([np.einsum("nm,nm->", gaps, k @ gaps) for k in parts])
     energy = np.array([np.einsum("nm,nm->", shapes, k @ shapes) for k in parts])

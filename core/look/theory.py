@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from femubench.core.fem.beam import stiffness_matrices
 from femubench.core.fem.frame import Member
 from femubench.core.fem.joints import whole_members
 from femubench.core.fem.sections import Section
@@ -53,7 +52,7 @@ def _bending(seen: Seen) -> FloatArray:
     structure = seen.model.frame_structure
     modes = seen.modes.take(np.arange(seen.count))
     local = (structure.gather @ modes.shapes).reshape(-1, 12, len(modes))
-    stiffness, member = stiffness_matrices(structure.properties), structure.mesh.member
+    stiffness, member = structure.properties.stiffness_matrices(), structure.mesh.member
     share = np.zeros((len(structure.frame.members), 2, len(modes)))
     across = [2, 4, 8, 10], [1, 5, 7, 11]  # local dofs of bending along z and along y
     for k, slots in enumerate(across):

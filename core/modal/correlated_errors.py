@@ -43,12 +43,6 @@ def shrunk_correlation(repeats: FloatArray) -> tuple[FloatArray, float]:
         repeats: a row a repeat, (n, m), n >= 3.
 
     Source: Schaefer & Strimmer (2005), Stat. Appl. Genet. Mol. Biol. 4, 32, target D.
-
-    Examples:
-        >>> rows = np.random.default_rng(0).standard_normal((4, 6))
-        >>> correlation, share = modal.shrunk_correlation(rows)
-        >>> bool(np.linalg.eigvalsh(correlation)[0] > 0.0) and share > 0.0
-        True
     """
     n = len(repeats)
     off = repeats - repeats.mean(axis=0)

@@ -53,18 +53,6 @@ def mac(a: Any, b: Any) -> FloatArray:  # noqa: ANN401 - real or complex arrays
     return np.asarray(np.minimum(ratio, 1.0))
 
 
-def auto_mac(shapes: Any) -> FloatArray:  # noqa: ANN401 - real or complex arrays
-    """Return the MAC of shapes with each other, (m, m): what the sensors can tell apart.
-
-    Examples:
-        >>> print(modal.auto_mac(measurement.shapes).round(2))
-        [[1. 0. 0.]
-         [0. 1. 0.]
-         [0. 0. 1.]]
-    """
-    return mac(shapes, shapes)
-
-
 def modal_scale_factor(
     measured: Any,  # noqa: ANN401 - real or complex arrays
     predicted: Any,  # noqa: ANN401
@@ -81,10 +69,6 @@ def modal_scale_factor(
         weights: W >= 0, e.g. 1/sigma^2, (n_sensors,) or (n_sensors, m); None for equal ones.
 
     Source: Allemang 1980, Investigation of some multiple input/output FRF techniques.
-
-    Examples:
-        >>> print(modal.modal_scale_factor([2.0, 4.0, np.nan], [1.0, 2.0, 3.0]))
-        [2.]
     """
     left, has_left = _columns(measured)
     right, has_right = _columns(predicted)

@@ -16,18 +16,3 @@ def generalised_masses(model: Model, shapes: FloatArray) -> FloatArray:
         shapes: at all its dofs, (n, m).
     """
     return np.asarray(np.einsum("ij,ij->j", shapes, model.mass_times(shapes)))
-
-
-def mass_normalised(model: Model, shapes: FloatArray) -> FloatArray:
-    """Return shapes with phi' M phi = 1 each, (n, m).
-
-    Arguments:
-        model: whose mass counts.
-        shapes: at all its dofs, each with some mass in it, (n, m).
-
-    Examples:
-        >>> shapes = modal.mass_normalised(model, 3.0 * modes.shapes)
-        >>> np.allclose(np.diag(shapes.T @ model.mass_times(shapes)), 1.0)
-        True
-    """
-    return np.asarray(shapes / np.sqrt(generalised_masses(model, shapes)))

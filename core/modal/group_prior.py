@@ -42,19 +42,74 @@ _FREE = 1e-8  # of the energy that the entries would have without cancelling eac
 _HELD = 0.1  # of it; a part of the structure with some dofs removed has less
 
 
-@cache_by_model
-def support_groups(model: Model) -> frozenset[str]:
-    """Return the groups of the stiffness that hold the structure to ground.
+def _energy(part: SparseArray, rigid: FloatArray) -> float:
+    """Return the largest energy of a rigid-body motion, relative to that of its entries."""
+    whole = np.einsum("nr,nr->r", np.abs(rigid), abs(part) @ np.abs(rigid))
+    energy = np.abs(np.einsum("nr,nr->r", rigid, part @ rigid))
+    return float((energy / np.where(whole > 0.0, whole, 1.0)).max(initial=0.0))
 
-    A group is a support where its matrix couples no two dofs, or where a rigid-body motion costs
-    it a tenth of the energy that its entries would have without cancelling each other. The latter
-    is asked only where positions and directions of the dofs are known to be right: where some group
-    that couples dofs has no energy in any rigid-body motion.
 
-    Examples:
-        >>> modal.support_groups(model)
-        frozenset()
+@dataclass(frozen=True)
+class GroupPriors:
+    """What is known of the groups of a model from matrices before any measurement.
+
+    Arguments:
+        model: from matrices.
     """
+
+    model: Model
+
+    @property
+    def supports(self) -> frozenset[str]:
+        """Return the groups of the stiffness that hold the structure to ground.
+
+        A group is a support where its matrix couples no two dofs, or where a rigid-body motion
+        costs it a tenth of the energy that its entries would have without cancelling each other.
+        The latter is asked only where positions and directions of the dofs are known to be right:
+        where some group that couples dofs has no energy in any rigid-body motion.
+
+        Examples:
+            >>> modal.GroupPriors(model).supports
+            frozenset()
+        """
+        return _supports(self.model)
+
+    def std(self, name: str) -> float:
+        """Return the standard deviation of ln(factor) of a group.
+
+        What the case states: a factor of so much up or down is as likely as not. Else that of its
+        kind (`KINDS`), stated or, for what holds to ground, found.
+
+        Arguments:
+            name: of a group of the stiffness or the mass.
+
+        Examples:
+            >>> modal.GroupPriors(model).std("deck")
+            0.1
+        """
+        if name in self.model.group_priors:
+            return float(np.log(self.model.group_priors[name]) / QUARTILE)
+        return self._kind(name).std
+
+    def largest_factor(self, name: str) -> float:
+        """Return the largest factor on a group that is believed; infinite for most kinds.
+
+        Arguments:
+            name: of a group of the stiffness or the mass.
+
+        Examples:
+            >>> modal.GroupPriors(model).largest_factor("deck")
+            inf
+        """
+        return self._kind(name).most
+
+    def _kind(self, name: str) -> GroupKind:
+        held = "support" if name in self.supports else "part"
+        return KINDS[self.model.group_kinds.get(name, held)]
+
+
+@cache_by_model
+def _supports(model: Model) -> frozenset[str]:
     rest = {
         k: part
         for k, part in model.groups.items()
@@ -65,48 +120,3 @@ def support_groups(model: Model) -> frozenset[str]:
     known = any(share < _FREE for share in energy.values())
     free = {name for name, share in energy.items() if not (known and share > _HELD)}
     return frozenset(set(model.groups) - free)
-
-
-def _energy(part: SparseArray, rigid: FloatArray) -> float:
-    """Return the largest energy of a rigid-body motion, relative to that of its entries."""
-    whole = np.einsum("nr,nr->r", np.abs(rigid), abs(part) @ np.abs(rigid))
-    energy = np.abs(np.einsum("nr,nr->r", rigid, part @ rigid))
-    return float((energy / np.where(whole > 0.0, whole, 1.0)).max(initial=0.0))
-
-
-def group_prior_std(model: Model, name: str) -> float:
-    """Return the standard deviation of ln(factor) of a group.
-
-    What the case states: a factor of so much up or down is as likely as not. Else that of its
-    kind (`KINDS`), stated or, for what holds to ground, found.
-
-    Arguments:
-        model: from matrices.
-        name: of a group of its stiffness or mass.
-
-    Examples:
-        >>> modal.group_prior_std(model, "deck")
-        0.1
-    """
-    if name in model.group_priors:
-        return float(np.log(model.group_priors[name]) / QUARTILE)
-    return _kind_of(model, name).std
-
-
-def largest_factor(model: Model, name: str) -> float:
-    """Return the largest factor on a group that is believed; infinite for most kinds.
-
-    Arguments:
-        model: from matrices.
-        name: of a group of its stiffness or mass.
-
-    Examples:
-        >>> modal.largest_factor(model, "deck")
-        inf
-    """
-    return _kind_of(model, name).most
-
-
-def _kind_of(model: Model, name: str) -> GroupKind:
-    held = "support" if name in support_groups(model) else "part"
-    return KINDS[model.group_kinds.get(name, held)]

@@ -35,7 +35,7 @@ from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import DENSE_LIMIT, solve_modes
 from femubench.core.modal.factorisation import factorise_definite
-from femubench.core.modal.group_prior import group_prior_std
+from femubench.core.modal.group_prior import GroupPriors
 from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
@@ -160,7 +160,7 @@ _K, _M = ("stiffness", ""), ("mass", "")
 
 def _factors(model: Model, name: str) -> tuple[float, ...]:
     """Return what a group of the stiffness may turn out to be, the softest first."""
-    return PART_FACTORS if group_prior_std(model, name) < _UNKNOWN else JOINT_FACTORS
+    return PART_FACTORS if GroupPriors(model).std(name) < _UNKNOWN else JOINT_FACTORS
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,6 @@ def rigid_body_vectors(dofs: Dofs) -> FloatArray:
     """Return the rigid-body motions of labelled dofs, (n, r) with r up to six.
 
     Three translations and three rotations about the centroid, those that move nothing left out.
-
-    Examples:
-        >>> modal.rigid_body_vectors(model.dofs).shape
-        (81, 3)
     """
     vectors = _motions(dofs)(dofs.xyz, dofs.motions)
     # A plane off the origin leaves roundoff in what moves nothing.

@@ -65,10 +65,6 @@ def shape_sensitivities(
         ModelError: when the bordered system is singular.
 
     Source: Fox & Kapoor (1968), full modal sum; Nelson (1976).
-
-    Examples:
-        >>> modal.shape_sensitivities(model, modes, 3, [stiffness]).shape
-        (81, 1)
     """
     change = matrix_slopes(model, parameters) if isinstance(parameters, Sequence) else parameters
     shape, eigenvalue = modes.shapes[:, index], float(modes.eigenvalues[index])
@@ -99,18 +95,3 @@ def shape_sensitivities(
         raise ModelError(f"mode {index + 1}: shape sensitivities have no solution") from error
     particular = np.asarray(solved[: model.size])
     return np.asarray(particular + np.outer(shape, own))
-
-
-def frequency_sensitivities(
-    model: Model, modes: Modes, parameters: Sequence[Property]
-) -> FloatArray:
-    """Return d f_j / d p in Hz a unit of the parameter, elastic modes only, (m, n_parameters).
-
-    Examples:
-        >>> print(modal.frequency_sensitivities(model, modes.take([3, 4]), [stiffness]).round(1))
-        [[127.9]
-         [138.8]]
-    """
-    slope = eigenvalue_sensitivities(model, modes, parameters)
-    omega = np.sqrt(np.abs(modes.eigenvalues))[:, None]
-    return np.asarray(slope / (4.0 * np.pi * omega))

@@ -57,40 +57,42 @@ class TimeSignals(Shown):
         """Return the samples of every record."""
         return [slice(*ends) for ends in pairwise((*self.starts, len(self.values)))]
 
+    @classmethod
+    def joined(cls, parts: Sequence[TimeSignals]) -> TimeSignals:
+        """Return the records of one state as one, on all their sensors and forces.
 
-def join_records(parts: Sequence[TimeSignals]) -> TimeSignals:
-    """Return the records of one state as one, on all their sensors and forces.
+        Raises:
+            InputError: for other rates or quantities.
 
-    Raises:
-        InputError: for other rates or quantities.
-
-    Examples:
-        >>> signals = modal.TimeSignals(measurement.sensors, 512.0, np.zeros((5120, 13)))
-        >>> len(modal.join_records([signals, signals]).records)
-        2
-    """
-    kinds = {f"{part.quantity} at {part.rate:.6g} Hz" for part in parts}
-    if len(kinds) > 1:
-        what = f"records of {' and '.join(sorted(kinds))}"
-        raise InputError(what, expected="one kind at one rate")
-    ends = np.cumsum([0, *(len(part.values) for part in parts)]).tolist()
-    sides: list[Any] = []
-    for side, column, empty in (("sensors", "values", np.nan), ("forces", "force_values", 0.0)):
-        every = [getattr(part, side) for part in parts]
-        first = {
-            label: (one.xyz[k], one.directions[k])
-            for one in reversed(every)
-            for k, label in enumerate(one.labels)
-        }
-        labels = tuple(dict.fromkeys(label for one in every for label in one.labels))
-        xyz = np.array([first[label][0] for label in labels], dtype=float).reshape(-1, 3)
-        values = np.full((ends[-1], len(labels)), empty)
-        for part, one, rows in zip(parts, every, pairwise(ends), strict=True):
-            if len(one):
-                where = [labels.index(label) for label in one.labels]
-                values[slice(*rows), where] = getattr(part, column)
-        sides += [Sensors(labels, xyz, tuple(first[label][1] for label in labels)), values]
-    starts = [end + start for end, part in zip(ends, parts, strict=False) for start in part.starts]
-    sensors, values, forces, acting = sides
-    kind = parts[0].quantity
-    return TimeSignals(sensors, parts[0].rate, values, forces, acting, kind, tuple(starts))
+        Examples:
+            >>> signals = modal.TimeSignals(measurement.sensors, 512.0, np.zeros((5120, 13)))
+            >>> len(modal.TimeSignals.joined([signals, signals]).records)
+            2
+        """
+        kinds = {f"{part.quantity} at {part.rate:.6g} Hz" for part in parts}
+        if len(kinds) > 1:
+            what = f"records of {' and '.join(sorted(kinds))}"
+            raise InputError(what, expected="one kind at one rate")
+        ends = np.cumsum([0, *(len(part.values) for part in parts)]).tolist()
+        sides: list[Any] = []
+        for side, column, empty in (("sensors", "values", np.nan), ("forces", "force_values", 0.0)):
+            every = [getattr(part, side) for part in parts]
+            first = {
+                label: (one.xyz[k], one.directions[k])
+                for one in reversed(every)
+                for k, label in enumerate(one.labels)
+            }
+            labels = tuple(dict.fromkeys(label for one in every for label in one.labels))
+            xyz = np.array([first[label][0] for label in labels], dtype=float).reshape(-1, 3)
+            values = np.full((ends[-1], len(labels)), empty)
+            for part, one, rows in zip(parts, every, pairwise(ends), strict=True):
+                if len(one):
+                    where = [labels.index(label) for label in one.labels]
+                    values[slice(*rows), where] = getattr(part, column)
+            sides += [Sensors(labels, xyz, tuple(first[label][1] for label in labels)), values]
+        starts = [
+            end + start for end, part in zip(ends, parts, strict=False) for start in part.starts
+        ]
+        sensors, values, forces, acting = sides
+        kind = parts[0].quantity
+        return cls(sensors, parts[0].rate, values, forces, acting, kind, tuple(starts))

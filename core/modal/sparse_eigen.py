@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.model import LowRank, Model, total_change
+from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.factorisation import LU, Cholesky, DefiniteLU, Symmetric, cholmod_obstacle
 from femubench.core.modal.generalised_mass import generalised_masses
 from femubench.core.modal.inertia import Change, negative_after, negative_by_pins, signs_hold
@@ -87,7 +87,7 @@ class ShiftedModel:
         mass = self.model.mass_change
         if mass is not None:
             mass = LowRank(mass.basis, -self.shift * mass.core) if self.shift else None
-        found = total_change([self.model.stiffness_change, mass])
+        found = LowRank.total([self.model.stiffness_change, mass])
         return None if found is None else (found.basis, np.diagonal(found.core))
 
     @cached_property

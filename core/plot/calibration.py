@@ -12,7 +12,6 @@ from femubench.core.plot.style import SOFT, check_kind, draw_curves, name_of, ow
 from femubench.core.schema.results import Run
 from femubench.core.score.bounded_gain import MeasuredModes, Rule
 from femubench.core.score.predictive import Forecasts
-from femubench.core.score.statistics import structures_of
 from femubench.core.typing import FloatArray
 
 if TYPE_CHECKING:
@@ -41,7 +40,7 @@ def calibration(run: Run, *, ax: Axes | None = None) -> Axes:
         'level of the interval'
     """
     check_kind(run, (Run,), "strategies")
-    structures = structures_of(run)
+    structures = run.structures
     reached: dict[str, dict[str, list[FloatArray]]] = defaultdict(lambda: defaultdict(list))
     for result in (result for result in run.ranked if result.status == "ok"):
         found = Forecasts.of(MeasuredModes.of(result.blocks, Rule()), result.blocks)

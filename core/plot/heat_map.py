@@ -38,7 +38,7 @@ def heat_map(
 
     Arguments:
         run: of a study, or any other.
-        x, y: axes, see `femubench.results.gain_by`; those of the study where they are left out.
+        x, y: axes, see `Run.gain_by`; those of the study where they are left out.
         ax: to draw on; None for axes of a new figure.
 
     Raises:

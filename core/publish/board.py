@@ -20,7 +20,6 @@ from femubench.core.publish.places import (
 from femubench.core.publish.submissions import Proof, Submission, slug
 from femubench.core.score.ranking import Scale
 from femubench.core.score.repeatability import unsteady
-from femubench.core.score.statistics import structures_of
 from femubench.core.score.twin_gain import twin_gains
 
 INDEX_SCHEMA = 4  # since runs have a proof
@@ -200,7 +199,7 @@ def _stated_in_runs(submissions: Iterable[Submission], what: str) -> dict[str, A
     """Return what the runs say of their cases; the first that says something counts."""
     found: dict[str, Any] = {}
     for item in submissions:
-        said = structures_of(item.run) if what == "structures" else item.run.meta.get(what) or {}
+        said = item.run.structures if what == "structures" else item.run.meta.get(what) or {}
         for name in _cases(item):
             if said.get(name):
                 found.setdefault(name, said[name])

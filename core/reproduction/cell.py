@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from femubench.core.errors import InputError
@@ -48,6 +48,34 @@ class Cell:
     def deviation_percent(self) -> float | None:
         """Return how far ours is from the printed figure; see `deviation_percent`."""
         return deviation_percent(self.printed, self.ours, self.unit)
+
+    @staticmethod
+    def verdict_counts(cells: Sequence[Cell]) -> dict[Verdict, int]:
+        """Return the number of cells of every verdict, none left out.
+
+        Examples:
+            >>> fit = reproduction.Ground("fitted", "the length is fitted to this frequency")
+            >>> page = reproduction.Page("paper", "1", (fit,), unit="Hz", tolerance=0.1)
+            >>> cells = [page.cell("mode 1", "FE", 255.8, 255.83)]
+            >>> reproduction.Cell.verdict_counts(cells)["fitted"]
+            1
+        """
+        return {
+            verdict: sum(cell.verdict == verdict for cell in cells) for verdict in Ground.VERDICTS
+        }
+
+    @staticmethod
+    def count_different(cells: Sequence[Cell]) -> int:
+        """Return how many different figures agree independently: one printed again counts once.
+
+        Examples:
+            >>> free = reproduction.Ground("independent", "nothing is chosen for it")
+            >>> page = reproduction.Page("paper", "2", (free,), decimals=3)
+            >>> cells = [page.cell(m, "mode 1", 1.0, 1.0001) for m in "BCD"]
+            >>> reproduction.Cell.count_different(cells)
+            1
+        """
+        return len({(c.paper, c.unit, c.printed) for c in cells if c.verdict == "independent"})
 
 
 def deviation_percent(printed: float, ours: float | None, unit: str) -> float | None:

@@ -26,6 +26,38 @@ class Choice:
     ours: Mapping[Key, float | None]
     worth: Verdict = "under-convention"
 
+    def under(self, cells: Sequence[Cell]) -> dict[Key, Cell]:
+        """Return the cells that a choice changes, judged anew by the bars of their kind.
+
+        What agrees is worth no more than the choice; what cannot be checked stays so.
+
+        Arguments:
+            cells: of the study.
+
+        Raises:
+            InputError: for a cell that is not there, or that does not know how it was judged.
+
+        Examples:
+            >>> fit = reproduction.Ground("fitted", "the length is fitted to this frequency")
+            >>> page = reproduction.Page("paper", "1", (fit,), unit="Hz", tolerance=0.1)
+            >>> key = "1", "mode 1", "FE"
+            >>> choice = reproduction.Choice("lumped mass", {key: 300.0})
+            >>> found = choice.under([page.cell("mode 1", "FE", 255.8, 255.83)])
+            >>> found[key].verdict
+            'does-not-follow'
+        """
+        known = {(cell.table, cell.row, cell.column): cell for cell in cells}
+        found = {}
+        missed = Ground("does-not-follow", f"the figures do not agree: {self.label}")
+        for key, ours in self.ours.items():
+            cell = known.get(key)
+            if cell is None or cell.page is None:
+                raise InputError(f"no judged cell {key}", expected="one of the study's")
+            grounds = (*cell.page.grounds, Ground(self.worth, self.label))
+            page = replace(cell.page, grounds=grounds, fault=missed)
+            found[key] = page.cell(cell.row, cell.column, cell.printed, ours, cell.others)
+        return found
+
 
 @dataclass(frozen=True)
 class Convention:
@@ -53,37 +85,3 @@ class Convention:
     def keys(self) -> frozenset[Key]:
         """Return the cells that any choice changes."""
         return frozenset(key for choice in self.choices for key in choice.ours)
-
-
-def under(choice: Choice, cells: Sequence[Cell]) -> dict[Key, Cell]:
-    """Return the cells that a choice changes, judged anew by the bars of their kind.
-
-    What agrees is worth no more than the choice; what cannot be checked stays so.
-
-    Arguments:
-        choice: with values of ours.
-        cells: of the study.
-
-    Raises:
-        InputError: for a cell that is not there, or that does not know how it was judged.
-
-    Examples:
-        >>> fit = reproduction.Ground("fitted", "the length is fitted to this frequency")
-        >>> page = reproduction.Page("paper", "1", (fit,), unit="Hz", tolerance=0.1)
-        >>> key = "1", "mode 1", "FE"
-        >>> choice = reproduction.Choice("lumped mass", {key: 300.0})
-        >>> found = reproduction.under(choice, [page.cell("mode 1", "FE", 255.8, 255.83)])
-        >>> found[key].verdict
-        'does-not-follow'
-    """
-    known = {(cell.table, cell.row, cell.column): cell for cell in cells}
-    found = {}
-    missed = Ground("does-not-follow", f"the figures do not agree: {choice.label}")
-    for key, ours in choice.ours.items():
-        cell = known.get(key)
-        if cell is None or cell.page is None:
-            raise InputError(f"no judged cell {key}", expected="one of the study's")
-        grounds = (*cell.page.grounds, Ground(choice.worth, choice.label))
-        page = replace(cell.page, grounds=grounds, fault=missed)
-        found[key] = page.cell(cell.row, cell.column, cell.printed, ours, cell.others)
-    return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 from femubench.core.errors import InputError
 
@@ -35,6 +35,8 @@ class Ground:
     Raises:
         InputError: for an empty reason, or a search that does not say how many it tried.
     """
+
+    VERDICTS: ClassVar[tuple[Verdict, ...]] = VERDICTS
 
     verdict: Verdict
     words: str

@@ -30,22 +30,22 @@ class Grid:
         """Yield where its cells belong, from left to right and down."""
         for _, entries in self.rows:
             for entry in entries:
-                yield from places_of(entry)
+                yield from self.places_of(entry)
 
+    @staticmethod
+    def places_of(entry: Entry) -> tuple[Place, ...]:
+        """Return where the cells of an entry belong: none, one or two.
 
-def places_of(entry: Entry) -> tuple[Place, ...]:
-    """Return where the cells of an entry belong: none, one or two.
+        Arguments:
+            entry: of a grid.
 
-    Arguments:
-        entry: of a grid.
-
-    Examples:
-        >>> reproduction.places_of((("mode 1", "FE"), ("mode 1", "error")))
-        (('mode 1', 'FE'), ('mode 1', 'error'))
-    """
-    if isinstance(entry, str):
-        return ()
-    return (entry,) if isinstance(entry[0], str) else entry
+        Examples:
+            >>> reproduction.Grid.places_of((("mode 1", "FE"), ("mode 1", "error")))
+            (('mode 1', 'FE'), ('mode 1', 'error'))
+        """
+        if isinstance(entry, str):
+            return ()
+        return (entry,) if isinstance(entry[0], str) else entry
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,37 @@ class PrintedTable:
     grids: tuple[Grid, ...]
     chart: Chart | None = None
 
+    @staticmethod
+    def filled(
+        tables: Sequence[PrintedTable], cells: Sequence[Cell]
+    ) -> Iterator[tuple[PrintedTable, dict[Place, Cell]]]:
+        """Yield every table with its cells; those that no layout has follow by their own rows.
+
+        Arguments:
+            tables: layouts.
+            cells: of all tables.
+
+        Examples:
+            >>> fit = reproduction.Ground("fitted", "the length is fitted to this frequency")
+            >>> page = reproduction.Page("paper", "1", (fit,), unit="Hz", tolerance=0.1)
+            >>> cell = page.cell("mode 1", "FE", 255.8, 255.83)
+            >>> [(table, own)] = reproduction.PrintedTable.filled([], [cell])
+            >>> table.grids[0].heads, own["mode 1", "FE"].ours
+            (('', 'FE'), 255.83)
+        """
+        left: dict[str, dict[Place, Cell]] = {}
+        for cell in cells:
+            left.setdefault(cell.table, {})[cell.row, cell.column] = cell
+        for table in tables:
+            own = left.pop(table.table, {})
+            placed = {place for grid in table.grids for place in grid.places}
+            rest = [cell for place, cell in own.items() if place not in placed]
+            further = (by_rows(rest),) if rest else ()
+            grids = (*table.grids, *further)
+            yield PrintedTable(table.table, table.title, grids, table.chart), own
+        for name, own in left.items():
+            yield PrintedTable(name, "", (by_rows(own.values()),)), own
+
 
 def by_rows(cells: Iterable[Cell]) -> Grid:
     """Return cells by their own rows and columns, in the order in which these come up."""
@@ -76,34 +107,3 @@ def by_rows(cells: Iterable[Cell]) -> Grid:
             for row in dict.fromkeys(row for row, _ in places)
         ),
     )
-
-
-def as_printed(
-    tables: Sequence[PrintedTable], cells: Sequence[Cell]
-) -> Iterator[tuple[PrintedTable, dict[Place, Cell]]]:
-    """Yield every table with its cells; those that no layout has follow by their own rows.
-
-    Arguments:
-        tables: layouts.
-        cells: of all tables.
-
-    Examples:
-        >>> fit = reproduction.Ground("fitted", "the length is fitted to this frequency")
-        >>> page = reproduction.Page("paper", "1", (fit,), unit="Hz", tolerance=0.1)
-        >>> cell = page.cell("mode 1", "FE", 255.8, 255.83)
-        >>> [(table, own)] = reproduction.as_printed([], [cell])
-        >>> table.grids[0].heads, own["mode 1", "FE"].ours
-        (('', 'FE'), 255.83)
-    """
-    left: dict[str, dict[Place, Cell]] = {}
-    for cell in cells:
-        left.setdefault(cell.table, {})[cell.row, cell.column] = cell
-    for table in tables:
-        own = left.pop(table.table, {})
-        placed = {place for grid in table.grids for place in grid.places}
-        rest = [cell for place, cell in own.items() if place not in placed]
-        further = (by_rows(rest),) if rest else ()
-        grids = (*table.grids, *further)
-        yield PrintedTable(table.table, table.title, grids, table.chart), own
-    for name, own in left.items():
-        yield PrintedTable(name, "", (by_rows(own.values()),)), own

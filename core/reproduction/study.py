@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from femubench.core.plot.figure import Figure
 from femubench.core.reproduction.cell import Cell
 from femubench.core.reproduction.convention import Convention
 from femubench.core.reproduction.equation import Equation
-from femubench.core.reproduction.ground import VERDICTS, Verdict
 from femubench.core.reproduction.printed_table import PrintedTable
 
 FIGURES = "figures"  # folder of the drawings beneath that of a report
@@ -55,6 +54,8 @@ class Study:
         conventions: computes what can be read in several ways; no two change the same cell.
     """
 
+    FIGURES: ClassVar[str] = FIGURES
+
     paper: str
     title: str
     citation: str
@@ -66,30 +67,6 @@ class Study:
     tables: tuple[PrintedTable, ...] = ()
     equations: tuple[Equation, ...] = ()
     conventions: Callable[[], tuple[Convention, ...]] = tuple
-
-
-def verdict_counts(cells: Sequence[Cell]) -> dict[Verdict, int]:
-    """Return the number of cells of every verdict, none left out.
-
-    Examples:
-        >>> fit = reproduction.Ground("fitted", "the length is fitted to this frequency")
-        >>> page = reproduction.Page("paper", "1", (fit,), unit="Hz", tolerance=0.1)
-        >>> reproduction.verdict_counts([page.cell("mode 1", "FE", 255.8, 255.83)])["fitted"]
-        1
-    """
-    return {verdict: sum(cell.verdict == verdict for cell in cells) for verdict in VERDICTS}
-
-
-def count_different(cells: Sequence[Cell]) -> int:
-    """Return how many different figures agree independently: one printed again counts once.
-
-    Examples:
-        >>> free = reproduction.Ground("independent", "nothing is chosen for it")
-        >>> page = reproduction.Page("paper", "2", (free,), decimals=3)
-        >>> reproduction.count_different([page.cell(m, "mode 1", 1.0, 1.0001) for m in "BCD"])
-        1
-    """
-    return len({(c.paper, c.unit, c.printed) for c in cells if c.verdict == "independent"})
 
 
 def cells_to_json(studies: Sequence[Study]) -> list[dict[str, Any]]:

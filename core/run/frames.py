@@ -18,19 +18,7 @@ __all__ = ["modes_frame", "results_frame", "run_from_json", "run_to_json"]
 
 
 def results_frame(run: Run) -> pd.DataFrame:
-    """Return one row a job: status, errors by block, counts, gain and rank.
-
-    Columns: case strategy seed nominal status reason seconds; ``used_percent``, ``used_mac`` and
-    the same for ``higher`` and ``modified`` (nan where the case has no such block);
-    rigid_body_modes rigid_body_modes_expected negative_eigenvalues unphysical
-    parameter_count evaluations gain rank. Of a study also the values of its axes:
-    ``plain_case`` and ``plain_strategy``, noise, sensors_left_out, and every option as
-    ``STRATEGY.OPTION``.
-
-    Examples:
-        >>> results.results_frame(run)["status"].tolist()
-        ['ok', 'ok']
-    """
+    """Return one row a job: status, errors by block, counts, gain and rank; see `Run.table`."""
     import pandas as pd
 
     rows, study = [], StudyAxes.of(run) if StudyAxes.from_run(run) is not None else None
@@ -50,17 +38,7 @@ def results_frame(run: Run) -> pd.DataFrame:
 
 
 def modes_frame(run: Run) -> pd.DataFrame:
-    """Return one row a measured mode of every job that is ok.
-
-    Columns: case strategy seed nominal block modification mode measured_hz predicted_hz
-    error_percent counted_percent mac predicted_std_hz. The error is signed, (f_p / f_m - 1), and
-    nan for a mode without partner or with an imaginary one; `counted_percent` is what the rms
-    takes, 100 for such a mode.
-
-    Examples:
-        >>> len(results.modes_frame(run))
-        10
-    """
+    """Return one row a measured mode of every job that is ok; see `Run.modes`."""
     import pandas as pd
 
     rows = [

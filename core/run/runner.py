@@ -185,10 +185,6 @@ def run_jobs(
     Raises:
         InputError: for two of one name, no worker, or a run that another process works on.
         ModelError: when the nominal model of a case cannot be solved.
-
-    Examples:
-        >>> results.run_jobs([case], [nominal]).results[0].status
-        'ok'
     """
     check_keywords(keywords, RunKeywords)
     given, where = split_keywords(keywords)

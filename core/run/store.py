@@ -55,40 +55,6 @@ def notes_of(faults: Sequence[InputError], folder: Path) -> list[str]:
     return shown
 
 
-def note_missing_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> str | None:
-    """Return a line that says which jobs of a run have no result; None where all have one.
-
-    Examples:
-        >>> meta = {"cases": {"rod": {}}, "strategies": ["mine"], "seeds": [0]}
-        >>> results.note_missing_jobs(meta, ())
-        '1 of 1 jobs are missing and count as the model that was given: rod mine seed 0 drawn'
-    """
-    starts = meta.get("starts") or {}
-    models = {case: starts.get(case, NOMINALS[:1]) for case in meta.get("cases") or {}}
-    # What runs along with the cases starts from the model that ranks.
-    models |= {name: models.get(case, NOMINALS)[:1] for name, case in origins_of(meta).items()}
-    starting = dict.fromkeys((case, nominal) for case in models for nominal in models[case])
-    seeds, strategies = (dict.fromkeys(meta.get(key) or ()) for key in ("seeds", "strategies"))
-    there = {
-        (r.case, r.nominal, r.seed, r.strategy)
-        for r in results
-        if (r.case, r.nominal) in starting and r.seed in seeds and r.strategy in strategies
-    }
-    # Of what a file claims, which may be without end, so many are made as are named.
-    plan = ((*start, seed, who) for start in starting for seed in seeds for who in strategies)
-    missing = islice((job for job in plan if job not in there), _MOST_JOBS)
-    first = ", ".join(f"{case} {who} seed {seed} {nominal}" for case, nominal, seed, who in missing)
-    planned = len(starting) * len(seeds) * len(strategies)
-    lost = planned - len(there)
-    if not lost:
-        return None
-    first += f" and {lost - _MOST_JOBS} more" if lost > _MOST_JOBS else ""
-    if "finished" in meta and (meta["finished"] is None or meta.get("interrupted") is True):
-        how = "has not ended" if meta["finished"] is None else "was interrupted"
-        return f"the run {how}: {len(there)} of {planned} jobs are there; not run: {first}"
-    return f"{lost} of {planned} jobs are missing and count as the model that was given: {first}"
-
-
 def _is_old(file: Path) -> bool:
     """Tell whether a file begins as those of earlier versions do."""
     with suppress(OSError, InputError), open_regular(file, LARGEST) as stream:
@@ -217,7 +183,7 @@ class Store:
         listed = [result for result in everything if result.case not in others]
         companions = tuple(result for result in everything if result.case in others)
         check_extent(meta, tuple(listed), file=self.folder)
-        known, missing = meta.get("notes"), note_missing_jobs(meta, everything)
+        known, missing = meta.get("notes"), self.note_missing_jobs(meta, everything)
         notes = [*(known if isinstance(known, list) else []), *notes_of(faults, self.folder)]
         notes += [*self.notes_of_old_files(), *([missing] if missing else [])]
         rate_results(listed, Scale.of(meta))
@@ -365,6 +331,44 @@ class Store:
     def _close(self, run_id: str, *, is_complete: bool = False) -> None:
         if run_id in self._writers:
             self._writers.pop(run_id).close(is_complete=is_complete)
+
+    @staticmethod
+    def note_missing_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> str | None:
+        """Return a line that says which jobs of a run have no result; None where all have one.
+
+        Examples:
+            >>> meta = {"cases": {"rod": {}}, "strategies": ["mine"], "seeds": [0]}
+            >>> results.Store.note_missing_jobs(meta, ())
+            '1 of 1 jobs are missing and count as the model that was given: rod mine seed 0 drawn'
+        """
+        starts = meta.get("starts") or {}
+        models = {case: starts.get(case, NOMINALS[:1]) for case in meta.get("cases") or {}}
+        # What runs along with the cases starts from the model that ranks.
+        models |= {name: models.get(case, NOMINALS)[:1] for name, case in origins_of(meta).items()}
+        starting = dict.fromkeys((case, nominal) for case in models for nominal in models[case])
+        seeds, strategies = (dict.fromkeys(meta.get(key) or ()) for key in ("seeds", "strategies"))
+        there = {
+            (r.case, r.nominal, r.seed, r.strategy)
+            for r in results
+            if (r.case, r.nominal) in starting and r.seed in seeds and r.strategy in strategies
+        }
+        # Of what a file claims, which may be without end, so many are made as are named.
+        plan = ((*start, seed, who) for start in starting for seed in seeds for who in strategies)
+        missing = islice((job for job in plan if job not in there), _MOST_JOBS)
+        first = ", ".join(
+            f"{case} {who} seed {seed} {nominal}" for case, nominal, seed, who in missing
+        )
+        planned = len(starting) * len(seeds) * len(strategies)
+        lost = planned - len(there)
+        if not lost:
+            return None
+        first += f" and {lost - _MOST_JOBS} more" if lost > _MOST_JOBS else ""
+        if "finished" in meta and (meta["finished"] is None or meta.get("interrupted") is True):
+            how = "has not ended" if meta["finished"] is None else "was interrupted"
+            return f"the run {how}: {len(there)} of {planned} jobs are there; not run: {first}"
+        return (
+            f"{lost} of {planned} jobs are missing and count as the model that was given: {first}"
+        )
 
 
 @contextmanager

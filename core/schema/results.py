@@ -193,6 +193,11 @@ class Run(Shown):
         return tuple(name for name in reversed(NOMINALS) if name in found) or ("drawn",)
 
     @property
+    def structures(self) -> Mapping[str, str]:
+        """Return the structure of every case; a case that is not there is its own."""
+        return dict(self.meta.get("structures") or {})
+
+    @property
     def ranked(self) -> tuple[JobResult, ...]:
         """Return the results that make the ranks: those started from the textbook models."""
         return self.started_from(self.nominals[0])

@@ -12,7 +12,7 @@ from femubench.core.errors import InputError
 from femubench.core.schema.results import BLOCKS, DONE, NOMINALS, JobResult, Nominal, Run
 from femubench.core.score.ranking import Scale
 from femubench.core.score.repeatability import environment_differences
-from femubench.core.score.statistics import Significance, structures_of, weigh_evidence
+from femubench.core.score.statistics import Significance, weigh_evidence
 
 Metric = Literal["loss", "used", "higher", "modified", "seconds", "failures"]
 METRICS: tuple[Metric, ...] = get_args(Metric)
@@ -203,7 +203,7 @@ def compare_runs(
     if not shared:
         expected = "one (case, strategy, seed) with the same case files"
         raise InputError("the two runs have no job in common", expected=expected)
-    scale, structures = Scale.of(before.meta), {**structures_of(after), **structures_of(before)}
+    scale, structures = Scale.of(before.meta), {**after.structures, **before.structures}
     held = {job.case for job in shared if scale.holds_back(job.case)}
     pairs = [
         _JobPair(j.strategy, old[j], new[j], _lost_gain(scale, old[j], new[j], held))

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
 from femubench.core.garbage import pause_collection
 from femubench.core.schema.results import BLOCKS, JobResult, Nominal, Run, origins_of
 from femubench.core.score.bounded_gain import ModelErrors
-from femubench.core.score.ranking import TIE, Scale, rank_items
+from femubench.core.score.ranking import TIE, Scale, rank_items, rank_results
 from femubench.core.score.statistics import (
     FEWEST,
+    METHOD,
     Differences,
     interval_of_mean,
-    structures_of,
+    interval_tail,
     tell_apart,
 )
 from femubench.core.typing import FloatArray
@@ -28,6 +29,7 @@ from femubench.core.typing import FloatArray
 if TYPE_CHECKING:
     import pandas as pd
 
+_Item = TypeVar("_Item")
 TESTED = "published test"  # the class of a scenario whose data were measured
 MUCH_WORSE = 1.25  # times the textbook model's error
 # What is averaged over seeds, then over the cases of a structure, then over structures.
@@ -100,7 +102,7 @@ class GainTable:
         seeds = {*run.meta.get("seeds", ()), *(result.seed for result in run.results)}
         names = tuple(dict.fromkeys(run.meta.get("strategies", ())))
         names += tuple(sorted({result.strategy for result in run.results} - set(names)))
-        own = structures_of(run)
+        own = run.structures
         found: dict[tuple[str, str, int], list[FloatArray]] = defaultdict(list)
         for result in listed:
             case = result.case if origins is None else origins.get(result.case, "")
@@ -163,12 +165,23 @@ class Standings:
     """A run as a board has it: the table of each strategy that counts, and who differs.
 
     Arguments:
+        run: what was run.
         own: on the cases.
         counted: by strategy the figures that count, on the cases or, where these are lower, on
             their twins, (cases, seeds, figures).
         apart: the differences that are shown.
+
+    Attributes:
+        TIE: gains that differ by less share a rank.
+        FEWEST: structures from which on differences are tested.
+        METHOD: how, in a sentence.
     """
 
+    TIE: ClassVar[float] = TIE
+    FEWEST: ClassVar[int] = FEWEST
+    METHOD: ClassVar[str] = METHOD
+
+    run: Run
     own: GainTable
     counted: Mapping[str, FloatArray]
     apart: Differences
@@ -191,7 +204,77 @@ class Standings:
                 other[rows] = np.where(there, twins.values[name], values[rows])
                 counted[name] = min((values, other), key=lambda item: _mean_gain(own, item))
         gains = {n: own.by_structure(v)[:, :, 0].mean(axis=1) for n, v in counted.items()}
-        return cls(own, counted, tell_apart(gains))
+        return cls(run, own, counted, tell_apart(gains))
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the rows of the leaderboard, best first; the rank of a yardstick is None.
+
+        Examples:
+            >>> [round(row["gain"], 2) for row in results.Standings.of(run).rows]
+            [0.6, -0.67]
+        """
+        return list_rows(self.run, self)
+
+    @property
+    def results(self) -> tuple[JobResult, ...]:
+        """Return the results that make the ranks, with their gains and ranks.
+
+        Examples:
+            >>> [(round(one.gain, 2), one.rank) for one in results.Standings.of(run).results]
+            [(-0.67, 2), (0.6, 1)]
+        """
+        return rank_results(self.run.ranked, self.run.meta)
+
+    def is_test(self, case: str) -> bool:
+        """Tell whether a case was measured: what has no class is somebody's own structure."""
+        return is_test((self.run.meta.get("classes") or {}).get(case))
+
+    @staticmethod
+    def basis_of(run: Run) -> str:
+        """Return on what the gain of a run is measured: ``unseen`` data, or the ``given`` modes.
+
+        Examples:
+            >>> results.Standings.basis_of(run)
+            'unseen'
+        """
+        return find_basis(run)
+
+    @staticmethod
+    def interval_of(run: Run) -> str:
+        """Return what the intervals of the gains are over: ``structures``, ``seeds`` or nothing.
+
+        Examples:
+            >>> results.Standings.interval_of(run)
+            ''
+        """
+        return GainTable.of(run, (), run.nominals[0]).interval
+
+    @staticmethod
+    def interval_tail(count: int) -> float:
+        """Return the share of resamples beyond either end of an interval over so many structures.
+
+        Examples:
+            >>> [round(results.Standings.interval_tail(count), 3) for count in (6, 10, 1000)]
+            [0.002, 0.009, 0.025]
+        """
+        return interval_tail(count)
+
+    @staticmethod
+    def ordered(
+        items: Iterable[_Item], key: Callable[[_Item], tuple[tuple[float, ...], float, str]]
+    ) -> list[_Item]:
+        """Return items best first, those that share a rank by name.
+
+        Arguments:
+            key: tier, number and name; the tier counts first, then the number, less being better.
+
+        Examples:
+            >>> errors = {"b": 1.0, "a": 1.0, "c": 2.0}
+            >>> results.Standings.ordered(errors, lambda name: ((), errors[name], name))
+            ['a', 'b', 'c']
+        """
+        return [item for _, item in rank_items(items, key)]
 
 
 def _mean_of(rows: Sequence[FloatArray]) -> FloatArray:
@@ -213,16 +296,6 @@ def mean_known(values: FloatArray) -> FloatArray:
     total = np.where(known, values, 0.0).sum(axis=0)
     count = known.sum(axis=0)
     return np.asarray(np.where(count > 0, total / np.maximum(count, 1), math.nan))
-
-
-def interval_kind(run: Run) -> str:
-    """Return what the intervals of the gains are over: ``structures``, ``seeds`` or nothing.
-
-    Examples:
-        >>> results.interval_kind(run)
-        ''
-    """
-    return GainTable.of(run, (), run.nominals[0]).interval
 
 
 @pause_collection()
@@ -251,10 +324,6 @@ def leaderboard(run: Run) -> pd.DataFrame:
 
     Raises:
         InputError: when the run keeps too little to be scored.
-
-    Examples:
-        >>> results.leaderboard(run)["gain"].round(2).tolist()
-        [0.6, -0.67]
     """
     import pandas as pd
 
@@ -270,10 +339,6 @@ def list_rows(run: Run, standings: Standings | None = None) -> list[dict[str, An
 
     Raises:
         InputError: when the run keeps too little to be scored.
-
-    Examples:
-        >>> [round(row["gain"], 2) for row in results.list_rows(run)]
-        [0.6, -0.67]
     """
     standings = standings or Standings.of(run)
     if not standings.own.cases:
@@ -308,12 +373,7 @@ def row_of(run: Run, strategy: str) -> dict[str, Any]:
 
 
 def find_basis(run: Run) -> str:
-    """Return on what the gain of a run is measured: ``unseen`` data, or the ``given`` modes.
-
-    Examples:
-        >>> results.find_basis(run)
-        'unseen'
-    """
+    """Return on what the gain of a run is measured: ``unseen`` data, or the ``given`` modes."""
     scale = Scale.of(run.meta)
     return "unseen" if any(map(scale.holds_back, scale.textbook)) else "given"
 
@@ -323,10 +383,6 @@ def is_test(classes: Sequence[str] | None) -> bool:
 
     Arguments:
         classes: of its scenario.
-
-    Examples:
-        >>> results.is_test(["grid", "published test"]), results.is_test(["grid", "clamped"])
-        (True, False)
     """
     return not classes or TESTED in classes
 

@@ -189,6 +189,15 @@ class PredictiveBoard:
         least, most = (100.0 * common.min(axis=0)).tolist(), (100.0 * common.max(axis=0)).tolist()
         return cls(tuple(rows), {band: (least[k], most[k]) for k, band in enumerate(BANDS)})
 
+    @staticmethod
+    def levels(modes: MeasuredModes, blocks: Mapping[str, Block]) -> FloatArray | None:
+        """Return the levels of the stated intervals that just reach the unseen modes of a result.
+
+        None where nothing is stated.
+        """
+        found = Forecasts.of(modes, blocks)
+        return found.level(found.std) if found.stated else None
+
 
 def learn_deviations(table: GainTable, textbook: Mapping[str, Forecasts]) -> FloatArray:
     """Return by case and band the one deviation of ln f for all that state none, (cases, 2).

@@ -126,11 +126,6 @@ def rank_items(
     Arguments:
         key: tier, number and name; the tier counts first, then the number, less being better. The
             name orders those that share a rank.
-
-    Examples:
-        >>> errors = {"b": 1.0, "a": 1.0, "c": 2.0}
-        >>> results.rank_items(errors, lambda name: ((), errors[name], name))
-        [(1, 'a'), (1, 'b'), (3, 'c')]
     """
     keyed = sorted(((*key(item), item) for item in items), key=lambda entry: entry[:3])
     found: list[tuple[int, str, _Item]] = []
@@ -152,11 +147,6 @@ def rank_results(results: Iterable[JobResult], meta: Mapping[str, Any]) -> tuple
     Arguments:
         results: in any order, which is kept.
         meta: of their run; results on a case whose models it does not keep stay as they are.
-
-    Examples:
-        >>> ranked = results.rank_results(run.results, run.meta)
-        >>> [(round(one.gain, 2), one.rank) for one in ranked]
-        [(-0.67, 2), (0.6, 1)]
     """
     listed = [replace(result) for result in results]
     rate_results(listed, Scale.of(meta))

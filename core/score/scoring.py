@@ -71,12 +71,7 @@ class JudgedModel:
 
 
 def frequency_error(mode: PairedMode) -> float:
-    """Return |f_p / f_m - 1|; 1 for a mode without partner or with an imaginary one.
-
-    Examples:
-        >>> round(results.frequency_error(results.PairedMode(1, 200.0, 210.0, 0.99)), 4)
-        0.05
-    """
+    """Return |f_p / f_m - 1|; 1 for a mode without partner or with an imaginary one."""
     if mode.predicted_hz is None or mode.predicted_hz <= 0.0:
         return 1.0
     return abs(mode.predicted_hz / mode.measured_hz - 1.0)
@@ -159,11 +154,6 @@ def score_model(case: Case, model: Model) -> dict[str, Block]:
 
     Raises:
         ModelError: when the model has no modes.
-
-    Examples:
-        >>> scored = results.score_model(case, model)
-        >>> {name: round(block.rms_percent, 1) for name, block in scored.items()}
-        {'used': 8.8, 'higher': 6.8}
     """
     return _blocks(case, model, _modes_for(model, (case.measurement,)))
 

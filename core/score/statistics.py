@@ -13,7 +13,6 @@ from typing import Literal
 
 import numpy as np
 
-from femubench.core.schema.results import Run
 from femubench.core.typing import FloatArray
 
 Verdict = Literal["better", "worse", "no difference shown", "same", "too few structures"]
@@ -76,16 +75,6 @@ class Differences:
         return tuple(better for better, worse, p in self.pairs if worse == name and p < LEVEL)
 
 
-def structures_of(run: Run) -> dict[str, str]:
-    """Return the structure of every case as the run tells; a case that is not there is its own.
-
-    Examples:
-        >>> list(results.structures_of(run).values())
-        ['ladder']
-    """
-    return dict(run.meta.get("structures") or {})
-
-
 def interval_of_mean(values: FloatArray) -> tuple[float, float]:
     """Return the 95 % interval of a mean by resampling; nan with less than two values.
 
@@ -111,11 +100,6 @@ def interval_tail(count: int) -> float:
 
     Arguments:
         count: number of structures, at least 2.
-
-    Examples:
-        >>> [round(results.interval_tail(count), 3) for count in (6, 10, 1000)]
-        [0.002, 0.009, 0.025]
-
     Source: Hesterberg (2015), section on expanded percentile intervals.
     """
     from scipy.special import ndtr, stdtrit
@@ -135,10 +119,6 @@ def flip_signs(differences: FloatArray) -> FloatArray:
 
     Source: Romano & Wolf (2005), Econometrica 73, 1237-1282; Westfall & Young (1993), step-down
     maxT.
-
-    Examples:
-        >>> print(results.flip_signs(np.array([[0.2, 0.3, 0.2, 0.1, 0.2, 0.3]]).T))
-        [0.03125]
     """
     found = np.round(differences, _DIGITS)
     n, k = found.shape

@@ -23,27 +23,7 @@ FIGURES = (
 
 
 def gain_by(run: Run, *axes: str) -> pd.DataFrame:
-    """Return one row a cell: the values of the axes, gain, and how many of its jobs failed.
-
-    The gain of a cell is that of the leaderboard with nothing else on it: cases are taken
-    together with every structure counted once, and so are the values of the axes left out; with
-    several seeds it is the mean over them. `gain_low` and `gain_high` are its 95 % interval,
-    over structures where there are six or more, else over seeds. A job that failed or is missing
-    counts as the model that was given. Of an axis of options there are the cells of its
-    strategy alone, unless ``strategy`` is an axis too: then the others have none there.
-
-    Arguments:
-        run: of a study, or any other.
-        axes: ``noise``, ``sensors_left_out``, ``strategy``, ``STRATEGY.OPTION``, ``case``,
-            ``nominal``; without any, those with more than one value, cases taken together.
-
-    Raises:
-        InputError: for an axis that the run does not have.
-
-    Examples:
-        >>> results.gain_by(run, "strategy")["gain"].round(2).tolist()
-        [-0.67, 0.6]
-    """
+    """Return one row a cell of a study; see `Run.gain_by`."""
     import pandas as pd
 
     known = StudyAxes.of(run)

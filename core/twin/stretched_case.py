@@ -13,7 +13,7 @@ from femubench.core.case.case import Case
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.frame import Frame, GroundSpring, Joint, Material, Member, Place, PointMass
 from femubench.core.fem.model import Model
-from femubench.core.fem.sections import Section, rectangular_tube, solid_rectangle
+from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
 from femubench.core.files import read_bytes
 from femubench.core.modal.eigen import solve_modes
@@ -151,7 +151,11 @@ def _section(section: Section, solid: ReducedSolid, factors: FloatArray) -> Sect
     width, height, wall = map(float, sizes)
     if not width:
         return similar_section(section, float(factors[solid.names.index(_SCALED)]))
-    shape = rectangular_tube(width, height, wall) if wall else solid_rectangle(width, height)
+    shape = (
+        Section.rectangular_tube(width, height, wall)
+        if wall
+        else Section.solid_rectangle(width, height)
+    )
     return replace(shape, name=section.name)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -13,17 +13,12 @@ from femubench.core.change.parametric_model import ParametricModel
 from femubench.core.change.tabulated import change_of
 from femubench.core.errors import InputError, NotApplicable, UnknownNameError
 from femubench.core.fem.frame import Frame
-from femubench.core.fem.group_factors import GROUP, group_places
+from femubench.core.fem.group_factors import GROUP, Groups
 from femubench.core.fem.joints import JointGroup, all_elements, elements_at, joint_groups
 from femubench.core.fem.model import Model
 from femubench.core.fem.slopes import Matrix
 from femubench.core.fem.structure import Structure
-from femubench.core.modal.group_prior import (
-    STRUCTURE_STD,
-    group_prior_std,
-    largest_factor,
-    support_groups,
-)
+from femubench.core.modal.group_prior import STRUCTURE_STD, GroupPriors
 from femubench.core.plugin.loader import list_effects
 from femubench.core.roles import Effect
 
@@ -45,9 +40,6 @@ def check_changes(words: str, *, parts_alone: bool = False) -> None:
     Arguments:
         words: an option as it was typed: ``own``, or sets of parts and effects joined by ``+``.
         parts_alone: whether effects are none of them.
-
-    Examples:
-        >>> update.check_changes("members")
     """
     known = get_args(PartSet)
     if words == OWN:
@@ -82,10 +74,6 @@ def element_sets(structure: Structure, word: str) -> Mapping[str, tuple[str, ...
 
     Raises:
         NotApplicable: when the frame has no such parts.
-
-    Examples:
-        >>> len(update.element_sets(structure, "members"))
-        7
     """
     frame, labels = structure.frame, all_elements(structure)
     if word == "elements":
@@ -123,93 +111,6 @@ def _check_apart(parts: Mapping[str, Sequence[str]]) -> None:
                 )
 
 
-def scale_parts(
-    source: Model | Structure, word: str, *, prior_std: float | None = None
-) -> list[Change]:
-    """Return one change a part: of a frame a factor on EA, EI, GJ and GA together, or of a group.
-
-    Arguments:
-        source: the nominal model, or the structure of a frame.
-        word: a `PartSet`.
-        prior_std: of its logarithm; None for no prior. Groups have their own.
-
-    Raises:
-        NotApplicable: when the model has no such parts.
-
-    Examples:
-        >>> update.scale_parts(structure, "sections")[0].name
-        'E section:tube'
-    """
-    structure = source.structure if isinstance(source, Model) else source
-    if structure is not None and word != "groups":
-        return [
-            scale_property(f"E {name}", "E", elements, prior_std=prior_std)
-            for name, elements in element_sets(structure, word).items()
-        ]
-    if not isinstance(source, Model) or word != "groups" or not source.groups:
-        need = _MISSING.get(word, "a frame of members")
-        raise NotApplicable(f"the model has no {word} to scale: changes={word} needs {need}")
-    return scale_groups(source, "stiffness", own_prior=prior_std is not None)
-
-
-def scale_groups(model: Model, matrix: Matrix, *, own_prior: bool) -> list[Change]:
-    """Return one change a group of the stiffness or of the mass.
-
-    Arguments:
-        model: from matrices.
-        matrix: ``stiffness`` or ``mass``.
-        own_prior: whether each has the log-normal prior of its group; else none.
-
-    Examples:
-        >>> update.scale_groups(model, "mass", own_prior=True)
-        []
-    """
-    quantity = "E" if matrix == "stiffness" else "density"
-    found = []
-    for place in group_places(model, matrix):
-        name, std = place.removeprefix(GROUP), None
-        if own_prior:
-            std = group_prior_std(model, name)
-            limit = max(20.0, float(np.exp(_WIDEST * std)))
-        else:
-            limit = 100.0 if matrix == "stiffness" and name in support_groups(model) else 20.0
-        at = f"{matrix} {place}", quantity, (place,)
-        upper = min(limit, largest_factor(model, name) if matrix == "stiffness" else limit)
-        found.append(scale_property(*at, prior_std=std, lower=1.0 / limit, upper=upper))
-    return found
-
-
-def scale_groups_within(model: Model, count: int) -> list[Change]:
-    """Return factors on the groups of the stiffness, at most so many: what is alike shares one.
-
-    Every group has its own; or every support has, and the structure shares one; or the supports
-    share another one; or there is one for all.
-
-    Arguments:
-        model: from matrices with groups.
-        count: how many factors there may be.
-
-    Raises:
-        NotApplicable: when the model has no groups.
-
-    Examples:
-        >>> from dataclasses import replace
-        >>> deck = replace(model, structure=None, groups={"deck": model.stiffness})
-        >>> [change.name for change in update.scale_groups_within(deck, 3)]
-        ['stiffness group:deck']
-    """
-    every = scale_parts(model, "groups")
-    held = {f"{GROUP}{name}" for name in support_groups(model)}
-    supports = [change for change in every if change.places[0] in held]
-    rest = [change for change in every if change.places[0] not in held]
-    levels = (
-        every,
-        [*supports, *_shared("structure", rest)],
-        [*_shared("supports", supports), *_shared("structure", rest)],
-    )
-    return next((level for level in levels if len(level) <= count), _shared("all groups", every))
-
-
 def _shared(name: str, changes: list[Change]) -> list[Change]:
     """Return one change for all of several."""
     if len(changes) < 2:
@@ -221,112 +122,6 @@ def _shared(name: str, changes: list[Change]) -> list[Change]:
 def stiffness_quantity(structure: Structure) -> str:
     """Return ``EI`` in plane, as Horton et al. have it, else ``E``: bending and torsion alike."""
     return "EI" if structure.frame.plane == "in-plane" else "E"
-
-
-def scale_all_stiffness(source: Model | Structure, prior_std: float | None = None) -> Change:
-    """Return one factor on the stiffness of all members, of matrices on the whole stiffness.
-
-    Arguments:
-        source: the nominal model, or the structure of a frame.
-        prior_std: of its logarithm; None for no prior.
-
-    Examples:
-        >>> update.scale_all_stiffness(structure).name
-        'E all members'
-    """
-    structure = source.structure if isinstance(source, Model) else source
-    fatal = prior_std is None
-    if structure is None:
-        return scale_property("stiffness all", "E", ("all",), prior_std=prior_std, fatal=fatal)
-    quantity, every = stiffness_quantity(structure), all_elements(structure)
-    name = f"{quantity} all members"
-    return scale_property(name, quantity, every, prior_std=prior_std, fatal=fatal)
-
-
-def scale_joint(
-    structure: Structure, group: JointGroup, *, prior_std: float | None = None
-) -> Change:
-    """Return one factor on the stiffness of the elements that touch joints.
-
-    Arguments:
-        structure: the frame.
-        group: which ends.
-        prior_std: of its logarithm; None for no prior.
-
-    Examples:
-        >>> update.scale_joint(structure, joints[0]).name
-        'E at L'
-    """
-    quantity, elements = stiffness_quantity(structure), elements_at(structure, group)
-    at = f"{quantity} at {group.name}", quantity, elements
-    return scale_property(*at, prior_std=prior_std, lower=0.01, upper=100.0)
-
-
-def select_determined(levels: Sequence[Sequence[Change]], count: int) -> list[Change]:
-    """Return the changes of the leading levels that so many data determine.
-
-    Only as many parameters as measured frequencies are set free, as in the source; a level is
-    taken as a whole or not at all, except that the first always gives one.
-
-    Arguments:
-        levels: changes of one parameter each, by descending importance.
-        count: number of measured frequencies.
-
-    Source: Horton et al. (1999), section 2.
-
-    Examples:
-        >>> levels = [[update.scale_all_stiffness(structure)], [joint, joint]]
-        >>> [len(update.select_determined(levels, count)) for count in (1, 2, 3)]
-        [1, 1, 3]
-    """
-    taken: list[Change] = []
-    for level in levels:
-        if len(taken) + len(level) > count:
-            break
-        taken.extend(level)
-    return taken or list(levels[0][:1])
-
-
-def list_changes(model: Model, words: str, *, prior_std: float | None = None) -> list[Change]:
-    """Return the changes that words name.
-
-    A set of parts gives each part a factor on its stiffness. An effect sits at its coarsest places:
-    the whole model, or joint types, sections and the like, or every joint or member, or what is
-    smaller; ``effect@place`` at one place that is named. ``plugin/effect`` is one of somebody else.
-
-    Arguments:
-        model: the nominal one.
-        words: sets of parts and effects joined by ``+``.
-        prior_std: of the logarithm of a factor; None for no prior on anything.
-
-    Raises:
-        NotApplicable: when the model has no such parts, two factors on the same one, or no place
-            for an effect.
-
-    Examples:
-        >>> names = [change.name for change in update.list_changes(model, "sections+density")]
-        >>> names
-        ['E section:tube', 'density all']
-    """
-    found: list[Change] = []
-    for word in words.split("+"):
-        if word in get_args(PartSet):
-            found += scale_parts(model, word, prior_std=prior_std)
-            continue
-        name, _, place = word.partition("@")
-        plugin, _, name = name.rpartition("/")
-        try:
-            known = list_effects(*([plugin] if plugin else []))
-        except UnknownNameError as error:
-            raise NotApplicable(f"changes: {error}") from error
-        effect = next((found for found in known if found.name == name), None)
-        if effect is None:
-            raise NotApplicable(f"changes: there is no effect {name!r}")
-        placed = [change_of(effect, model, where) for where in _places(effect, model, place)]
-        placed = [replace(c, name=f"{name} {c.places[0]}") for c in placed]
-        found += placed if prior_std is not None else [c.without_prior() for c in placed]
-    _check_apart({change.name: change.places for change in found if change.quantity})
-    return found
 
 
 def _places(effect: Effect, model: Model, place: str) -> list[str]:
@@ -357,22 +152,224 @@ def _coarseness(frame: Frame | None, place: str) -> tuple[int, str]:
     return (2, "") if place in whole else (3, "")
 
 
-def parameterise(model: Model, words: str) -> ParametricModel:
-    """Return a model with the changes that words name, each with a prior.
+@dataclass(frozen=True)
+class Changes:
+    """The changes that strategies fit to a model.
 
     Arguments:
-        model: a frame, or matrices with groups.
-        words: as of `list_changes`, or ``own``: the members of a frame, the groups of matrices.
-
-    Raises:
-        InputError: for other words.
-        NotApplicable: when the model has no such parts, or two factors on the same one.
-
-    Examples:
-        >>> update.parameterise(model, "members").names[0]
-        'E rung-right'
+        source: the nominal model, or the structure of a frame.
     """
-    check_changes(words)
-    if words == OWN:
-        words = "members" if model.structure is not None else "groups"
-    return ParametricModel(model, tuple(list_changes(model, words, prior_std=STRUCTURE_STD)))
+
+    source: Model | Structure
+
+    @property
+    def structure(self) -> Structure | None:
+        """Return the frame; None for a model that came as matrices."""
+        return self.source.structure if isinstance(self.source, Model) else self.source
+
+    @property
+    def model(self) -> Model:
+        """Return the model."""
+        return self.source if isinstance(self.source, Model) else Model.of(self.source)
+
+    def parts(self, word: str, *, prior_std: float | None = None) -> list[Change]:
+        """Return one change a part: of a frame a factor on EA, EI, GJ and GA, or of a group.
+
+        Arguments:
+            word: a `PartSet`.
+            prior_std: of its logarithm; None for no prior. Groups have their own.
+
+        Raises:
+            NotApplicable: when the model has no such parts.
+        """
+        structure = self.structure
+        if structure is not None and word != "groups":
+            return [
+                scale_property(f"E {name}", "E", elements, prior_std=prior_std)
+                for name, elements in element_sets(structure, word).items()
+            ]
+        if word != "groups" or not self.model.groups:
+            need = _MISSING.get(word, "a frame of members")
+            raise NotApplicable(f"the model has no {word} to scale: changes={word} needs {need}")
+        return self.groups("stiffness", own_prior=prior_std is not None)
+
+    def groups(self, matrix: Matrix, *, own_prior: bool) -> list[Change]:
+        """Return one change a group of the stiffness or of the mass.
+
+        Arguments:
+            matrix: ``stiffness`` or ``mass``.
+            own_prior: whether each has the log-normal prior of its group; else none.
+
+        Examples:
+            >>> update.Changes(model).groups("mass", own_prior=True)
+            []
+        """
+        model, quantity = self.model, "E" if matrix == "stiffness" else "density"
+        found = []
+        for place in Groups(model).places(matrix):
+            name, std = place.removeprefix(GROUP), None
+            if own_prior:
+                std = GroupPriors(model).std(name)
+                limit = max(20.0, float(np.exp(_WIDEST * std)))
+            else:
+                limit = (
+                    100.0 if matrix == "stiffness" and name in GroupPriors(model).supports else 20.0
+                )
+            at = f"{matrix} {place}", quantity, (place,)
+            upper = min(
+                limit, GroupPriors(model).largest_factor(name) if matrix == "stiffness" else limit
+            )
+            found.append(scale_property(*at, prior_std=std, lower=1.0 / limit, upper=upper))
+        return found
+
+    def groups_within(self, count: int) -> list[Change]:
+        """Return factors on the groups of the stiffness, at most so many: what is alike shares one.
+
+        Every group has its own; or every support has, and the structure shares one; or the supports
+        share another one; or there is one for all.
+
+        Arguments:
+            count: how many factors there may be.
+
+        Raises:
+            NotApplicable: when the model has no groups.
+
+        Examples:
+            >>> from dataclasses import dataclass, replace
+            >>> deck = replace(model, structure=None, groups={"deck": model.stiffness})
+            >>> [change.name for change in update.Changes(deck).groups_within(3)]
+            ['stiffness group:deck']
+        """
+        every = self.parts("groups")
+        held = {f"{GROUP}{name}" for name in GroupPriors(self.model).supports}
+        supports = [change for change in every if change.places[0] in held]
+        rest = [change for change in every if change.places[0] not in held]
+        levels = (
+            every,
+            [*supports, *_shared("structure", rest)],
+            [*_shared("supports", supports), *_shared("structure", rest)],
+        )
+        return next(
+            (level for level in levels if len(level) <= count), _shared("all groups", every)
+        )
+
+    def stiffness(self, prior_std: float | None = None) -> Change:
+        """Return one factor on the stiffness of all members, of matrices on the whole stiffness.
+
+        Arguments:
+            prior_std: of its logarithm; None for no prior.
+
+        Examples:
+            >>> update.Changes(structure).stiffness().name
+            'E all members'
+        """
+        structure = self.structure
+        fatal = prior_std is None
+        if structure is None:
+            return scale_property("stiffness all", "E", ("all",), prior_std=prior_std, fatal=fatal)
+        quantity, every = stiffness_quantity(structure), all_elements(structure)
+        name = f"{quantity} all members"
+        return scale_property(name, quantity, every, prior_std=prior_std, fatal=fatal)
+
+    def joint(self, group: JointGroup, *, prior_std: float | None = None) -> Change:
+        """Return one factor on the stiffness of the elements that touch joints.
+
+        Arguments:
+            group: which ends.
+            prior_std: of its logarithm; None for no prior.
+
+        Examples:
+            >>> update.Changes(structure).joint(joints[0]).name
+            'E at L'
+        """
+        structure = self.structure or self.model.frame_structure
+        quantity, elements = stiffness_quantity(structure), elements_at(structure, group)
+        at = f"{quantity} at {group.name}", quantity, elements
+        return scale_property(*at, prior_std=prior_std, lower=0.01, upper=100.0)
+
+    @staticmethod
+    def determined(levels: Sequence[Sequence[Change]], count: int) -> list[Change]:
+        """Return the changes of the leading levels that so many data determine.
+
+        Only as many parameters as measured frequencies are set free, as in the source; a level is
+        taken as a whole or not at all, except that the first always gives one.
+
+        Arguments:
+            levels: changes of one parameter each, by descending importance.
+            count: number of measured frequencies.
+
+        Source: Horton et al. (1999), section 2.
+
+        Examples:
+            >>> levels = [[update.Changes(structure).stiffness()], [joint, joint]]
+            >>> [len(update.Changes.determined(levels, count)) for count in (1, 2, 3)]
+            [1, 1, 3]
+        """
+        taken: list[Change] = []
+        for level in levels:
+            if len(taken) + len(level) > count:
+                break
+            taken.extend(level)
+        return taken or list(levels[0][:1])
+
+    def listed(self, words: str, *, prior_std: float | None = None) -> list[Change]:
+        """Return the changes that words name.
+
+        A set of parts gives each part a factor on its stiffness. An effect sits at its coarsest
+        places: the whole model, or joint types, sections and the like, or every joint or member, or
+        what is smaller; ``effect@place`` at one place that is named. ``plugin/effect`` is one of
+        somebody else.
+
+        Arguments:
+            words: sets of parts and effects joined by ``+``.
+            prior_std: of the logarithm of a factor; None for no prior on anything.
+
+        Raises:
+            NotApplicable: when the model has no such parts, two factors on the same one, or no
+                place for an effect.
+
+        Examples:
+            >>> names = [change.name for change in update.Changes(model).listed("sections+density")]
+            >>> names
+            ['E section:tube', 'density all']
+        """
+        found: list[Change] = []
+        for word in words.split("+"):
+            if word in get_args(PartSet):
+                found += self.parts(word, prior_std=prior_std)
+                continue
+            name, _, place = word.partition("@")
+            plugin, _, name = name.rpartition("/")
+            try:
+                known = list_effects(*([plugin] if plugin else []))
+            except UnknownNameError as error:
+                raise NotApplicable(f"changes: {error}") from error
+            effect = next((found for found in known if found.name == name), None)
+            if effect is None:
+                raise NotApplicable(f"changes: there is no effect {name!r}")
+            placed = [
+                change_of(effect, self.model, where) for where in _places(effect, self.model, place)
+            ]
+            placed = [replace(c, name=f"{name} {c.places[0]}") for c in placed]
+            found += placed if prior_std is not None else [c.without_prior() for c in placed]
+        _check_apart({change.name: change.places for change in found if change.quantity})
+        return found
+
+    def parameterise(self, words: str) -> ParametricModel:
+        """Return a model with the changes that words name, each with a prior.
+
+        Arguments:
+            words: as of `listed`, or ``own``: the members of a frame, the groups of matrices.
+
+        Raises:
+            InputError: for other words.
+            NotApplicable: when the model has no such parts, or two factors on the same one.
+
+        Examples:
+            >>> update.Changes(model).parameterise("members").names[0]
+            'E rung-right'
+        """
+        check_changes(words)
+        if words == OWN:
+            words = "members" if self.structure is not None else "groups"
+        return ParametricModel(self.model, tuple(self.listed(words, prior_std=STRUCTURE_STD)))

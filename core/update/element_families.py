@@ -12,14 +12,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError, NotApplicable
-from femubench.core.fem.beam import stiffness_matrices
 from femubench.core.fem.frame import Plane
 from femubench.core.fem.model import Model
 from femubench.core.fem.model_parameters import matrix_slopes, with_values
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
-from femubench.core.update.change_lists import parameterise
+from femubench.core.update.change_lists import Changes
 
 Symmetry = Literal["none", "half-turn", "mirror", "full"]
 _MIRROR_AXIS = 0  # the mid-plane is normal to the element
@@ -265,6 +264,146 @@ class ElementFamily(Family):
             for j in range(shapes.shape[1])
         ]
 
+    @classmethod
+    def physical(cls, structure: Structure) -> ElementFamily:
+        """Return one factor on every rigidity of every element: EI, GJ or EA, or all of them.
+
+        The matrices that integration gave are kept: with a Timoshenko beam the shear rigidity goes
+        with EI, so that the ratio of shear to bending flexibility stays.
+
+        Source: Ahmadian, Gladwell & Ismail (1997), section 4.2 and equation (21).
+
+        Examples:
+            >>> update.ElementFamily.physical(structure).names[:2]
+            ('EI rung-right/1', 'GJ rung-right/1')
+        """
+        spatial = structure.frame.plane == "3d"
+        xz, xy = _TRANSLATION_XZ + _SLOPE_XZ, _TRANSLATION_XY + _SLOPE_XY
+        masks = {
+            "EIy" if spatial else "EI": _block(xz, xz),
+            "GJ": _block(_TWIST, _TWIST),
+            "EA": _block(_AXIAL, _AXIAL),
+        }
+        if spatial:
+            masks["EIz"] = _block(xy, xy)
+        elements, patterns, columns, listed, labels = _masked(structure, masks)
+        p = structure.properties
+        rigidity = {"EI": p.EIy, "EIy": p.EIy, "EIz": p.EIz, "GJ": p.GJ, "EA": p.EA}
+        before = np.array([rigidity[key][elements[e]] for key, e in listed])
+        count = patterns.shape[1]
+        units = np.eye(count)[:, :, None] * np.eye(count)[:, None, :]
+        return cls(
+            structure=structure,
+            elements=elements,
+            patterns=patterns,
+            columns=columns,
+            names=tuple(f"{key} {labels[e]}" for key, e in listed),
+            before=before,
+            scale=before,
+            units=tuple("N" if key == "EA" else "N m2" for key, _ in listed),
+            cores=np.broadcast_to(units, (len(elements), *units.shape)),
+        )
+
+    @classmethod
+    def nobari(cls, structure: Structure) -> ElementFamily:
+        """Return one factor each on w-w, w-slope and slope-slope of bending, and on the rod.
+
+        Source: Nobari, Robb & Ewins (1993); Ahmadian, Gladwell & Ismail (1997), equation (20),
+        whose third matrix is [2, 1; 1, 2] on the slopes.
+
+        Examples:
+            >>> len(update.ElementFamily.nobari(structure))
+            112
+        """
+        spatial = structure.frame.plane == "3d"
+        masks: dict[str, FloatArray] = {}
+        planes = [("y" if spatial else "", _TRANSLATION_XZ, _SLOPE_XZ)]
+        if spatial:
+            planes.append(("z", _TRANSLATION_XY, _SLOPE_XY))
+        for about, translation, slope in planes:
+            masks[f"k1{about}"] = _block(translation, translation)
+            masks[f"k2{about}"] = _block(translation, slope)
+            masks[f"k3{about}"] = _block(slope, slope)
+        masks["k4t" if spatial else "k4"] = _block(_TWIST, _TWIST)
+        masks["k4a" if spatial else "k4 "] = _block(_AXIAL, _AXIAL)
+        elements, patterns, columns, listed, labels = _masked(structure, masks)
+        one = np.ones(len(listed))
+        names = tuple(f"{key.strip()} {labels[e]}" for key, e in listed)
+        return cls(
+            structure=structure,
+            elements=elements,
+            patterns=patterns,
+            columns=columns,
+            names=names,
+            before=one,
+            scale=one,
+            units=("",) * len(listed),
+        )
+
+    @classmethod
+    def generic(
+        cls,
+        structure: Structure,
+        *,
+        plain: Symmetry = "half-turn",
+        joint: Symmetry = "none",
+        tied: bool = False,
+    ) -> ElementFamily:
+        """Return elements with the nominal strain modes and a free symmetric core for them.
+
+        A parameter k_ij is relative: the core term divided by the nominal sqrt(k_ii k_jj).
+
+        Arguments:
+            plain: symmetry of elements that touch no joint.
+            joint: symmetry of elements that touch a joint.
+            tied: whether all elements at joints of one type, and all plain ones, share one relative
+                core; that of an element is turned end for end where its second end is at the joint.
+
+        Source: Ahmadian, Gladwell & Ismail (1997), section 4.3.
+
+        Examples:
+            >>> len(update.ElementFamily.generic(structure, tied=True))
+            16
+        """
+        elements, _, labels = _changeable(structure)
+        # The joint type that every element touches and the end by which it does.
+        kinds, ends = [""] * len(structure.properties), [0] * len(structure.properties)
+        for kind, touching in structure.joint_ends.items():
+            for end_name in touching:
+                element, end = structure.element_ends[end_name]
+                kinds[element], ends[element] = kind, end
+        plane, active = structure.frame.plane, structure.active_local
+        terms, flip = free_terms([], active), end_swap_signs(plane, active)
+        plain_cores = np.zeros((len(terms), len(flip), len(flip)))
+        for a, (i, j) in enumerate(terms):
+            plain_cores[a, i, j] = plain_cores[a, j, i] = 1.0
+        turned = np.array([tied and ends[e] == 1 for e in elements])[:, None, None, None]
+        cores = np.where(turned, np.outer(flip, flip) * plain_cores, plain_cores)
+        vectors = scale_strain_vectors(structure, elements)[:, None]
+        patterns = vectors @ cores @ np.swapaxes(vectors, 2, 3)
+        allowed = {s: set(free_terms(operations_of(s, plane), active)) for s in (plain, joint)}
+        unknowns: dict[tuple[int, int, str | int], tuple[int, str]] = {}
+        columns = np.full(patterns.shape[:2], -1)
+        for row, e in enumerate(elements):
+            where = (kinds[e] or "plain") if tied else labels[row]
+            for a, (i, j) in enumerate(terms):
+                if (i, j) in allowed[joint if kinds[e] else plain] and patterns[row, a].any():
+                    new = (len(unknowns), f"k{i + 1}{j + 1} {where}")
+                    columns[row, a] = unknowns.setdefault((i, j, kinds[e] if tied else row), new)[0]
+        before = np.array([1.0 if i == j else 0.0 for i, j, _ in unknowns])
+        names = tuple(name for _, name in unknowns.values())
+        return cls(
+            structure=structure,
+            elements=elements,
+            patterns=patterns,
+            columns=columns,
+            names=names,
+            before=before,
+            scale=np.ones(len(names)),
+            units=("",) * len(names),
+            cores=cores,
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class GroupFamily(Family):
@@ -304,31 +443,25 @@ class GroupFamily(Family):
         slopes = matrix_slopes(self.model, self.factors)
         return [sp.csr_array(slopes.products(shape, 0.0)) for shape in shapes.T]
 
+    @classmethod
+    def of(cls, model: Model) -> GroupFamily:
+        """Return one factor on every group of the stiffness of a model from matrices.
 
-def group_family(model: Model) -> GroupFamily:
-    """Return one factor on every group of the stiffness of a model from matrices.
-
-    Raises:
-        NotApplicable: when it has no groups.
-
-    Examples:
-        >>> from dataclasses import replace
-        >>> deck = replace(model, structure=None, groups={"deck": model.stiffness})
-        >>> update.group_family(deck).names
-        ('stiffness group:deck',)
-    """
-    parts = parameterise(model, "groups")
-    one = np.ones(len(parts))
-    return GroupFamily(
-        columns=np.arange(len(parts))[:, None],
-        names=parts.names,
-        before=one,
-        scale=one,
-        units=("",) * len(parts),
-        cores=np.ones((len(parts), 1, 1, 1)),
-        model=model,
-        factors=parts.properties,
-    )
+        Raises:
+            NotApplicable: when it has no groups.
+        """
+        parts = Changes(model).parameterise("groups")
+        one = np.ones(len(parts))
+        return cls(
+            columns=np.arange(len(parts))[:, None],
+            names=parts.names,
+            before=one,
+            scale=one,
+            units=("",) * len(parts),
+            cores=np.ones((len(parts), 1, 1, 1)),
+            model=model,
+            factors=parts.properties,
+        )
 
 
 def tie_unknowns(family: ElementFamily, parts: Mapping[str, tuple[str, ...]]) -> ElementFamily:
@@ -338,11 +471,6 @@ def tie_unknowns(family: ElementFamily, parts: Mapping[str, tuple[str, ...]]) ->
         family: with an unknown a pattern and element, as large as another's at the same relative
             change.
         parts: from a name to labels of elements; no element is in two.
-
-    Examples:
-        >>> parts = update.element_sets(structure, "members")
-        >>> len(update.tie_unknowns(update.physical_family(structure), parts))
-        14
     """
     part_of = {label: name for name, labels in parts.items() for label in labels}
     unknowns: dict[tuple[int, str], tuple[int, int]] = {}
@@ -371,7 +499,7 @@ def _changeable(structure: Structure) -> tuple[IntArray, FloatArray, list[str]]:
     elements = np.flatnonzero(carries)
     if len(elements) == 0:
         raise NotApplicable("no element of the model carries mass")
-    stiffness = stiffness_matrices(structure.properties.take(elements))
+    stiffness = structure.properties.take(elements).stiffness_matrices()
     seen: Counter[str] = Counter()
     labels = []
     for e in elements:
@@ -402,151 +530,12 @@ def _masked(
     return elements, patterns, columns, listed, labels
 
 
-def physical_family(structure: Structure) -> ElementFamily:
-    """Return one factor on every rigidity of every element: EI and GJ, or EI and EA, or all four.
-
-    The matrices that integration gave are kept: with a Timoshenko beam the shear rigidity goes
-    with EI, so that the ratio of shear to bending flexibility stays.
-
-    Source: Ahmadian, Gladwell & Ismail (1997), section 4.2 and equation (21).
-
-    Examples:
-        >>> update.physical_family(structure).names[:2]
-        ('EI rung-right/1', 'GJ rung-right/1')
-    """
-    spatial = structure.frame.plane == "3d"
-    xz, xy = _TRANSLATION_XZ + _SLOPE_XZ, _TRANSLATION_XY + _SLOPE_XY
-    masks = {
-        "EIy" if spatial else "EI": _block(xz, xz),
-        "GJ": _block(_TWIST, _TWIST),
-        "EA": _block(_AXIAL, _AXIAL),
-    }
-    if spatial:
-        masks["EIz"] = _block(xy, xy)
-    elements, patterns, columns, listed, labels = _masked(structure, masks)
-    p = structure.properties
-    rigidity = {"EI": p.EIy, "EIy": p.EIy, "EIz": p.EIz, "GJ": p.GJ, "EA": p.EA}
-    before = np.array([rigidity[key][elements[e]] for key, e in listed])
-    count = patterns.shape[1]
-    units = np.eye(count)[:, :, None] * np.eye(count)[:, None, :]
-    return ElementFamily(
-        structure=structure,
-        elements=elements,
-        patterns=patterns,
-        columns=columns,
-        names=tuple(f"{key} {labels[e]}" for key, e in listed),
-        before=before,
-        scale=before,
-        units=tuple("N" if key == "EA" else "N m2" for key, _ in listed),
-        cores=np.broadcast_to(units, (len(elements), *units.shape)),
-    )
-
-
-def nobari_family(structure: Structure) -> ElementFamily:
-    """Return one factor each on the terms w-w, w-slope and slope-slope of bending, and on the rod.
-
-    Source: Nobari, Robb & Ewins (1993); Ahmadian, Gladwell & Ismail (1997), equation (20), whose
-    third matrix is [2, 1; 1, 2] on the slopes.
-
-    Examples:
-        >>> len(update.nobari_family(structure))
-        112
-    """
-    spatial = structure.frame.plane == "3d"
-    masks: dict[str, FloatArray] = {}
-    planes = [("y" if spatial else "", _TRANSLATION_XZ, _SLOPE_XZ)]
-    if spatial:
-        planes.append(("z", _TRANSLATION_XY, _SLOPE_XY))
-    for about, translation, slope in planes:
-        masks[f"k1{about}"] = _block(translation, translation)
-        masks[f"k2{about}"] = _block(translation, slope)
-        masks[f"k3{about}"] = _block(slope, slope)
-    masks["k4t" if spatial else "k4"] = _block(_TWIST, _TWIST)
-    masks["k4a" if spatial else "k4 "] = _block(_AXIAL, _AXIAL)
-    elements, patterns, columns, listed, labels = _masked(structure, masks)
-    one = np.ones(len(listed))
-    names = tuple(f"{key.strip()} {labels[e]}" for key, e in listed)
-    return ElementFamily(
-        structure=structure,
-        elements=elements,
-        patterns=patterns,
-        columns=columns,
-        names=names,
-        before=one,
-        scale=one,
-        units=("",) * len(listed),
-    )
-
-
 def scale_strain_vectors(structure: Structure, elements: IntArray) -> FloatArray:
     """Return V with k_e0 = V V' on the dofs that the plane lets move, (n_e, 12, q)."""
     p = structure.properties.take(elements)
     vectors = strain_vectors(p.length - p.rigid_1 - p.rigid_2, p.rigid_1, p.rigid_2)
     vectors = vectors[:, :, active_strain_modes(structure.active_local)]
     inverse = np.linalg.pinv(vectors)
-    core = inverse @ stiffness_matrices(p) @ np.swapaxes(inverse, 1, 2)
+    core = inverse @ p.stiffness_matrices() @ np.swapaxes(inverse, 1, 2)
     diagonal = np.einsum("eqq->eq", core)
     return np.asarray(vectors * np.sqrt(np.maximum(diagonal, 0.0))[:, None, :])
-
-
-def generic_family(
-    structure: Structure,
-    *,
-    plain: Symmetry = "half-turn",
-    joint: Symmetry = "none",
-    tied: bool = False,
-) -> ElementFamily:
-    """Return elements with the nominal strain modes and a free symmetric core for them.
-
-    A parameter k_ij is relative: the core term divided by the nominal sqrt(k_ii k_jj).
-
-    Arguments:
-        plain: symmetry of elements that touch no joint.
-        joint: symmetry of elements that touch a joint.
-        tied: whether all elements at joints of one type, and all plain ones, share one relative
-            core; that of an element is turned end for end where its second end is at the joint.
-
-    Source: Ahmadian, Gladwell & Ismail (1997), section 4.3.
-
-    Examples:
-        >>> len(update.generic_family(structure, tied=True))
-        16
-    """
-    elements, _, labels = _changeable(structure)
-    # The joint type that every element touches and the end by which it does.
-    kinds, ends = [""] * len(structure.properties), [0] * len(structure.properties)
-    for kind, touching in structure.joint_ends.items():
-        for end_name in touching:
-            element, end = structure.element_ends[end_name]
-            kinds[element], ends[element] = kind, end
-    plane, active = structure.frame.plane, structure.active_local
-    terms, flip = free_terms([], active), end_swap_signs(plane, active)
-    plain_cores = np.zeros((len(terms), len(flip), len(flip)))
-    for a, (i, j) in enumerate(terms):
-        plain_cores[a, i, j] = plain_cores[a, j, i] = 1.0
-    turned = np.array([tied and ends[e] == 1 for e in elements])[:, None, None, None]
-    cores = np.where(turned, np.outer(flip, flip) * plain_cores, plain_cores)
-    vectors = scale_strain_vectors(structure, elements)[:, None]
-    patterns = vectors @ cores @ np.swapaxes(vectors, 2, 3)
-    allowed = {s: set(free_terms(operations_of(s, plane), active)) for s in (plain, joint)}
-    unknowns: dict[tuple[int, int, str | int], tuple[int, str]] = {}
-    columns = np.full(patterns.shape[:2], -1)
-    for row, e in enumerate(elements):
-        where = (kinds[e] or "plain") if tied else labels[row]
-        for a, (i, j) in enumerate(terms):
-            if (i, j) in allowed[joint if kinds[e] else plain] and patterns[row, a].any():
-                new = (len(unknowns), f"k{i + 1}{j + 1} {where}")
-                columns[row, a] = unknowns.setdefault((i, j, kinds[e] if tied else row), new)[0]
-    before = np.array([1.0 if i == j else 0.0 for i, j, _ in unknowns])
-    names = tuple(name for _, name in unknowns.values())
-    return ElementFamily(
-        structure=structure,
-        elements=elements,
-        patterns=patterns,
-        columns=columns,
-        names=names,
-        before=before,
-        scale=np.ones(len(names)),
-        units=("",) * len(names),
-        cores=cores,
-    )

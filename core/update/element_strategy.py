@@ -13,7 +13,7 @@ from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.measurement import Measurement
 from femubench.core.update.change_lists import OWN, check_changes, element_sets
-from femubench.core.update.element_families import ElementFamily, Family, tie_unknowns
+from femubench.core.update.element_families import ElementFamily, Family, GroupFamily, tie_unknowns
 from femubench.core.update.equation_error import update_by_equation_error
 from femubench.core.update.quasi import Expansion, Frequencies
 from femubench.core.update.strategy import Strategy, UpdateResult
@@ -32,10 +32,18 @@ class ElementStrategy(Strategy):
             model's own, which leaves the measured shapes as the only data.
         changes: `own` for the unknowns of the family; else those of the elements of every one
             of the `members`, `sections`, `materials` or `sets` of the case are tied to each other.
+
+    Attributes:
+        OWN: the word for the unknowns of the family.
+        keep_rigid: whether rigid-body modes are kept exactly.
+        takes_groups: whether groups of matrices get a factor each, too.
     """
+
+    OWN: ClassVar[str] = OWN
 
     needs: ClassVar[frozenset[str]] = frozenset({"shapes", "elements"})
     keep_rigid: ClassVar[bool] = False
+    takes_groups: ClassVar[bool] = False
 
     settings: ClassVar[tuple[str, ...]] = (
         "orthogonality=false",
@@ -65,6 +73,9 @@ class ElementStrategy(Strategy):
         Raises:
             NotApplicable: when the model has no such parts.
         """
+        grouped = model.structure is None and self.changes == OWN
+        if self.takes_groups and (grouped or self.changes == "groups"):
+            return GroupFamily.of(model)
         if self.changes == "groups":
             raise NotApplicable("groups of matrices have no elements: changes=sets of a frame")
         structure = model.frame_structure

@@ -24,7 +24,7 @@ from femubench.core.update.promise import (
     force_scale,
     measure_residuals,
 )
-from femubench.core.update.quasi import ITERATIONS, QuasiModes, quasi_measured_modes
+from femubench.core.update.quasi import ITERATIONS, QuasiModes
 from femubench.core.update.strategy import UpdateResult
 
 
@@ -444,7 +444,7 @@ def _met(
     history: list[Mapping[str, float]] = []
     for step in range(MOST_ITERATIONS):
         try:
-            quasi = quasi_measured_modes(current, measurement)
+            quasi = QuasiModes.of(current, measurement)
         except StrategyFailure as lost:
             if not history:
                 raise
@@ -520,7 +520,7 @@ def _free_directions(pattern: EntryPattern, model: Model, rigid: FloatArray) -> 
 
 def _quasi_after(step: int, current: Model, measurement: Measurement) -> QuasiModes:
     try:
-        return quasi_measured_modes(current, measurement)
+        return QuasiModes.of(current, measurement)
     except StrategyFailure as lost:
         text = f"after step {step} of least squares over the entries {lost}"
         raise StrategyFailure(text) from lost

@@ -264,11 +264,6 @@ def update_by_equation_error(
         StrategyFailure: when a measured mode has no partner, or a promise is not kept.
 
     Source: Ahmadian, Gladwell & Ismail (1997), section 4.
-
-    Examples:
-        >>> family = update.physical_family(structure)
-        >>> update.update_by_equation_error(model, measurement, family).parameter_count
-        56
     """
     if len(family) > MOST_UNKNOWNS:
         raise NotApplicable(

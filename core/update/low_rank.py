@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.fem.model import LowRank, Model, total_change
+from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.eigen import DENSE_LIMIT, Modes, keep_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.update.promise import check_used_modes
@@ -34,7 +34,7 @@ def with_stiffness_step(model: Model, modes: Modes, step: LowRank) -> Model:
         >>> round(float(gap))
         -100000
     """
-    changed = replace(model, stiffness_change=total_change([model.stiffness_change, step]))
+    changed = replace(model, stiffness_change=LowRank.total([model.stiffness_change, step]))
     if model.size > DENSE_LIMIT:
         after = _modes_after(model, modes, step)
         if after is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,8 +26,6 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import WINDOW_WITHOUT_SHAPE, pair_modes
 from femubench.core.modal.sparse_eigen import ShiftedModel
 from femubench.core.typing import BoolArray, FloatArray, IntArray
-from femubench.core.update.sensitivity_update import estimate_parameters
-from femubench.core.update.strategy import UpdateResult
 
 _SPARE = 10  # modes above the measured ones that may become their partners
 _LOST = 1.0 - 1.0 / WINDOW_WITHOUT_SHAPE  # what a mode without a partner counts as, relative
@@ -275,68 +273,107 @@ class ModalSpace:
                 return trial, found
         return x, fit
 
+    @classmethod
+    def of(
+        cls,
+        parametric: ParametricModel,
+        measurement: Measurement,
+        *,
+        shape_weight: float,
+        at: FloatArray | None = None,
+        size: int | None = None,
+    ) -> ModalSpace:
+        """Return the problem in all elastic modes of a model, or in a few shapes.
 
-def modal_space(
-    parametric: ParametricModel,
-    measurement: Measurement,
-    *,
-    shape_weight: float,
-    at: FloatArray | None = None,
-    size: int | None = None,
-) -> ModalSpace:
-    """Return the problem in all elastic modes of a model, or in a few shapes.
+        The few are the lowest modes, and the static answers to a change of every parameter in the
+        measured ones, those that matter most: they keep frequencies true where parameters move far.
 
-    The few are the lowest modes, and the static answers to a change of every parameter in the
-    measured ones, those that matter most: they keep frequencies true where parameters move far.
+        Arguments:
+            parametric: the model and its changes, factors on stiffness and effects.
+            measurement: the used modes.
+            shape_weight: as of `ModalSpace`.
+            at: coordinates where the shapes are taken, (p,); None for the nominal model.
+            size: number of shapes at most; None for all, of a large model a hundred.
 
-    Arguments:
-        parametric: the model and its changes, factors on stiffness and effects.
-        measurement: the used modes.
-        shape_weight: as of `ModalSpace`.
-        at: coordinates where the shapes are taken, (p,); None for the nominal model.
-        size: number of shapes at most; None for all, of a large model a hundred.
+        Raises:
+            StrategyFailure: when no mode of the model looks like any measured mode.
 
-    Raises:
-        StrategyFailure: when no mode of the model looks like any measured mode.
+        Source: Fox & Miura (1971), an approximate analysis technique for design calculations, for
+        the reduced basis of shapes and their derivatives.
 
-    Source: Fox & Miura (1971), an approximate analysis technique for design calculations, for the
-    reduced basis of shapes and their derivatives.
+        Examples:
+            >>> members = update.Changes(model).parameterise("members")
+            >>> space = update.ModalSpace.of(members, measurement, shape_weight=0.1)
+            >>> space.fit(np.zeros(7)).paired
+            3
+        """
+        _ = parametric.start  # raises where changes do not go together
+        x = np.zeros(len(parametric)) if at is None else at
+        model = parametric.model if not x.any() else parametric.at(x)
+        modes = solve_modes(model, enough_modes(model, len(measurement)))
+        observer = model.observe(measurement.sensors)
+        terms = parametric.terms
+        basis = modes.shapes if terms else modes.elastic.shapes
+        # A spring's softness runs over decades, for which few shapes are too few.
+        whole = model.size <= DENSE_LIMIT and (bool(terms) or size is None)
+        limit = basis.shape[1] if whole else size or 100
+        if limit < basis.shape[1] or model.size > DENSE_LIMIT:
+            basis = _few_shapes(parametric, measurement, model, modes, limit)
+            if terms:
+                basis = np.hstack([modes.shapes[:, modes.rigid], basis])
+        factors = parametric.is_property
+        inner = parametric.energies(basis, basis)[factors]
+        nominal = basis.T @ model.stiffness_times(basis)
+        nominal -= np.tensordot(np.expm1(x[factors]), inner, axes=1)
+        mass = np.eye(len(nominal))
+        projected = np.array([term.operator.project(basis) for term in terms])
+        # At the nominal model the terms are not in it yet.
+        for own, term, factor in zip(projected, terms, parametric.factors(x), strict=True):
+            if x.any():
+                {"stiffness": nominal, "mass": mass}[term.matrix][:] -= factor * own
+        given = nominal, mass, inner, projected, observer @ basis, shape_weight
+        space = cls(measurement, parametric, *given)
+        if space.fit(x, slopes=False).paired == 0:
+            raise StrategyFailure("no mode of the model looks like any measured mode")
+        return space
 
-    Examples:
-        >>> members = update.parameterise(model, "members")
-        >>> space = update.modal_space(members, measurement, shape_weight=0.1)
-        >>> space.fit(np.zeros(7)).paired
-        3
-    """
-    _ = parametric.start  # raises where changes do not go together
-    x = np.zeros(len(parametric)) if at is None else at
-    model = parametric.model if not x.any() else parametric.at(x)
-    modes = solve_modes(model, enough_modes(model, len(measurement)))
-    observer = model.observe(measurement.sensors)
-    terms = parametric.terms
-    basis = modes.shapes if terms else modes.elastic.shapes
-    # A spring's softness runs over decades, for which few shapes are too few.
-    whole = model.size <= DENSE_LIMIT and (bool(terms) or size is None)
-    limit = basis.shape[1] if whole else size or 100
-    if limit < basis.shape[1] or model.size > DENSE_LIMIT:
-        basis = _few_shapes(parametric, measurement, model, modes, limit)
-        if terms:
-            basis = np.hstack([modes.shapes[:, modes.rigid], basis])
-    factors = parametric.is_property
-    inner = parametric.energies(basis, basis)[factors]
-    nominal = basis.T @ model.stiffness_times(basis)
-    nominal -= np.tensordot(np.expm1(x[factors]), inner, axes=1)
-    mass = np.eye(len(nominal))
-    projected = np.array([term.operator.project(basis) for term in terms])
-    # At the nominal model the terms are not in it yet.
-    for own, term, factor in zip(projected, terms, parametric.factors(x), strict=True):
-        if x.any():
-            {"stiffness": nominal, "mass": mass}[term.matrix][:] -= factor * own
-    given = nominal, mass, inner, projected, observer @ basis, shape_weight
-    space = ModalSpace(measurement, parametric, *given)
-    if space.fit(x, slopes=False).paired == 0:
-        raise StrategyFailure("no mode of the model looks like any measured mode")
-    return space
+    def fit_bounded(self, start: FloatArray, largest: float) -> tuple[FloatArray, float]:
+        """Return the local optimum of the coordinates between their bounds, and the cost there.
+
+        Arguments:
+            start: coordinates, (p,).
+            largest: bound of a factor; the least is its inverse.
+
+        Source: Branch, Coleman & Li (1999), trust-region reflective least squares.
+
+        Examples:
+            >>> sections = update.Changes(model).parameterise("sections")
+            >>> space = update.ModalSpace.of(sections, measurement, shape_weight=0.0)
+            >>> x, cost = space.fit_bounded(np.zeros(1), 3.0)
+            >>> cost < space.fit(np.zeros(1)).cost
+            True
+        """
+        low, high = self.bounds(float(np.log(largest)))
+        middle, half, kept = 0.5 * (low + high), 0.5 * (high - low), {}
+
+        def residual(x: FloatArray) -> FloatArray:
+            kept[0] = (x.copy(), self.fit(x))
+            return kept[0][1].residual
+
+        def slope(x: FloatArray) -> FloatArray:
+            at, fit = kept[0]
+            return (fit if np.array_equal(at, x) else self.fit(x)).slope
+
+        found = least_squares(
+            residual,
+            np.clip(start, middle - _INSIDE * half, middle + _INSIDE * half),
+            slope,
+            bounds=(low, high),
+            max_nfev=_EVALUATIONS,
+            xtol=_TOLERANCE,
+            ftol=_TOLERANCE,
+        )
+        return np.asarray(found.x), 2.0 * float(found.cost)
 
 
 def _few_shapes(
@@ -389,66 +426,3 @@ def _largest_answers(
             products = [parts.start_slopes.inner(shape[:, None], answers)[:, 0] for shape in moved]
             weights = np.array(products)
     return np.asarray(answers)
-
-
-def fit_bounded(space: ModalSpace, start: FloatArray, largest: float) -> tuple[FloatArray, float]:
-    """Return the local optimum of the coordinates between their bounds, and the cost there.
-
-    Arguments:
-        space: the problem.
-        start: coordinates, (p,).
-        largest: bound of a factor; the least is its inverse.
-
-    Source: Branch, Coleman & Li (1999), trust-region reflective least squares.
-
-    Examples:
-        >>> sections = update.parameterise(model, "sections")
-        >>> space = update.modal_space(sections, measurement, shape_weight=0.0)
-        >>> x, cost = update.fit_bounded(space, np.zeros(1), 3.0)
-        >>> cost < space.fit(np.zeros(1)).cost
-        True
-    """
-    low, high = space.bounds(float(np.log(largest)))
-    middle, half, kept = 0.5 * (low + high), 0.5 * (high - low), {}
-
-    def residual(x: FloatArray) -> FloatArray:
-        kept[0] = (x.copy(), space.fit(x))
-        return kept[0][1].residual
-
-    def slope(x: FloatArray) -> FloatArray:
-        at, fit = kept[0]
-        return (fit if np.array_equal(at, x) else space.fit(x)).slope
-
-    found = least_squares(
-        residual,
-        np.clip(start, middle - _INSIDE * half, middle + _INSIDE * half),
-        slope,
-        bounds=(low, high),
-        max_nfev=_EVALUATIONS,
-        xtol=_TOLERANCE,
-        ftol=_TOLERANCE,
-    )
-    return np.asarray(found.x), 2.0 * float(found.cost)
-
-
-def parametric_result(
-    parametric: ParametricModel,
-    x: FloatArray,
-    history: Sequence[dict[str, float]] = (),
-    **figures: float,
-) -> UpdateResult:
-    """Return the updated model with its parameters.
-
-    Arguments:
-        parametric: the nominal model and its changes.
-        x: coordinates, (p,).
-        history: one mapping an iteration.
-        figures: diagnostics.
-
-    Examples:
-        >>> sections = update.parameterise(model, "sections")
-        >>> update.parametric_result(sections, np.zeros(1)).parameters[0].after
-        1.0
-    """
-    estimates = estimate_parameters(parametric, x, None)
-    return UpdateResult(parametric.at(x), len(parametric), estimates, tuple(history), figures)

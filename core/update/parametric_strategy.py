@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from femubench.core.update.change_lists import OWN, check_changes
-from femubench.core.update.strategy import Strategy
+from femubench.core.change.parametric_model import ParametricModel
+from femubench.core.fem.model import Model
+from femubench.core.typing import FloatArray
+from femubench.core.update.change_lists import OWN, Changes, check_changes
+from femubench.core.update.sensitivity_update import estimate_parameters
+from femubench.core.update.strategy import Strategy, UpdateResult
 
 
 @dataclass(frozen=True)
@@ -29,3 +34,29 @@ class ParametricStrategy(Strategy):
 
     def __post_init__(self) -> None:
         check_changes(self.changes)
+
+    def parameterise(self, model: Model) -> ParametricModel:
+        """Return the model with what may change of it, each with a prior.
+
+        Raises:
+            NotApplicable: when the model has no such parts, or two factors on the same one.
+        """
+        return Changes(model).parameterise(self.changes)
+
+    @staticmethod
+    def result(
+        parametric: ParametricModel,
+        x: FloatArray,
+        history: Sequence[dict[str, float]] = (),
+        **figures: float,
+    ) -> UpdateResult:
+        """Return the updated model with its parameters.
+
+        Arguments:
+            parametric: the nominal model and its changes.
+            x: coordinates, (p,).
+            history: one mapping an iteration.
+            figures: diagnostics.
+        """
+        estimates = estimate_parameters(parametric, x, None)
+        return UpdateResult(parametric.at(x), len(parametric), estimates, tuple(history), figures)

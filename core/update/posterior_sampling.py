@@ -184,7 +184,7 @@ def sample_posterior(
     measurement: Measurement,
     rng: np.random.Generator,
     *,
-    discrepancy: Discrepancy,
+    discrepancy: tuple[float, float],
     options: UpdateOptions,
 ) -> UpdateResult:
     """Return the model at the posterior mean, with samples of the posterior.
@@ -203,7 +203,7 @@ def sample_posterior(
         changes: each parameter with a prior.
         measurement: the used modes, each with a standard deviation.
         rng: decides on every draw.
-        discrepancy: its prior.
+        discrepancy: of its log-normal prior the median and the standard deviation of the logarithm.
         options: of the search for the most probable parameters; statistical weighting.
 
     Raises:
@@ -215,17 +215,18 @@ def sample_posterior(
     Foreman-Mackey, Hogg, Lang & Goodman (2013), PASP 125, 306-312.
 
     Examples:
-        >>> factor = update.scale_all_stiffness(structure, prior_std=0.1)
-        >>> own = update.Discrepancy(median=0.02, spread=0.7)
+        >>> factor = update.Changes(structure).stiffness(prior_std=0.1)
         >>> options = update.UpdateOptions(weighting="statistical")
         >>> rng = np.random.default_rng(0)
         >>> found = update.sample_posterior(
-        ...     structure, [factor], measurement, rng, discrepancy=own, options=options
+        ...     structure, [factor], measurement, rng, discrepancy=(0.02, 0.7), options=options
         ... )
         >>> len(found.uncertainty.samples)
         40
     """
-    target, covariance = most_probable(source, changes, measurement, discrepancy, options)
+    target, covariance = most_probable(
+        source, changes, measurement, Discrepancy(*discrepancy), options
+    )
     sampler, off, rough = _fitted(target, np.asarray(np.linalg.cholesky(covariance)), rng)
     if sampler is None:
         return _normal_result(target, covariance, off)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,7 +16,6 @@ from femubench.core.modal.expansion import (
     expand_by_rotation,
     find_measured_rows,
 )
-from femubench.core.modal.generalised_mass import mass_normalised
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import pair_measured
 from femubench.core.typing import FloatArray, IntArray
@@ -34,7 +33,12 @@ class QuasiModes:
         rigid: free rigid-body modes of the model, mass-orthonormal, (n, r).
         modes: the model's own modes from which the shapes were made.
         partners: which of them belong to the measured ones, (m,).
+
+    Attributes:
+        ITERATIONS: how often an update starts again from its own shapes, as the source does.
     """
+
+    ITERATIONS: ClassVar[int] = ITERATIONS
 
     shapes: FloatArray
     eigenvalues: FloatArray
@@ -48,6 +52,32 @@ class QuasiModes:
         measured = np.sqrt(self.eigenvalues) / (2.0 * np.pi)
         own = self.modes.natural_frequencies[self.partners]
         return float(np.where(own > 0.0, np.abs(own / measured - 1.0), 1.0).max())
+
+    @classmethod
+    def of(cls, model: Model, measurement: Measurement) -> QuasiModes:
+        """Return the used modes expanded by rotating the model's own shapes.
+
+        Arguments:
+            model: the current estimate; its mass is the one the shapes are orthonormal with.
+            measurement: the used modes.
+
+        Raises:
+            StrategyFailure: when a measured mode has no partner in the model.
+            NotApplicable: when there are fewer complete sensors than modes.
+
+        Source: Ahmadian, Gladwell & Ismail (1997), equations (16)-(17).
+
+        Examples:
+            >>> quasi = update.QuasiModes.of(model, measurement)
+            >>> np.allclose(quasi.shapes.T @ model.mass @ quasi.shapes, np.eye(3))
+            True
+        """
+        rows = find_measured_rows(measurement.shapes)
+        modes, partners = pair_modes_of(model, measurement)
+        full = modes.shapes[:, partners]
+        at_sensors = (model.observe(measurement.sensors) @ full)[rows]
+        shapes, _ = expand_by_rotation(measurement.shapes[rows], at_sensors, full)
+        return cls(shapes, measurement.eigenvalues, modes.shapes[:, modes.rigid], modes, partners)
 
 
 def partners_of(model: Model, measurement: Measurement) -> tuple[Modes, IntArray]:
@@ -68,34 +98,6 @@ def pair_modes_of(model: Model, measurement: Measurement) -> tuple[Modes, IntArr
     if lost:
         raise StrategyFailure(f"no mode of the model matches measured mode {lost[0]}")
     return modes, partner
-
-
-def quasi_measured_modes(model: Model, measurement: Measurement) -> QuasiModes:
-    """Return the used modes expanded by rotating the model's own shapes.
-
-    Arguments:
-        model: the current estimate; its mass is the one the shapes are orthonormal with.
-        measurement: the used modes.
-
-    Raises:
-        StrategyFailure: when a measured mode has no partner in the model.
-        NotApplicable: when there are fewer complete sensors than modes.
-
-    Source: Ahmadian, Gladwell & Ismail (1997), equations (16)-(17).
-
-    Examples:
-        >>> quasi = update.quasi_measured_modes(model, measurement)
-        >>> np.allclose(quasi.shapes.T @ model.mass @ quasi.shapes, np.eye(3))
-        True
-    """
-    rows = find_measured_rows(measurement.shapes)
-    modes, partners = pair_modes_of(model, measurement)
-    full = modes.shapes[:, partners]
-    at_sensors = (model.observe(measurement.sensors) @ full)[rows]
-    shapes, _ = expand_by_rotation(measurement.shapes[rows], at_sensors, full)
-    return QuasiModes(
-        shapes, measurement.eigenvalues, modes.shapes[:, modes.rigid], modes, partners
-    )
 
 
 Expansion = Literal["rotation", "force"]
@@ -130,10 +132,10 @@ class WantedModes:
                 large for `force`.
         """
         forced = self.expansion == "force"
-        quasi = quasi_measured_modes(self.nominal if forced else current, self.measurement)
+        quasi = QuasiModes.of(self.nominal if forced else current, self.measurement)
         own = quasi
         if self.frequencies == "nominal" and not forced:
-            own = quasi_measured_modes(self.nominal, self.measurement)
+            own = QuasiModes.of(self.nominal, self.measurement)
         if forced:
             quasi = replace(quasi, shapes=self._forced())
         if self.frequencies == "nominal":
@@ -150,4 +152,4 @@ class WantedModes:
         rows = find_measured_rows(measured.shapes)
         sensors = sp.csr_array(model.observe(measured.sensors))[rows]
         shapes = expand_by_dynamics(model, sensors, measured.shapes[rows], measured.eigenvalues)
-        return mass_normalised(model, shapes)
+        return model.mass_normalised(shapes)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from femubench.core.change.change import Change
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.measurement import Measurement
-from femubench.core.update.change_lists import OWN, check_changes, list_changes
+from femubench.core.update.change_lists import OWN, Changes, check_changes
 from femubench.core.update.sensitivity_update import UpdateOptions, sensitivity_update
 from femubench.core.update.strategy import Strategy, UpdateResult
 
@@ -28,7 +28,12 @@ class SensitivityStrategy(Strategy):
             of each of the `elements`, `members`, `joints`, `sections`, `materials`, `sets` of the
             case, or `groups` of matrices; an effect at its coarsest places, `effect@place` at one;
             several joined by ``+``.
+
+    Attributes:
+        OWN: the word for the strategy's own list.
     """
+
+    OWN: ClassVar[str] = OWN
 
     options: UpdateOptions = field(default_factory=UpdateOptions)
     changes: str = OWN
@@ -58,4 +63,4 @@ class SensitivityStrategy(Strategy):
 
     def list_changes(self, model: Model, measurement: Measurement) -> list[Change]:
         """Return the changes that `changes` names, nothing known of them beforehand."""
-        return list_changes(model, self.changes)
+        return Changes(model).listed(self.changes)

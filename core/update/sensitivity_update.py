@@ -306,7 +306,7 @@ def sensitivity_update(
     Source: Horton, Gurgenci, Veidt & Friswell (1999), equations (1), (2), (3) and (4).
 
     Examples:
-        >>> factor = update.scale_all_stiffness(structure)
+        >>> factor = update.Changes(structure).stiffness()
         >>> update.sensitivity_update(structure, [factor], measurement).parameter_count
         1
     """

@@ -58,7 +58,7 @@ class Uncertainty:
 
         Examples:
             >>> def make(q):
-            ...     return fem.Model.of(structure.with_values([stiffness], np.exp(q)))
+            ...     return femubench.Model.of(structure.with_values([stiffness], np.exp(q)))
             >>> len(update.Uncertainty.draw(make, np.zeros(1), np.array([[0.01]])).samples)
             16
         """
@@ -83,7 +83,7 @@ class Uncertainty:
 
         Examples:
             >>> def make(q):
-            ...     return fem.Model.of(structure.with_values([stiffness], np.exp(q)))
+            ...     return femubench.Model.of(structure.with_values([stiffness], np.exp(q)))
             >>> len(update.Uncertainty.of_draws(make, np.array([[0.0], [0.1]])).samples)
             2
         """

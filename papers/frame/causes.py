@@ -10,7 +10,7 @@ from math import factorial
 import numpy as np
 
 from femubench import Model, solve_modes
-from femubench.fem import Factor, FloatArray, Frame, Section, rectangular_tube
+from femubench.fem import Factor, FloatArray, Frame, Section
 from femubench.reproduction import Workbench
 from femubench.scenarios.structures import ladder_truth
 
@@ -45,7 +45,7 @@ class Ladder:
         nominal = case.model.frame_structure.frame
         width = nominal.members[0].section.width
         assert width is not None
-        tube = rectangular_tube(width, width, WALL)
+        tube = Section.rectangular_tube(width, width, WALL)
         return cls(nominal, ladder_truth(tube), tube, case.measurement.frequencies)
 
     @property

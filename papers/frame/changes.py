@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from femubench import Model, UpdateResult
-from femubench.fem import FloatArray, Structure, stiffness_matrices
+from femubench.fem import FloatArray, Structure
 from femubench.plot import wireframe_of
 from femubench.reproduction import Figure, MatrixImage, StructureMap, Workbench
 from femubench.results import element_norms, stiffness_difference
-from femubench.update import ElementFamily, generic_family
+from femubench.update import ElementFamily
 
 CASE = "frame"
 SOLUTIONS = {"least squares": "generic-ls", "adjusted": "generic-adjusted"}
@@ -48,7 +48,7 @@ def relative_change(structure: Structure, change: FloatArray) -> FloatArray:
         structure: the nominal frame.
         change: of the local element matrices, (n, 12, 12).
     """
-    nominal = stiffness_matrices(structure.properties)
+    nominal = structure.properties.stiffness_matrices()
     return element_norms(structure, change) / element_norms(structure, nominal)
 
 
@@ -94,7 +94,7 @@ def solution_changes(bench: Workbench, words: str) -> FloatArray:
         words: ``generic-ls`` or ``generic-adjusted``.
     """
     structure = bench.cases[CASE].model.frame_structure
-    family = generic_family(structure, tied=words == "generic-adjusted")
+    family = ElementFamily.generic(structure, tied=words == "generic-adjusted")
     return relative_change(structure, recover_change(family, bench.update(CASE, words)))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from femubench import Modes, StrategyFailure, solve_modes
 from femubench.fem import FloatArray
 from femubench.reproduction import Ground, Workbench
-from femubench.update import quasi_measured_modes
+from femubench.update import QuasiModes
 
 PAPER = "frame"
 CASE = "frame"
@@ -73,7 +73,7 @@ def with_turned_shapes(bench: Workbench) -> Workbench:
     By equations (16)-(17) a rotation of the model's own shapes is all that the test's can do.
     """
     case = bench.cases[CASE]
-    data, quasi = case.measurement, quasi_measured_modes(case.model, case.used_measurement())
+    data, quasi = case.measurement, QuasiModes.of(case.model, case.used_measurement())
     readings = case.model.observe(data.sensors) @ quasi.modes.shapes[:, quasi.partners]
     cases = dict(bench.cases)
     for name in TURNS:

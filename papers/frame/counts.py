@@ -20,7 +20,7 @@ from femubench.papers.frame.common import (
 )
 from femubench.papers.printed import read_printed
 from femubench.reproduction import Cell, Ground, Page, Workbench
-from femubench.update import generic_family, physical_family
+from femubench.update import ElementFamily
 
 _NAMES = {
     "joints_L": "L joints",
@@ -70,10 +70,10 @@ def count_cells(bench: Workbench) -> tuple[Cell, ...]:
     at_joints = {
         structure.element_ends[e][0] for ends in structure.joint_ends.values() for e in ends
     }
-    family = generic_family(structure)
+    family = ElementFamily.generic(structure)
     free = (family.columns >= 0).sum(axis=1)
     touches = np.isin(family.elements, list(at_joints))
-    element = physical_family(structure).patterns[0].sum(axis=0)
+    element = ElementFamily.physical(structure).patterns[0].sum(axis=0)
     ours = {
         "joints_L": types["L"],
         "joints_T": types["T"],

@@ -11,7 +11,7 @@ from femubench import Model, solve_modes
 from femubench.fem import FloatArray, Structure
 from femubench.papers.frame.common import CASE, format_frequencies, strain_modes
 from femubench.reproduction import Extra, Workbench
-from femubench.update import Symmetry, generic_family, quasi_measured_modes
+from femubench.update import ElementFamily, QuasiModes, Symmetry
 
 _TORSION_FACTOR = 140.0
 
@@ -39,7 +39,7 @@ def rotations(bench: Workbench) -> tuple[float, float]:
     """
     case = bench.cases[CASE]
     used = case.used_measurement()
-    quasi = quasi_measured_modes(case.model, used)
+    quasi = QuasiModes.of(case.model, used)
     analytical = (case.model.observe(used.sensors) @ quasi.modes.shapes)[:, quasi.partners]
     scale = np.linalg.norm(analytical, axis=0) / np.linalg.norm(used.shapes, axis=0)
     sign = np.sign(np.einsum("ij,ij->j", used.shapes, analytical))
@@ -91,7 +91,7 @@ def coupling_terms(structure: Structure) -> dict[str, tuple[str, ...]]:
     plain = next(label for i, label in enumerate(structure.labels) if i not in touched)
     kinds: tuple[Symmetry, ...] = ("half-turn", "mirror", "full")
     for kind in kinds:
-        names = generic_family(structure, plain=kind, joint="none").names
+        names = ElementFamily.generic(structure, plain=kind, joint="none").names
         terms = (name.split(" ", 1)[0] for name in names if name.endswith(f" {plain}"))
         found[kind] = tuple(term for term in terms if term[1] != term[2])
     return found
@@ -100,14 +100,14 @@ def coupling_terms(structure: Structure) -> dict[str, tuple[str, ...]]:
 def _symmetry(bench: Workbench) -> tuple[str, ...]:
     structure = bench.cases[CASE].model.frame_structure
     left = {kind: ", ".join(terms) or "none" for kind, terms in coupling_terms(structure).items()}
-    full = len(generic_family(structure, plain="full"))
+    full = len(ElementFamily.generic(structure, plain="full"))
     return (
         "section 4.3",
         "second and third mode antisymmetric, k12 = k23 = 0",
         "k12 = k13 = 0 (mirror), or k12 = k23 = 0 (half turn), or all three",
         f"couplings left by a mirror: {left['mirror']}, by a half turn: {left['half-turn']}, by "
         f"both: {left['full']}; a tube has both, which leaves {full} parameters, not "
-        f"{len(generic_family(structure))}",
+        f"{len(ElementFamily.generic(structure))}",
     )
 
 

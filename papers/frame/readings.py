@@ -16,7 +16,7 @@ from femubench.papers.frame.common import (
     strain_modes,
 )
 from femubench.reproduction import Extra, Ground, Workbench
-from femubench.update import QuasiModes, generic_family, quasi_measured_modes
+from femubench.update import ElementFamily, QuasiModes
 
 SEARCH = "docs/reproduce.md has the search"
 # Readings of one column in the grid of docs/reproduce.md, and those that the page says were tried
@@ -124,7 +124,7 @@ def uniform_factor(bench: Workbench, quasi: QuasiModes) -> tuple[float, float, f
 def energy_shares(bench: Workbench) -> tuple[float, float, float]:
     """Return the share of bending, shear and twist in the strain energy of modes 1-3 in percent."""
     structure = bench.cases[CASE].model.frame_structure
-    family = generic_family(structure, plain="full", joint="full")
+    family = ElementFamily.generic(structure, plain="full", joint="full")
     shapes = _first(bench).shapes
     local = (structure.gather @ shapes).reshape(-1, 12, shapes.shape[1])[family.elements]
     energy = np.einsum("eim,eaij,ejm->am", local, family.patterns, local)[:3]
@@ -134,7 +134,7 @@ def energy_shares(bench: Workbench) -> tuple[float, float, float]:
 
 def _first(bench: Workbench) -> QuasiModes:
     case = bench.cases[CASE]
-    return quasi_measured_modes(case.model, case.used_measurement())
+    return QuasiModes.of(case.model, case.used_measurement())
 
 
 def cutoffs(bench: Workbench) -> Extra:

@@ -13,7 +13,7 @@ from femubench.fem import FloatArray, IntArray
 from femubench.modal import rigid_modes_of
 from femubench.papers.frame.common import CASE
 from femubench.reproduction import Extra, Workbench
-from femubench.update import ElementFamily, generic_family, nobari_family, physical_family
+from femubench.update import ElementFamily
 
 _RANK = 1e-9  # of the largest singular value
 _UNCOUPLED = ("k11", "k12", "k22", "k33")  # generic beam and generic rod, without coupling
@@ -80,14 +80,14 @@ def compare_spaces(model: Model) -> Spaces:
     # The entries whose matrix leaves rigid-body motion free of forces.
     forces = _forces(np.eye(int(present.sum())), rigid, row[present], column[present])
     kept = ranks.split(forces)[1]
-    generic = generic_family(structure, plain="none", joint="none")
+    generic = ElementFamily.generic(structure, plain="none", joint="none")
     chosen = [i for i, name in enumerate(generic.names) if name.startswith(_UNCOUPLED)]
     assembled = _assembled(generic, chosen, size)
     added = ~present & (np.abs(assembled).max(axis=1) > _RANK)
     inside = ranks.split(assembled[added])[1]
     nobari, physical = (
         _assembled(family, range(len(family)), size)
-        for family in (nobari_family(structure), physical_family(structure))
+        for family in (ElementFamily.nobari(structure), ElementFamily.physical(structure))
     )
     free = ranks.split(_forces(nobari, rigid, row, column))[1]
     return Spaces(

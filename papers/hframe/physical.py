@@ -10,12 +10,12 @@ from femubench import Case, Measurement, Model, solve_modes
 from femubench.fem import FloatArray
 from femubench.modal import pair_measured
 from femubench.update import (
+    Joints,
     UpdateOptions,
     all_elements,
     scale_property,
     sensitivity_update,
     set_property,
-    with_joint_springs,
 )
 
 ARM = 0.02  # m, from the column's axis to its face
@@ -45,8 +45,8 @@ def physical_model(case: Case) -> TimoshenkoFit:
     """
     structure = case.model.frame_structure
     frame = replace(structure.frame, beam="timoshenko", bending_mass="cubic")  # of the time
-    sprung = with_joint_springs(
-        structure.rebuilt(frame), {end: {"ry": _START} for end in _ENDS}, arm=ARM, arm_factor=None
+    sprung = Joints(structure.rebuilt(frame)).with_springs(
+        {end: {"ry": _START} for end in _ENDS}, arm=ARM, arm_factor=None
     )
     places = tuple(f"{end}:ry" for end in _ENDS)
     changes = [

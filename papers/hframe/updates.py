@@ -20,7 +20,7 @@ from femubench.papers.hframe.rows import (
 )
 from femubench.papers.printed import read_printed
 from femubench.reproduction import Cell, Ground, Page, Workbench
-from femubench.update import spring_estimates
+from femubench.update import Joints
 
 INITIAL, UPDATED, LIMIT = 0.01, 0.05, 0.1  # of frequencies and of parameters, in percent
 DIGITS = {"k_x": -7, "k_z": -7, "a_H": 4}  # printed with three digits
@@ -117,11 +117,12 @@ def springs_by_rule(bench: Workbench) -> tuple[float, float, dict[str, float]]:
 
     The second, in m as well, is the middle of the lengths that all three round to print with.
     """
-    frame = bench.cases["hframe"].model.frame_structure.frame
+    structure = bench.cases["hframe"].model.frame_structure
+    frame = structure.frame
     horizontal = frame.members[frame.member_index["horizontal"]]
     start, stop = frame.corners[frame.member_ends[frame.member_index["horizontal"]]]
     length = float(np.linalg.norm(stop - start)) / horizontal.elements
-    found = spring_estimates(frame, ("horizontal@T1", "horizontal@T2"))
+    found = Joints(structure).spring_estimates(("horizontal@T1", "horizontal@T2"))
     ours = dict(zip(RULED, (found["x"], found["z"], found["ry"]), strict=True))
     ends, theirs = [], read_printed("hframe")["initial_springs"]
     for symbol, (digits, power) in RULED.items():

@@ -7,19 +7,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 from femubench import Model
-from femubench.effect import (
-    Change,
-    FrameEffect,
-    Parameter,
-    Site,
-    Size,
-    free_translations,
-    mass_term,
-    point_in,
-    point_of,
-    point_places,
-    proportional,
-)
+from femubench.effect import Change, FrameEffect, ModelPlaces, Parameter, Places, Site, Size
 from femubench.fem import Frame, PointMass
 
 # Of the structure's mass: as much as there is to a joint, within these bounds. A fifth
@@ -36,12 +24,13 @@ class AddedMass(FrameEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the points, or nodes, that can move."""
-        return [at for at in point_places(model) if free_translations(model, point_in(model, at))]
+        places = ModelPlaces(model)
+        return [at for at in places.points() if places.free(places.point(at))]
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the mass."""
         structure = model.structure
-        points = point_places(model) if structure is None else structure.frame.joints
+        points = ModelPlaces(model).points() if structure is None else structure.frame.joints
         scale = model.total_mass * min(max(1.0 / max(len(points), 1), _LEAST), _MOST)
         return (Parameter("mass", "kg", scale, one_sided=True),)
 
@@ -49,13 +38,13 @@ class AddedMass(FrameEffect):
         """Return the frame with the mass."""
         if not values[0]:
             return frame
-        mass = PointMass(point_of(frame, place), values[0])
+        mass = PointMass(Places(frame).point(place), values[0])
         return replace(frame, masses=(*frame.masses, mass))
 
     def extend_matrices(self, model: Model, place: str, values: Sequence[float]) -> Model:
         """Return the model with the mass in it."""
-        return model.attach([PointMass(point_in(model, place), values[0])], [])
+        return model.attach([PointMass(ModelPlaces(model).point(place), values[0])], [])
 
     def change(self, model: Model, place: str) -> Change:
         """Return the mass matrix of 1 kg at the point."""
-        return proportional(mass_term(model, [point_in(model, place)]))
+        return Change.proportional(ModelPlaces(model).mass_term([ModelPlaces(model).point(place)]))

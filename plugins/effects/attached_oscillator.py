@@ -11,23 +11,18 @@ import scipy.sparse as sp
 
 from femubench import Model
 from femubench.effect import (
-    FREE,
     Change,
     FrameEffect,
+    ModelPlaces,
     Parameter,
+    Places,
     RowOperator,
     Site,
     Size,
     Term,
-    bare_place,
     elastic_band,
-    find_directed_point,
-    free_translations,
-    list_directed_places,
-    translation_rows,
-    with_extra,
 )
-from femubench.fem import FloatArray, Frame, Oscillator
+from femubench.fem import FloatArray, Frame, Oscillator, SparseArray
 
 _SHARE = 0.005  # of the structure's mass
 # A part that is tuned to a mode splits its peak by the root of the mass ratio (Den Hartog 1956,
@@ -59,15 +54,15 @@ class AttachedOscillator(FrameEffect):
         # The mesh node nearest to the middle of a member.
         middle = {m.name: m.elements // 2 / m.elements or 0.5 for m in frame.members}
         middles = [f"{name}@{station:g}" for name, station in middle.items()]
-        return list_directed_places(model, [*frame.joint_index, *middles])
+        return ModelPlaces(model).directed([*frame.joint_index, *middles])
 
     def finer(self, model: Model, place: str) -> Sequence[str]:
         """Return the place with a mass that hangs free, where it can be felt across at all."""
-        if place.endswith(FREE):
+        if place.endswith(Places.FREE):
             return ()
-        at, direction = find_directed_point(model, place)
-        across = set(free_translations(model, at)) - {direction}
-        return (f"{place}{FREE}",) if across else ()
+        at, direction = ModelPlaces(model).directed_point(place)
+        across = set(ModelPlaces(model).free(at)) - {direction}
+        return (f"{place}{Places.FREE}",) if across else ()
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return its mass, and its frequency around the middle of the lowest elastic ones."""
@@ -82,24 +77,26 @@ class AttachedOscillator(FrameEffect):
         """Return the frame with the oscillator."""
         if not values[0]:
             return frame
-        at = find_directed_point(frame, bare_place(place))
-        oscillator = Oscillator(*at, values[0], values[1], crosswise=not place.endswith(FREE))
+        at = Places(frame).directed_point(place)
+        oscillator = Oscillator(
+            *at, values[0], values[1], crosswise=not place.endswith(Places.FREE)
+        )
         return replace(frame, oscillators=(*frame.oscillators, oscillator))
 
     def change(self, model: Model, place: str) -> Change:
         """Return 1 kg on a dof of its own and the spring of 1 N/m that carries it."""
-        at, direction = find_directed_point(model, bare_place(place))
-        crosswise = () if place.endswith(FREE) else free_translations(model, at)
+        at, direction = ModelPlaces(model).directed_point(place)
+        crosswise = () if place.endswith(Places.FREE) else ModelPlaces(model).free(at)
         others = [d for d in crosswise if d != direction]
         own = sp.csr_array(([1.0], [model.size], [0, 1]), shape=(1, model.size + 1))
-        spring = with_extra(-translation_rows(model, at, [direction]), [1.0])
+        spring = _with_extra(-ModelPlaces(model).translations(at, [direction]), [1.0])
         terms = [
             Term("stiffness", RowOperator(spring, np.eye(1))),
             # On a scale it weighs what it weighs, however it hangs.
             Term("mass", RowOperator(own, np.eye(1)), weight=None if others else 1.0),
         ]
         if others:
-            carried = with_extra(translation_rows(model, at, others), [0.0] * len(others))
+            carried = _with_extra(ModelPlaces(model).translations(at, others), [0.0] * len(others))
             terms.append(Term("mass", RowOperator(carried, np.eye(len(others)))))
 
         def factors(values: FloatArray) -> FloatArray:
@@ -108,3 +105,12 @@ class AttachedOscillator(FrameEffect):
             return np.column_stack([stiffness, mass, mass][: len(terms)])
 
         return Change(tuple(terms), factors, extra=1)
+
+
+def _with_extra(rows: SparseArray, extra: Sequence[float]) -> SparseArray:
+    """Return rows on the dofs of the model and one behind them, where they have `extra`, (p,)."""
+    count, size = rows.shape
+    data = np.insert(rows.data, rows.indptr[1:], extra)
+    indices = np.insert(rows.indices, rows.indptr[1:], size)
+    bounds = rows.indptr + np.arange(count + 1)
+    return sp.csr_array((data, indices, bounds), shape=(count, size + 1))

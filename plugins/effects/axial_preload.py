@@ -17,21 +17,9 @@ from femubench.effect import (
     Site,
     Size,
     Term,
-    member_length,
     once_for,
-    proportional,
-    sparse_term,
 )
-from femubench.fem import (
-    FloatArray,
-    Frame,
-    IntArray,
-    Preload,
-    Structure,
-    preload_forces,
-    redundant_members,
-    unit_preload_matrices,
-)
+from femubench.fem import FloatArray, Frame, GeometricStiffness, IntArray, Preload, Structure
 
 _SCALE, _BOUND = 0.15, 0.6  # of the Euler load
 _MOST = 60
@@ -52,7 +40,10 @@ class AxialPreload(FrameEffect):
         """Return the members that the rest of the frame resists, the 60 first to buckle at most."""
         if model.structure is None:
             return ()
-        frame, members = model.structure.frame, redundant_members(model.structure)
+        frame, members = (
+            model.structure.frame,
+            GeometricStiffness(model.structure).redundant_members(),
+        )
         slender = set(sorted(members, key=lambda name: euler_load(frame, name))[:_MOST])
         return tuple(name for name in members if name in slender)
 
@@ -76,19 +67,19 @@ class AxialPreload(FrameEffect):
         """
         structure = model.frame_structure
         units, kind, every = once_for(model, "preload units", lambda: _units(structure))
-        forces, adjacent = preload_forces(structure, place)
+        forces, adjacent = GeometricStiffness(structure).forces(place)
         operator = ElementOperator(structure, every, units, share=forces, kind=kind)
         terms = [Term("stiffness", operator)]
         if adjacent is not None:
-            terms.append(sparse_term("stiffness", adjacent))
-        return proportional(*terms)
+            terms.append(Term.of("stiffness", adjacent))
+        return Change.proportional(*terms)
 
 
 def _units(structure: Structure) -> tuple[FloatArray, IntArray, IntArray]:
     """Return the unit matrices by kinds of elements, each one's kind, and all elements."""
     mesh = structure.mesh
     first, kind = structure.properties.alike(mesh.member, *mesh.rigid.T)
-    return unit_preload_matrices(structure)[first], kind, np.arange(len(kind))
+    return GeometricStiffness(structure).unit_matrices()[first], kind, np.arange(len(kind))
 
 
 def euler_load(frame: Frame, name: str) -> float:
@@ -97,4 +88,4 @@ def euler_load(frame: Frame, name: str) -> float:
     # A frame in one plane needs Iy alone.
     own = (member.section.Iy, member.section.Iz)
     inertia = min((i for i in own if i > 0.0), default=0.0)  # of a rod
-    return float(np.pi**2 * member.material.E * inertia / member_length(frame, name) ** 2)
+    return float(np.pi**2 * member.material.E * inertia / frame.member_length(name) ** 2)

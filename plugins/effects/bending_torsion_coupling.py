@@ -11,13 +11,12 @@ from femubench.effect import (
     Change,
     ElementOperator,
     FrameEffect,
+    ModelPlaces,
     Parameter,
     Size,
     Term,
-    elements_of,
-    proportional,
 )
-from femubench.fem import Coupling, Frame, coupling_matrices
+from femubench.fem import Coupling, Frame
 
 _BOUND = 0.8
 
@@ -49,6 +48,6 @@ class BendingTorsionCoupling(FrameEffect):
     def change(self, model: Model, place: str) -> Change:
         """Return what a coefficient of 1 adds to the elements of the member."""
         structure = model.frame_structure
-        elements = elements_of(structure, place)
-        blocks = coupling_matrices(structure.properties.take(elements))
-        return proportional(Term("stiffness", ElementOperator(structure, elements, blocks)))
+        elements = ModelPlaces(model).elements(place)
+        blocks = structure.properties.take(elements).coupling_matrices()
+        return Change.proportional(Term("stiffness", ElementOperator(structure, elements, blocks)))

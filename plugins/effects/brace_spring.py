@@ -15,17 +15,16 @@ from femubench import Model
 from femubench.effect import (
     Change,
     FrameEffect,
+    ModelPlaces,
     Parameter,
+    Places,
     RowOperator,
     Site,
     Size,
     Term,
     elastic_band,
-    elongation_row,
-    pair_of,
-    proportional,
 )
-from femubench.fem import ACTIVE, Brace, Frame
+from femubench.fem import Brace, Frame
 
 _SHARE = 0.01  # of the squared lowest elastic frequency, as of springs to ground
 _MOST = 300
@@ -51,7 +50,7 @@ class BraceSpring(FrameEffect):
         frame = model.structure.frame
         body = dict(frame.joint_index)  # the number of the rigid body that links make of joints
         for link in frame.links:
-            if len(link.motions) in (0, len(ACTIVE[frame.plane])):
+            if len(link.motions) in (0, len(frame.active)):
                 taken = {body[name] for name in (link.leads, *link.follows)}
                 body = {name: min(taken) if own in taken else own for name, own in body.items()}
         joined = {frozenset(body[name] for name in member.ends) for member in frame.members}
@@ -76,12 +75,12 @@ class BraceSpring(FrameEffect):
         """Return the frame with the brace."""
         if not values[0]:
             return frame
-        return replace(frame, braces=(*frame.braces, Brace(pair_of(frame, place), values[0])))
+        return replace(frame, braces=(*frame.braces, Brace(Places(frame).pair(place), values[0])))
 
     def change(self, model: Model, place: str) -> Change:
         """Return the stiffness matrix of 1 N/m."""
-        row = elongation_row(model, pair_of(model.frame_structure.frame, place))
-        return proportional(Term("stiffness", RowOperator(row, np.eye(1))))
+        row = ModelPlaces(model).elongation(Places(model.frame_structure.frame).pair(place))
+        return Change.proportional(Term("stiffness", RowOperator(row, np.eye(1))))
 
 
 def _in_line(frame: Frame, body: Mapping[str, int]) -> set[frozenset[int]]:

@@ -10,16 +10,8 @@ from typing import ClassVar
 import numpy as np
 
 from femubench import Model, solve_modes
-from femubench.effect import (
-    Change,
-    FrameEffect,
-    Parameter,
-    Size,
-    once_for,
-    proportional,
-    sparse_term,
-)
-from femubench.fem import Frame, ModelError, SparseArray, gravity_stiffness
+from femubench.effect import Change, FrameEffect, Parameter, Size, Term, once_for
+from femubench.fem import Frame, GeometricStiffness, ModelError, SparseArray
 
 # Beyond the own weight there may be loads that stand on it; what stands is safe from buckling
 # by three times its weight and more.
@@ -71,9 +63,9 @@ class GravityStiffness(FrameEffect):
     def change(self, model: Model, place: str) -> Change:
         """Return the geometric stiffness of the weight."""
         now = model.frame_structure.frame.gravity
-        return proportional(sparse_term("stiffness", _unit(model)), neutral=now)
+        return Change.proportional(Term.of("stiffness", _unit(model)), neutral=now)
 
 
 def _unit(model: Model) -> SparseArray:
     """Return the geometric stiffness of the weight, worked out once."""
-    return once_for(model, "weight", lambda: gravity_stiffness(model.frame_structure))
+    return once_for(model, "weight", lambda: GeometricStiffness(model.frame_structure).of_weight())

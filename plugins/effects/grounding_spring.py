@@ -12,17 +12,14 @@ from femubench import Model
 from femubench.effect import (
     Change,
     FrameEffect,
+    ModelPlaces,
     Parameter,
+    Places,
     RowOperator,
     Site,
     Size,
     Term,
     elastic_band,
-    find_directed_point,
-    list_directed_places,
-    point_places,
-    proportional,
-    translation_rows,
 )
 from femubench.fem import Frame, GroundSpring
 
@@ -41,7 +38,7 @@ class GroundingSpring(FrameEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the points, or nodes, in each direction that they can move in."""
-        return list_directed_places(model, point_places(model))
+        return ModelPlaces(model).directed(ModelPlaces(model).points())
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the stiffness; at its scale the lowest frequency rises by about a percent."""
@@ -52,16 +49,16 @@ class GroundingSpring(FrameEffect):
         """Return the frame with the spring."""
         if not values[0]:
             return frame
-        at, direction = find_directed_point(frame, place)
+        at, direction = Places(frame).directed_point(place)
         return replace(frame, springs=(*frame.springs, GroundSpring(at, direction, values[0])))
 
     def extend_matrices(self, model: Model, place: str, values: Sequence[float]) -> Model:
         """Return the model with the spring in it."""
-        at, direction = find_directed_point(model, place)
+        at, direction = ModelPlaces(model).directed_point(place)
         return model.attach([], [GroundSpring(at, direction, values[0])])
 
     def change(self, model: Model, place: str) -> Change:
         """Return the stiffness matrix of 1 N/m."""
-        at, direction = find_directed_point(model, place)
-        row = translation_rows(model, at, [direction])
-        return proportional(Term("stiffness", RowOperator(row, np.eye(1))))
+        at, direction = ModelPlaces(model).directed_point(place)
+        row = ModelPlaces(model).translations(at, [direction])
+        return Change.proportional(Term("stiffness", RowOperator(row, np.eye(1))))

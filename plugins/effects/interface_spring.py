@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -13,22 +14,20 @@ from femubench import Model
 from femubench.effect import (
     Change,
     FrameEffect,
+    ModelPlaces,
     Parameter,
     RowOperator,
     Site,
     Size,
     Term,
     elastic_band,
-    facing_nodes,
-    interface_directions,
-    interface_places,
-    node_pairs,
-    proportional,
-    translation_rows,
+    once_for,
 )
-from femubench.fem import Brace, Frame, Place, SparseArray
+from femubench.fem import Brace, Frame, ModelError, Place, SparseArray
 
 _SHARE = 0.01  # of the squared lowest elastic frequency
+_TOUCHING = 1e-6  # m
+_MOST = 300  # pairs
 
 
 class InterfaceSpring(FrameEffect):
@@ -44,7 +43,7 @@ class InterfaceSpring(FrameEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the pairs of nodes that share a place, and all of them together."""
-        return interface_places(model, facing_nodes(model))
+        return _words(model, once_for(model, "facing nodes", lambda: _facing(model)))
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the stiffness of each spring."""
@@ -58,8 +57,8 @@ class InterfaceSpring(FrameEffect):
             return frame
         found = tuple(
             Brace(pair, values[0], direction)
-            for pair in node_pairs(model, place)
-            for direction in interface_directions(model, place)
+            for pair in ModelPlaces(model).node_pairs(place)
+            for direction in ModelPlaces(model).pair_directions(place)
         )
         return replace(frame, braces=(*frame.braces, *found))
 
@@ -71,15 +70,44 @@ class InterfaceSpring(FrameEffect):
     def change(self, model: Model, place: str) -> Change:
         """Return the stiffness matrix of springs of 1 N/m."""
         rows = _rows(model, place)
-        return proportional(Term("stiffness", RowOperator(rows, np.eye(rows.shape[0]))))
+        return Change.proportional(Term("stiffness", RowOperator(rows, np.eye(rows.shape[0]))))
 
 
 def _rows(model: Model, place: str) -> SparseArray:
     """Return how much the nodes of each pair move apart in each direction, sparse (p, n)."""
-    directions = interface_directions(model, place)
+    directions = ModelPlaces(model).pair_directions(place)
     rows = [
-        translation_rows(model, Place(joint=last), directions)
-        - translation_rows(model, Place(joint=first), directions)
-        for first, last in node_pairs(model, place)
+        ModelPlaces(model).translations(Place(joint=last), directions)
+        - ModelPlaces(model).translations(Place(joint=first), directions)
+        for first, last in ModelPlaces(model).node_pairs(place)
     ]
     return sp.csr_array(sp.vstack(rows))
+
+
+def _facing(model: Model) -> tuple[tuple[str, str], ...]:
+    """Return the pairs of joints or nodes that share a place, 300 at most.
+
+    Of more than two at one place each pairs with the next.
+    """
+    at: dict[tuple[float, ...], list[str]] = {}
+    for name, xyz in ModelPlaces(model).nodes.items():
+        at.setdefault(tuple(np.round(xyz / _TOUCHING).tolist()), []).append(name)
+    pairs = [pair for names in at.values() for pair in pairwise(names)]
+    return tuple(pairs[:_MOST])
+
+
+def _words(model: Model, pairs: Sequence[tuple[str, str]]) -> tuple[str, ...]:
+    """Return the words of pairs of nodes, of each direction, and of all of them together."""
+    words = [f"{first}-{last}" for first, last in pairs]
+    if len(pairs) > 1:
+        sides = ("+".join(names) for names in zip(*pairs, strict=True))
+        words.insert(0, "-".join(sides))
+    found = []
+    for word in words:
+        try:
+            directions = ModelPlaces(model).pair_directions(word)
+        except ModelError:
+            continue
+        found.append(word)
+        found += [f"{word}:{d}" for d in directions] if len(directions) > 1 else []
+    return tuple(found)

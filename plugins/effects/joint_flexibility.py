@@ -9,17 +9,15 @@ import numpy as np
 
 from femubench import Model
 from femubench.effect import (
-    APART,
     Change,
     FrameEffect,
     Parameter,
+    Places,
     Size,
-    end_stiffness,
-    flexible_ends_change,
-    soften_ends,
 )
-from femubench.fem import ACTIVE, FloatArray, Frame, Structure
-from femubench.update import JointGroup, joint_groups
+from femubench.fem import FloatArray, Frame, Structure
+from femubench.plugins.effects.flexible_ends import end_stiffness, flexible_ends_change, soften_ends
+from femubench.update import JointGroup, Joints
 
 _SOFTEST = 1e-3  # of the scale
 _TORSION, _BENDING = ("rx",), ("ry", "rz")
@@ -47,7 +45,7 @@ class JointFlexibility(FrameEffect):
 
     def finer(self, model: Model, place: str) -> Sequence[str]:
         """Return the place with a factor for every type."""
-        return () if place.endswith(APART) else (f"{place}{APART}",)
+        return () if place.endswith(Places.APART) else (f"{place}{Places.APART}",)
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the multiple of 4 EI/L and GJ/L, and the factors of the types as their ln."""
@@ -60,7 +58,7 @@ class JointFlexibility(FrameEffect):
             scaling="compliance",
             one_sided=True,
         )
-        groups = _groups(model.frame_structure) if place.endswith(APART) else ()
+        groups = _groups(model.frame_structure) if place.endswith(Places.APART) else ()
         factors = (
             Parameter(f"ln of {group.name} over all", "", _SPREAD, 0.0, -_WIDEST, _WIDEST)
             for group in groups
@@ -98,8 +96,7 @@ def _groups(structure: Structure) -> tuple[JointGroup, ...]:
     Of joints of one type `joint-rotation` is there. Springs at both ends of an element cannot be
     condensed one by one: its ends must be of one type.
     """
-    frame = structure.frame
-    groups = tuple(group for group in joint_groups(frame) if group.role != "through")
+    groups = tuple(group for group in Joints(structure).groups() if group.role != "through")
     owner: dict[int, str] = {}
     for group in groups:
         for end in group.ends:
@@ -116,7 +113,7 @@ def _multiples(values: FloatArray, count: int) -> FloatArray:
 
 def _parts(frame: Frame) -> tuple[tuple[str, ...], ...]:
     """Return the local directions of bending, and of torsion where the plane has it."""
-    active = ACTIVE[frame.plane]
+    active = frame.active
     parts = (tuple(d for d in group if d in active) for group in (_BENDING, _TORSION))
     return tuple(part for part in parts if part)
 

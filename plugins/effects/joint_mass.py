@@ -7,17 +7,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 from femubench import Model
-from femubench.effect import (
-    Change,
-    FrameEffect,
-    Parameter,
-    Site,
-    Size,
-    joints_of,
-    mass_term,
-    proportional,
-    type_places,
-)
+from femubench.effect import Change, FrameEffect, ModelPlaces, Parameter, Places, Site, Size
 from femubench.fem import Frame, Place, PointMass
 
 _SHARE = 0.02  # of the structure's mass, over all joints
@@ -32,7 +22,7 @@ class JointMass(FrameEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the joint types that two joints at least are of."""
-        return () if model.structure is None else type_places(model.structure.frame)
+        return () if model.structure is None else Places(model.structure.frame).types()
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the mass at each joint."""
@@ -48,8 +38,10 @@ class JointMass(FrameEffect):
 
     def change(self, model: Model, place: str) -> Change:
         """Return the mass matrix of 1 kg at each joint."""
-        return proportional(mass_term(model, _points(model.frame_structure.frame, place)))
+        return Change.proportional(
+            ModelPlaces(model).mass_term(_points(model.frame_structure.frame, place))
+        )
 
 
 def _points(frame: Frame, place: str) -> tuple[Place, ...]:
-    return tuple(Place(joint=name) for name in joints_of(frame, place))
+    return tuple(Place(joint=name) for name in Places(frame).joints_of(place))

@@ -12,29 +12,18 @@ import numpy as np
 from femubench import Model
 from femubench.effect import (
     Change,
+    ChebyshevPoints,
     ElementOperator,
     FrameEffect,
     Parameter,
+    Places,
     Site,
     Size,
     Term,
-    chebyshev_nodes,
-    end_places,
-    ends_of,
-    joints_with_members,
-    member_length,
     once_for,
-    type_places,
 )
-from femubench.fem import (
-    FloatArray,
-    Frame,
-    IntArray,
-    RigidEnd,
-    Structure,
-    stiffness_matrices,
-)
-from femubench.update import available_length, half_depth
+from femubench.fem import FloatArray, Frame, IntArray, RigidEnd, Structure
+from femubench.update import Joints
 
 _SHARE = 0.02  # of the member, where sections are numbers
 _DIGITS = 9
@@ -57,12 +46,12 @@ class JointOffset(FrameEffect):
         if model.structure is None:
             return ()
         frame = model.structure.frame
-        return (*type_places(frame), *joints_with_members(frame), *end_places(frame))
+        return (*Places(frame).types(), *Places(frame).joints(), *Places(frame).ends())
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the length; the scale is half the depth of the crossing members."""
         structure = model.frame_structure
-        ends = ends_of(structure.frame, place)
+        ends = Places(structure.frame).ends_of(place)
         scale = float(np.mean([_scale(model, end) for end in ends]))
         upper = _longest(structure, ends)
         return (Parameter("length", "m", scale, lower=0.0, upper=upper, one_sided=True),)
@@ -72,7 +61,7 @@ class JointOffset(FrameEffect):
         if values[0] == 0.0:
             return frame
         rigid = {f"{r.member}@{r.joint}": r for r in frame.rigid_ends}
-        for end in ends_of(frame, place):
+        for end in Places(frame).ends_of(place):
             member, _, joint = end.rpartition("@")
             there = rigid.get(end, RigidEnd(joint, member, 0.0))
             rigid[end] = replace(there, stiffness_length=there.stiffness_length + values[0])
@@ -81,7 +70,7 @@ class JointOffset(FrameEffect):
     def change(self, model: Model, place: str) -> Change:
         """Return the stiffness of the end elements by powers of their flexible length."""
         structure = model.frame_structure
-        ends = ends_of(structure.frame, place)
+        ends = Places(structure.frame).ends_of(place)
         found: dict[int, list[float]] = {}
         for end in ends:
             element, side = structure.element_ends[end]
@@ -110,9 +99,9 @@ class JointOffset(FrameEffect):
 
 
 def _scale(model: Model, end: str) -> float:
-    frame = model.frame_structure.frame
-    depth = once_for(model, ("half depth", end), partial(half_depth, frame, end))
-    return depth if depth > 0.0 else _SHARE * member_length(frame, end.rpartition("@")[0])
+    structure = model.frame_structure
+    depth = once_for(model, ("half depth", end), partial(Joints(structure).half_depth, end))
+    return depth if depth > 0.0 else _SHARE * structure.frame.member_length(end.rpartition("@")[0])
 
 
 def _longest(structure: Structure, ends: Sequence[str]) -> float:
@@ -122,7 +111,7 @@ def _longest(structure: Structure, ends: Sequence[str]) -> float:
     for end in ends:
         element, side = structure.element_ends[end]
         there = float((p.rigid_1, p.rigid_2)[side][element])
-        room.append(available_length(structure, end) - max(0.0, there))
+        room.append(Joints(structure).available_length(end) - max(0.0, there))
     return max(min(room), 1e-9)
 
 
@@ -155,11 +144,11 @@ def _kept_blocks(
         p = model.frame_structure.properties.take(rows[fresh])
         # The functions are all but dependent where the shear of both planes is alike: the
         # smallest solution is the stable one.
-        nodes = chebyshev_nodes(0.0, longest, _SAMPLES)
+        nodes = ChebyshevPoints(0.0, longest, _SAMPLES).points
         many = p.take(np.tile(np.arange(len(p)), len(nodes)))
         more = (nodes[:, None, None] * sides[fresh]).reshape(-1, 2)
         rigid = {"rigid_1": many.rigid_1 + more[:, 0], "rigid_2": many.rigid_2 + more[:, 1]}
-        values = stiffness_matrices(replace(many, **rigid)).reshape(len(nodes), -1)
+        values = replace(many, **rigid).stiffness_matrices().reshape(len(nodes), -1)
         basis = _basis(key, nodes)
         weight = basis.max(axis=1)[:, None]
         fitted = np.linalg.lstsq(basis / weight, values / weight, rcond=1e-13)[0]

@@ -9,26 +9,22 @@ import numpy as np
 
 from femubench import Model
 from femubench.effect import (
-    APART,
     Change,
     FrameEffect,
     Parameter,
+    Places,
     Site,
     Size,
-    branch_places,
+)
+from femubench.fem import Frame, Structure
+from femubench.plugins.effects.flexible_ends import (
     end_arm,
-    end_places,
     end_room,
     end_stiffness,
-    ends_of,
     flexible_ends_change,
     free_arm_change,
-    joints_of,
-    joints_with_members,
     soften_ends,
-    type_places,
 )
-from femubench.fem import ACTIVE, Frame, Structure
 
 _SOFTEST = 1e-3  # of the scale
 _TORSION, _BENDING = ("rx",), ("ry", "rz")
@@ -56,21 +52,23 @@ class JointRotation(FrameEffect):
         if model.structure is None:
             return ()
         frame = model.structure.frame
-        types = (*type_places(frame), *branch_places(frame))
-        return (*types, *joints_with_members(frame), *end_places(frame))
+        types = (*Places(frame).types(), *Places(frame).branches())
+        return (*types, *Places(frame).joints(), *Places(frame).ends())
 
     def finer(self, model: Model, place: str) -> Sequence[str]:
         """Return the place with directions apart and a free arm, where these are more values."""
-        if place.endswith(APART):
+        if place.endswith(Places.APART):
             return ()
-        structure, free = model.frame_structure, f"{place}{APART}"
+        structure, free = model.frame_structure, f"{place}{Places.APART}"
         more = len(_parts(structure.frame, free)) > len(_parts(structure.frame, place))
         return (free,) if more or _longest(structure, place) > 1.0 else ()
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the stiffnesses, with the members' own as scale, 4 EI/L and GJ/L, and the arm."""
         structure = model.frame_structure
-        own, lateral, torsion = end_stiffness(structure.frame, ends_of(structure.frame, place))
+        own, lateral, torsion = end_stiffness(
+            structure.frame, Places(structure.frame).ends_of(place)
+        )
         names = ("stiffness", "bending", "bending ry")
         scales = {**dict.fromkeys(names, own), "bending rz": lateral, "torsion": torsion}
         found = [
@@ -85,7 +83,7 @@ class JointRotation(FrameEffect):
             )
             for name in _parts(structure.frame, place)
         ]
-        if place.endswith(APART) and (longest := _longest(structure, place)) > 1.0:
+        if place.endswith(Places.APART) and (longest := _longest(structure, place)) > 1.0:
             # The textbook has half the depth of the crossing member.
             found.append(Parameter(_ARM, "", 0.5, 1.0, 0.0, longest, textbook=1.0))
         return tuple(found)
@@ -95,35 +93,35 @@ class JointRotation(FrameEffect):
         groups = _parts(frame, place).values()
         arm = values[len(groups)] if len(values) > len(groups) else 1.0
         own = {d: value for names, value in zip(groups, values, strict=False) for d in names}
-        return soften_ends(frame, dict.fromkeys(ends_of(frame, place), own), arm)
+        return soften_ends(frame, dict.fromkeys(Places(frame).ends_of(place), own), arm)
 
     def change(self, model: Model, place: str) -> Change:
         """Return the springs condensed into the end elements."""
         structure = model.frame_structure
-        ends, groups = ends_of(structure.frame, place), _parts(structure.frame, place)
+        ends, groups = Places(structure.frame).ends_of(place), _parts(structure.frame, place)
         parts = tuple(groups.values())
-        if place.endswith(APART) and (longest := _longest(structure, place)) > 1.0:
+        if place.endswith(Places.APART) and (longest := _longest(structure, place)) > 1.0:
             return free_arm_change(model, ends, parts, longest)
         return flexible_ends_change(model, ends, parts)
 
 
 def _parts(frame: Frame, place: str) -> dict[str, tuple[str, ...]]:
     """Return the local directions that belong to every stiffness, by its name."""
-    active = ACTIVE[frame.plane]
+    active = frame.active
     bending, torsion = (tuple(d for d in group if d in active) for group in (_BENDING, _TORSION))
-    if place.endswith(APART):
+    if place.endswith(Places.APART):
         names = ("bending",) if len(bending) == 1 else tuple(f"bending {d}" for d in bending)
         apart = {name: (d,) for name, d in zip(names, bending, strict=True)}
         return {**apart, **({"torsion": torsion} if torsion else {})}
     # The word first: to list the places takes a look at every joint.
-    branch = place.endswith(":branch") and place in branch_places(frame)
-    if torsion and (len(joints_of(frame, place)) > 1 or branch):
+    branch = place.endswith(":branch") and place in Places(frame).branches()
+    if torsion and (len(Places(frame).joints_of(place)) > 1 or branch):
         return {"bending": bending, "torsion": torsion}
     return {"stiffness": (*torsion, *bending)}
 
 
 def _longest(structure: Structure, place: str) -> float:
     """Return how long the arm may be, as a multiple of half a depth; 0 where there is none."""
-    ends = ends_of(structure.frame, place)
+    ends = Places(structure.frame).ends_of(place)
     arms = [(end_arm(structure, end), end_room(structure, end)) for end in ends]
     return min((min(_LONGEST, room / arm) for arm, room in arms if arm > 0.0), default=0.0)

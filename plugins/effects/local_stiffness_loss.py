@@ -13,16 +13,14 @@ from femubench.effect import (
     Change,
     ElementOperator,
     FrameEffect,
+    ModelPlaces,
     Parameter,
+    Places,
     Size,
     Term,
-    element_labels,
-    elements_of,
     once_for,
-    proportional,
-    tabulate_change,
 )
-from femubench.fem import Factor, Frame, halves_of, stiffness_matrices
+from femubench.fem import Factor, Frame
 
 _LOSS = Parameter("loss", "", 0.3, lower=0.0, upper=0.95, one_sided=True, wording="share")
 
@@ -36,11 +34,11 @@ class LocalStiffnessLoss(FrameEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return every element."""
-        return () if model.structure is None else element_labels(model.structure.frame)
+        return () if model.structure is None else Places(model.structure.frame).elements()
 
     def finer(self, model: Model, place: str) -> Sequence[str]:
         """Return the halves of the element: damage ends where it likes, not at a node."""
-        return halves_of(place)
+        return Places.halves(place)
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the fraction that is lost."""
@@ -60,12 +58,12 @@ class LocalStiffnessLoss(FrameEffect):
 
     def change(self, model: Model, place: str) -> Change:
         """Return the stiffness of the element with a minus sign."""
-        if not halves_of(place):
-            return tabulate_change(self, model, place, self.parameters(model, place))
+        if not Places.halves(place):
+            return self.tabulate(model, place)
         structure = model.frame_structure
-        rows = elements_of(structure, place)
+        rows = ModelPlaces(model).elements(place)
         whole = once_for(
-            model, "element stiffness", lambda: stiffness_matrices(structure.properties)
+            model, "element stiffness", lambda: structure.properties.stiffness_matrices()
         )
         lost = ElementOperator(structure, rows, whole, share=-np.ones(len(rows)), kind=rows)
-        return proportional(Term("stiffness", lost))
+        return Change.proportional(Term("stiffness", lost))

@@ -13,22 +13,14 @@ from femubench.effect import (
     Change,
     ElementOperator,
     FrameEffect,
+    ModelPlaces,
     Parameter,
     Site,
     Size,
     Term,
-    elements_of,
     once_for,
 )
-from femubench.fem import (
-    Eccentricity,
-    FloatArray,
-    Frame,
-    IntArray,
-    Section,
-    Structure,
-    eccentric_mass_parts,
-)
+from femubench.fem import Eccentricity, FloatArray, Frame, IntArray, Section, Structure
 
 _SCALE, _BOUND = 0.15, 1.0  # of the size of the section
 
@@ -65,7 +57,7 @@ class MassEccentricity(FrameEffect):
         """Return what is linear and what is quadratic in the offset, on top of a known one."""
         structure = model.frame_structure
         axis = axis_of(structure.frame)
-        elements = elements_of(structure, place)
+        elements = ModelPlaces(model).elements(place)
         parts, kind = once_for(model, "eccentric mass", lambda: _parts(structure, axis))
         own, other = structure.properties.ecc_y[elements], structure.properties.ecc_z[elements]
         own, other = (own, other) if axis == "y" else (other, own)
@@ -80,7 +72,7 @@ class MassEccentricity(FrameEffect):
 def _parts(structure: Structure, axis: Literal["y", "z"]) -> tuple[FloatArray, IntArray]:
     """Return what is linear, quadratic and mixed by kinds of elements, and each one's kind."""
     first, kind = structure.properties.alike()
-    found = eccentric_mass_parts(structure.properties.take(first))
+    found = structure.properties.take(first).eccentric_mass_parts()
     return np.stack([found[name] for name in (axis, 2 * axis, "yz")], axis=1), kind
 
 

@@ -13,19 +13,16 @@ from femubench import Model
 from femubench.effect import (
     Change,
     FrameEffect,
+    ModelPlaces,
     Parameter,
+    Places,
     RowOperator,
     Site,
     Size,
     Term,
     once_for,
-    point_in,
-    point_motion,
-    point_of,
-    point_places,
-    translation_rows,
 )
-from femubench.fem import ACTIVE, FloatArray, Frame, Member, PointMass, SparseArray, member_axes
+from femubench.fem import FloatArray, Frame, Member, PointMass, SparseArray
 from femubench.plugins.effects.mass_eccentricity import section_size
 
 _SHARE = 0.005  # of the structure's mass
@@ -51,7 +48,7 @@ class MassOffset(FrameEffect):
         """Return the points along the members at which an arm can be felt."""
         if model.structure is None:
             return ()
-        along = [at for at in point_places(model) if "@" in at]
+        along = [at for at in ModelPlaces(model).points() if "@" in at]
         # Asked for with every likely added mass, and the same for all of them.
         return once_for(
             model,
@@ -76,13 +73,13 @@ class MassOffset(FrameEffect):
         if not values[0]:
             return frame
         x, y, z = (float(v) for v in values[1] * _across(frame, place))
-        mass = PointMass(point_of(frame, place), values[0], (x, y, z))
+        mass = PointMass(Places(frame).point(place), values[0], (x, y, z))
         return replace(frame, masses=(*frame.masses, mass))
 
     def change(self, model: Model, place: str) -> Change:
         """Return what 1 kg does at the point, what is linear and what is quadratic in the arm."""
-        at = point_in(model, place)
-        own = translation_rows(model, at, _directions(model))
+        at = ModelPlaces(model).point(place)
+        own = ModelPlaces(model).translations(at, _directions(model))
         turned = _arm_rows(model, place)
         rows = sp.csr_array(sp.vstack([own, turned]))
         p = own.shape[0]
@@ -102,23 +99,23 @@ class MassOffset(FrameEffect):
 
 
 def _directions(model: Model) -> list[str]:
-    return [d for d in ACTIVE[model.frame_structure.frame.plane] if d in "xyz"]
+    return [d for d in model.frame_structure.frame.active if d in "xyz"]
 
 
 def _member_at(frame: Frame, place: str) -> Member:
-    return frame.members[frame.member_index[str(point_of(frame, place).member)]]
+    return frame.members[frame.member_index[str(Places(frame).point(place).member)]]
 
 
 def _across(frame: Frame, place: str) -> FloatArray:
     """Return the direction of an arm, global, (3,); an arm up is not felt out of plane."""
-    axes, _ = member_axes(frame, _member_at(frame, place))
+    axes = Places(frame).axes(_member_at(frame, place))
     return np.asarray(axes[1] if frame.plane == "out-of-plane" else axes[2])
 
 
 def _arm_rows(model: Model, place: str) -> SparseArray:
     """Return how much more than its point the end of an arm of 1 m moves, sparse (p, n)."""
-    at = point_in(model, place)
+    at = ModelPlaces(model).point(place)
     x, y, z = _across(model.frame_structure.frame, place)
     lever = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
     kept = ["xyz".index(direction) for direction in _directions(model)]
-    return sp.csr_array(sp.csr_array(lever[kept]) @ point_motion(model, at)[3:])
+    return sp.csr_array(sp.csr_array(lever[kept]) @ ModelPlaces(model).motion(at)[3:])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -15,31 +14,16 @@ from femubench.effect import (
     ElementOperator,
     FrameEffect,
     LookWarning,
-    MatrixOperator,
+    ModelPlaces,
     Parameter,
+    Places,
     Seen,
     Size,
     Term,
-    elements_of,
-    member_labels,
-    members_of,
     once_for,
-    proportional,
-    set_places,
 )
-from femubench.fem import (
-    GROUP,
-    FloatArray,
-    Frame,
-    Member,
-    Property,
-    group_matrix,
-    group_places,
-    mass_matrices,
-    stiffness_matrices,
-    with_group_factors,
-)
-from femubench.modal import group_prior_std, largest_factor, support_groups
+from femubench.fem import FloatArray, Frame, Groups, Member, Property
+from femubench.modal import GroupPriors
 
 _SURE = 3.0  # standard deviations of the weighed mass
 
@@ -56,22 +40,22 @@ class MaterialEffect(FrameEffect):
     def places(self, model: Model) -> Sequence[str]:
         """Return the whole structure, and the members of every material where there are more."""
         structure = model.structure
-        return ("all", *(() if structure is None else set_places(structure.frame, ("material",))))
+        return ("all", *(() if structure is None else Places(structure.frame).sets(("material",))))
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the relative change; of a group with a prior of its own, that of a factor."""
         name = f"change of {self.constant}"
-        group = place.removeprefix(GROUP)
-        known = {*model.group_priors, *model.group_kinds, *support_groups(model)}
-        if model.structure is None and place.startswith(GROUP) and group in known:
-            most = largest_factor(model, group) if self.constant == "E" else np.inf
-            given = group_prior_std(model, group), 0.0, -np.inf, most - 1.0
+        group = place.removeprefix(Groups.PREFIX)
+        known = {*model.group_priors, *model.group_kinds, *GroupPriors(model).supports}
+        if model.structure is None and place.startswith(Groups.PREFIX) and group in known:
+            most = GroupPriors(model).largest_factor(group) if self.constant == "E" else np.inf
+            given = GroupPriors(model).std(group), 0.0, -np.inf, most - 1.0
             return (Parameter(name, "", *given, scaling="factor", wording="change"),)
         return (Parameter(name, "", 0.1, lower=-0.9, wording="change"),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with another material in the members."""
-        named = members_of(frame, place)
+        named = Places(frame).members(place)
         members = tuple(
             self._scaled(member, 1.0 + values[0]) if member.name in named else member
             for member in frame.members
@@ -85,22 +69,25 @@ class MaterialEffect(FrameEffect):
     def extend_matrices(self, model: Model, place: str, values: Sequence[float]) -> Model:
         """Return the model with its matrices scaled as they are."""
         quantity = "E" if self.constant == "E" else "density"
-        return with_group_factors(model, [Property(place, quantity, (place,))], [1.0 + values[0]])
+        return Groups(model).with_factors([Property(place, quantity, (place,))], [1.0 + values[0]])
 
     def change(self, model: Model, place: str) -> Change:
         """Return the matrices of the elements, exactly proportional to the change."""
         kind: Literal["mass", "stiffness"] = "stiffness" if self.constant == "E" else "mass"
         structure = model.structure
         if structure is not None:
-            rows = elements_of(structure, place, arms=True)
-            matrices = stiffness_matrices if self.constant == "E" else mass_matrices
-            whole = once_for(model, f"element {kind}", partial(matrices, structure.properties))
-            return proportional(Term(kind, ElementOperator(structure, rows, whole, kind=rows)))
-        parts = [group_matrix(model, kind, place)]
+            rows = ModelPlaces(model).elements(place, arms=True)
+            p = structure.properties
+            matrices = p.stiffness_matrices if self.constant == "E" else p.mass_matrices
+            whole = once_for(model, f"element {kind}", matrices)
+            return Change.proportional(
+                Term(kind, ElementOperator(structure, rows, whole, kind=rows))
+            )
+        parts = [Groups(model).matrix(kind, place)]
         low_rank = model.stiffness_change if self.constant == "E" else model.mass_change
         if low_rank is not None and place == "all":
             parts.append(low_rank)
-        return proportional(*(Term(kind, MatrixOperator(part)) for part in parts))
+        return Change.proportional(*(Term.of(kind, part) for part in parts))
 
 
 class YoungsModulus(MaterialEffect):
@@ -162,7 +149,7 @@ class MemberStiffness(MaterialEffect):
     def places(self, model: Model) -> Sequence[str]:
         """Return members and families, or the groups; a single one is `youngs-modulus`."""
         if model.structure is None:
-            return group_places(model, "stiffness")
+            return Groups(model).places("stiffness")
         parts = _parts(model.structure.frame)
         return parts if len(parts) > 1 else ()
 
@@ -193,9 +180,9 @@ class GroupMass(MaterialEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the groups of the mass."""
-        return group_places(model, "mass")
+        return Groups(model).places("mass")
 
 
 def _parts(frame: Frame) -> tuple[str, ...]:
     """Return the members, then sets and sections of more than one."""
-    return (*member_labels(frame), *set_places(frame))
+    return (*frame.member_index, *Places(frame).sets())

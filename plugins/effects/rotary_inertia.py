@@ -14,14 +14,13 @@ from femubench.effect import (
     ElementOperator,
     FrameEffect,
     LookWarning,
+    ModelPlaces,
     Parameter,
     Seen,
     Size,
     Term,
-    elements_of,
-    proportional,
 )
-from femubench.fem import Frame, mass_matrices
+from femubench.fem import Frame
 
 
 class RotaryInertia(FrameEffect):
@@ -64,10 +63,10 @@ class RotaryInertia(FrameEffect):
         """Return the mass matrix of the textbook's rotary inertia."""
         structure = model.frame_structure
         whole = structure.rebuilt(self.frame(structure.frame, place, (1.0,)))
-        rows = elements_of(whole, place)
+        rows = ModelPlaces(model).elements(place)
         own = whole.properties.take(rows)
         none = np.zeros(len(own))
         without = own.scale("rhoIy", none).scale("rhoIz", none)
-        blocks = mass_matrices(own) - mass_matrices(without)
+        blocks = own.mass_matrices() - without.mass_matrices()
         term = Term("mass", ElementOperator(structure, rows, blocks))
-        return proportional(term, neutral=structure.frame.rotary_share)
+        return Change.proportional(term, neutral=structure.frame.rotary_share)

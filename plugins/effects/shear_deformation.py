@@ -18,18 +18,9 @@ from femubench.effect import (
     Seen,
     Size,
     Term,
-    proportional,
-    rate_nodes,
 )
-from femubench.fem import (
-    BeamProperties,
-    Factor,
-    FloatArray,
-    Frame,
-    constant_kappa,
-    mass_matrices,
-    stiffness_matrices,
-)
+from femubench.fem import BeamProperties, Factor, FloatArray, Frame, Section
+from femubench.plugins.effects.flexible_ends import rate_nodes
 
 _KAPPA = 5.0 / 6.0  # of a rectangle, for sections of unknown shape
 _AT_ALL = ("all",)
@@ -75,7 +66,7 @@ class ShearDeformation(FrameEffect):
         members = tuple(
             m
             if m.section.kappa is not None
-            else replace(m, section=replace(m.section, kappa=constant_kappa(_KAPPA)))
+            else replace(m, section=replace(m.section, kappa=Section.constant_kappa(_KAPPA)))
             for m in frame.members
         )
         own = () if share == 1.0 else (Factor("shear", _AT_ALL, share),)
@@ -119,7 +110,7 @@ class ShearDeformation(FrameEffect):
                         rates.append(float(node))
                         powers.append(power)
         if not terms:
-            return proportional()
+            return Change.proportional()
         rate, power_of = np.array(rates), np.array(powers)
 
         def coefficients(values: FloatArray) -> FloatArray:
@@ -148,7 +139,7 @@ def _by_flexibility(seen: Seen, frame: Frame) -> FloatArray:
     whole = structure.rebuilt(frame).properties
     modes = seen.modes.take(np.arange(seen.count))
     local = np.asarray(structure.gather @ modes.shapes).reshape(len(whole), 12, -1)
-    force = stiffness_matrices(structure.properties)[:, 1:3] @ local
+    force = structure.properties.stiffness_matrices()[:, 1:3] @ local
     flexibility = np.column_stack([whole.flex_y, whole.flex_z])
     length = whole.length - whole.rigid_1 - whole.rigid_2
     work = np.einsum("e,ed,edm->m", length, flexibility, np.square(force))
@@ -177,8 +168,8 @@ def _parts(
     other = [
         replace(p, **{**none, shear: value / phi * getattr(p, shear)}) for value in (0.0, 1.0, 3.0)
     ]
-    stiff = [stiffness_matrices(own) for own in other]
-    heavy = [mass_matrices(own) for own in other]
+    stiff = [own.stiffness_matrices() for own in other]
+    heavy = [own.mass_matrices() for own in other]
     first, second = heavy[0] - heavy[1], heavy[1] - heavy[2]
     square = (first - 2.0 * second) / 0.375
     return [

@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from femubench import Model
-from femubench.effect import Change, FrameEffect, Parameter, Term, point_of, split_direction
-from femubench.fem import FloatArray, Frame, GroundSpring, Member, Place
+from femubench.effect import Change, FrameEffect, Parameter, Places, Term
+from femubench.fem import FloatArray, Frame, GroundSpring, Member
 from femubench.plugins.effects.support_position import (
     POWERS,
     Beam,
@@ -80,7 +80,7 @@ class SupportAdded(FrameEffect):
         if not values[0]:
             return frame
         beam, x, _, direction = _line(frame, place)
-        at = point_of(frame, str(beam.place(x + values[1])))
+        at = Places(frame).point(str(beam.place(x + values[1])))
         return replace(frame, springs=(*frame.springs, GroundSpring(at, direction, values[0])))
 
     def change(self, model: Model, place: str) -> Change:
@@ -106,9 +106,9 @@ class SupportAdded(FrameEffect):
 
 def _line(frame: Frame, place: str) -> tuple[Beam, float, Member, str]:
     """Return the beam at a place, where on it that is in m, the member there, and a direction."""
-    word, direction = split_direction(place)
-    name, _, station = word.rpartition("@")
+    at, direction = Places(frame).directed_point(place)
+    name = place.rpartition("@")[0]
     beam = beam_of(frame, name)
-    x = beam.position(frame, Place(member=name, s=float(station)))
+    x = beam.position(frame, at)
     assert x is not None
-    return beam, x, frame.members[frame.member_index[name]], direction or "z"
+    return beam, x, frame.members[frame.member_index[name]], direction

@@ -13,15 +13,12 @@ from femubench.effect import (
     Change,
     FrameEffect,
     Parameter,
+    Places,
     Site,
     Size,
-    flexible_supports_change,
-    members_at,
-    soften_supports,
-    support_places,
-    supports_of,
 )
-from femubench.fem import FloatArray, Frame, Member, member_axes
+from femubench.fem import FloatArray, Frame, Member
+from femubench.plugins.effects.flexible_supports import flexible_supports_change, soften_supports
 
 _SOFTEST = 1e-3  # of the scale
 _TRANSLATIONS, _ROTATIONS = ("x", "y", "z"), ("rx", "ry", "rz")
@@ -51,7 +48,7 @@ class SupportFlexibility(FrameEffect):
         if model.structure is None:
             return ()
         frame = model.structure.frame
-        return tuple(place for place in support_places(frame) if _parts(frame, place))
+        return tuple(place for place in Places(frame).supports() if _parts(frame, place))
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the stiffnesses; the scale is that of what is held, or of the springs there."""
@@ -91,7 +88,7 @@ def _parts(frame: Frame, place: str) -> dict[tuple[str, str], _Held]:
     """
     held = {
         (word, direction): stiffness
-        for word, own in supports_of(frame, place).items()
+        for word, own in Places(frame).supports_of(place).items()
         for direction, stiffness in own.items()
         if np.isfinite(stiffness) or _resistance(frame, word, direction) > 0.0
     }
@@ -115,14 +112,14 @@ def _scale(frame: Frame, held: _Held) -> float:
 def _resistance(frame: Frame, word: str, direction: str) -> float:
     """Return the mean stiffness of whole members against a motion of a support."""
     kind, axis = divmod((*_TRANSLATIONS, *_ROTATIONS).index(direction), 3)
-    members = members_at(frame, f"support:{word}")
-    turns = [np.asarray(member_axes(frame, m)[0][:, axis] ** 2) for m in members]
+    members = Places(frame).members_at(f"support:{word}")
+    turns = [np.asarray(Places(frame).axes(m)[:, axis] ** 2) for m in members]
     return float(np.mean([_own(frame, m)[kind] @ t for m, t in zip(members, turns, strict=True)]))
 
 
 def _own(frame: Frame, member: Member) -> FloatArray:
     """Return EA/L and 12 EI/L^3 above GJ/L and 4 EI/L along a member's axes, (2, 3)."""
-    s, m, length = member.section, member.material, member_axes(frame, member)[1]
+    s, m, length = member.section, member.material, frame.member_length(member.name)
     lateral = s.Iz or s.Iy
     twist = m.G * s.J / length or 4.0 * m.E * s.Iy / length
     return np.array(

@@ -11,18 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench import Model
-from femubench.effect import (
-    Change,
-    FrameEffect,
-    Parameter,
-    RowOperator,
-    Term,
-    member_length,
-    point_motion,
-    point_of,
-    release_supports,
-    supports_of,
-)
+from femubench.effect import Change, FrameEffect, ModelPlaces, Parameter, Places, RowOperator, Term
 from femubench.fem import (
     FloatArray,
     Frame,
@@ -31,8 +20,8 @@ from femubench.fem import (
     ModelError,
     Place,
     SparseArray,
-    member_axes,
 )
+from femubench.plugins.effects.flexible_supports import release_supports
 
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 _ACROSS = 0.7  # cosine of the angle between a member and what a support on it holds, at most
@@ -124,12 +113,12 @@ def beam_of(frame: Frame, member: str) -> Beam:
         while (more := following()) is not None:
             line.append(more)
         line = [(name, not along) for name, along in reversed(line)]
-    lengths = [member_length(frame, name) for name, _ in line]
+    lengths = [frame.member_length(name) for name, _ in line]
     return Beam(tuple(line), tuple(np.concatenate([[0.0], np.cumsum(lengths)]).tolist()))
 
 
 def _along(frame: Frame, member: Member) -> FloatArray:
-    return np.asarray(member_axes(frame, member)[0][0])
+    return np.asarray(Places(frame).axes(member)[0])
 
 
 def directions_across(frame: Frame, name: str) -> list[str]:
@@ -189,7 +178,7 @@ class Track:
         for low, high in pairwise(grid):
             points = [beam.place(float(low + (high - low) * s)) for s in share]
             axis = _AXES.index(direction)
-            seen = sp.vstack([point_motion(model, at)[[axis]] for at in points])
+            seen = sp.vstack([ModelPlaces(model).motion(at)[[axis]] for at in points])
             found.append(sp.csr_array(sp.csr_array(inverse) @ seen))
         # An interval of several elements has nodes inside that give.
         compliance = _bending_compliance(model, beam, grid, direction) * every
@@ -245,12 +234,12 @@ def _spot_of(frame: Frame, word: str) -> _Spot | None:
     a member merely lies on one that holds it across. At a joint with members to the side it is a
     support of the joint.
     """
-    held = supports_of(frame, f"support:{word}")[word]
-    at = point_of(frame, word)
+    held = Places(frame).supports_of(f"support:{word}")[word]
+    at = Places(frame).point(word)
     around = [at.member] if at.member else list(frame.ends_at(str(at.joint)))
     if not around or len(around) > 2 or not all(np.isinf(list(held.values()))):
         return None
-    others = [w for w in supports_of(frame, "support:all") if w != word]
+    others = [w for w in Places(frame).supports_of("support:all") if w != word]
     beam = beam_of(frame, str(around[0]))
     names = dict(beam.members)
     if not set(around) <= set(names) or not all(
@@ -260,7 +249,7 @@ def _spot_of(frame: Frame, word: str) -> _Spot | None:
 
     x, total = float(beam.position(frame, at) or 0.0), beam.ends[-1]
     margin, bounds = _MARGIN * total, [(0.0, 0.0), (total, 0.0)]
-    found = (beam.position(frame, point_of(frame, other)) for other in others)
+    found = (beam.position(frame, Places(frame).point(other)) for other in others)
     bounds += [(other, margin) for other in found if other is not None]
     low = max((b + m for b, m in bounds if b < x - _SAME), default=x)
     high = min((b - m for b, m in bounds if b > x + _SAME), default=x)
@@ -288,7 +277,7 @@ class SupportPosition(FrameEffect):
         if model.structure is None or not model.structure.frame.supports:
             return ()
         frame = model.structure.frame
-        words = supports_of(frame, "support:all")
+        words = Places(frame).supports_of("support:all")
         return tuple(f"support:{word}" for word in words if _spot_of(frame, word))[:_MOST]
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
@@ -312,9 +301,9 @@ class SupportPosition(FrameEffect):
         if values[0] == 0.0:
             return frame
         spot, word = _spot(frame, place), place.removeprefix("support:")
-        at = point_of(frame, str(spot.beam.place(spot.x + spot.inward * values[0])))
+        at = Places(frame).point(str(spot.beam.place(spot.x + spot.inward * values[0])))
         supports = (
-            replace(s, at=at) if str(point_of(frame, str(s.at))) == word else s
+            replace(s, at=at) if str(Places(frame).point(str(s.at))) == word else s
             for s in frame.supports
         )
         return replace(frame, supports=tuple(supports))

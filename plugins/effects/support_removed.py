@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from femubench import Model
-from femubench.effect import Parameter, Size, point_of, supports_of
+from femubench.effect import Parameter, Places, Size
 from femubench.fem import FloatArray, Frame
 from femubench.plugins.effects.support_flexibility import SupportFlexibility
 
@@ -36,7 +36,7 @@ class SupportRemoved(SupportFlexibility):
         if model.structure is None or not model.structure.frame.supports:
             return ()
         frame = model.structure.frame
-        held = supports_of(frame, "support:all")
+        held = Places(frame).supports_of("support:all")
         firm = [word for word, own in held.items() if all(np.isinf(k) for k in own.values())]
         rows = {word: np.array([_row(frame, word, d) for d in own]) for word, own in held.items()}
         whole = _rank(list(rows.values()))
@@ -55,7 +55,7 @@ class SupportRemoved(SupportFlexibility):
 def _row(frame: Frame, word: str, direction: str) -> FloatArray:
     """Return what a support sees of the six motions of a rigid body, (6,), lengths in the size."""
     size = float(np.ptp(frame.corners, axis=0).max())
-    at = point_of(frame, word)
+    at = Places(frame).point(word)
     if at.joint is not None:
         xyz = np.array(frame.joint(at.joint).xyz)
     else:

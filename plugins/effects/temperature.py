@@ -13,15 +13,14 @@ from femubench.effect import (
     Change,
     ElementOperator,
     FrameEffect,
+    ModelPlaces,
     Parameter,
     Reading,
     Size,
     Term,
-    elements_of,
     once_for,
-    proportional,
 )
-from femubench.fem import Factor, FloatArray, Frame, Member, stiffness_matrices
+from femubench.fem import Factor, FloatArray, Frame, Member
 
 _AXES = ("x", "y", "z")
 _FLAT = 1e-6  # of the largest extent
@@ -76,15 +75,15 @@ class Temperature(FrameEffect):
         structure = model.frame_structure
         frame, mesh = structure.frame, structure.mesh
         # A factor of an element leaves the arms of joint springs alone.
-        rows = elements_of(structure, "all", arms=place == "all")
+        rows = ModelPlaces(model).elements("all", arms=place == "all")
         slopes = np.array([slope_of(member.material.E) for member in frame.members])
         whole = once_for(
-            model, "element stiffness", lambda: stiffness_matrices(structure.properties)
+            model, "element stiffness", lambda: structure.properties.stiffness_matrices()
         )
         own = slopes[mesh.member[rows]]
         even = Term("stiffness", ElementOperator(structure, rows, whole, share=own, kind=rows))
         if place == "all":
-            return proportional(even)
+            return Change.proportional(even)
         known = _shares(frame, place)
         pairs = zip(mesh.member[rows], mesh.number[rows], strict=True)
         shares = np.array([known[int(m)][int(k) - 1] for m, k in pairs])

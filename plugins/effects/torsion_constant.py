@@ -15,20 +15,13 @@ from femubench.effect import (
     ElementOperator,
     FrameEffect,
     LookWarning,
+    ModelPlaces,
     Parameter,
     Seen,
     Size,
     Term,
-    elements_of,
-    proportional,
 )
-from femubench.fem import (
-    Frame,
-    Section,
-    bredt,
-    stiffness_matrices,
-    wall_of,
-)
+from femubench.fem import Frame, Section
 
 _SAME = 1e-6
 _CLOSE = 0.01  # of the polar moment
@@ -97,15 +90,15 @@ class TorsionConstant(FrameEffect):
     def change(self, model: Model, place: str) -> Change:
         """Return the torsional stiffness of the elements."""
         structure = model.frame_structure
-        rows = elements_of(structure, place, arms=True)
+        rows = ModelPlaces(model).elements(place, arms=True)
         own = structure.properties.take(rows)
         plain = own.scale("coupling", np.zeros(len(own)))
-        now = stiffness_matrices(plain)
-        twist = stiffness_matrices(plain.scale("GJ", np.full(len(own), 2.0))) - now
-        coupled = stiffness_matrices(own) - now
+        now = plain.stiffness_matrices()
+        twist = plain.scale("GJ", np.full(len(own), 2.0)).stiffness_matrices() - now
+        coupled = own.stiffness_matrices() - now
         terms = [Term("stiffness", ElementOperator(structure, rows, b)) for b in (twist, coupled)]
         if not coupled.any():
-            return proportional(terms[0])
+            return Change.proportional(terms[0])
         # The coupling grows with the root of EI GJ.
         return Change(
             tuple(terms),
@@ -132,7 +125,7 @@ def shape_torsion_constant(section: Section) -> float | None:
     """
     if section.width is None or section.height is None or not section.shape:
         return None
-    own = section.same_shape(section.width, section.height, wall_of(section))
+    own = section.same_shape(section.width, section.height, section.wall)
     numbers = [section.A, section.Iy, section.Iz]
     alike = np.allclose([own.A, own.Iy, own.Iz], numbers, rtol=_SAME, atol=0)
     return own.J if alike else None
@@ -154,7 +147,7 @@ def estimate_torsion_constant(section: Section) -> tuple[float, str] | None:
     if section.width is not None and section.height is not None:
         if section.shape not in _RULES:
             return None
-        own = section.same_shape(section.width, section.height, wall_of(section))
+        own = section.same_shape(section.width, section.height, section.wall)
         return own.J, _RULES[section.shape]
     if a**2 > _SOLID * np.sqrt(iy * iz):
         return a**4 / (4.0 * np.pi**2 * (iy + iz)), "by Saint-Venant's estimate for a solid section"
@@ -171,7 +164,9 @@ def estimate_torsion_constant(section: Section) -> tuple[float, str] | None:
         r = float(root_scalar(excess, bracket=(1e-6, 1e6), xtol=1e-12, rtol=1e-12).root)
         b = float(np.sqrt(12.0 * iy / a * (1.0 + r) / (r**2 * (3.0 + r))))
         h, wall, form = r * b, a / (2.0 * b * (1.0 + r)), "rectangular"
-    return bredt(b, h, wall), f"by Bredt's formula for a {form} tube with the same area and inertia"
+    return Section.bredt(
+        b, h, wall
+    ), f"by Bredt's formula for a {form} tube with the same area and inertia"
 
 
 def is_round(section: Section) -> bool | None:

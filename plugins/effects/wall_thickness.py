@@ -12,31 +12,17 @@ import numpy as np
 from femubench import Model
 from femubench.effect import (
     Change,
+    ChebyshevPoints,
     ElementOperator,
     FrameEffect,
+    ModelPlaces,
     Parameter,
+    Places,
     Size,
     Term,
-    barycentric,
-    chebyshev_nodes,
-    elements_of,
-    member_labels,
-    members_of,
     once_for,
-    set_places,
 )
-from femubench.fem import (
-    BeamProperties,
-    FloatArray,
-    Frame,
-    IntArray,
-    Member,
-    Section,
-    Structure,
-    mass_matrices,
-    stiffness_matrices,
-    wall_of,
-)
+from femubench.fem import BeamProperties, FloatArray, Frame, IntArray, Member, Section, Structure
 
 _SCALE, _MOST, _NODES = 0.1, 0.9, 9
 _MATRICES: tuple[Literal["stiffness", "mass"], ...] = ("stiffness", "mass")
@@ -69,11 +55,11 @@ class WallThickness(FrameEffect):
         if model.structure is None:
             return ()
         frame = model.structure.frame
-        members = member_labels(frame)
+        members = tuple(frame.member_index)
         everything = ("all",) if len(members) > 1 else ()
-        words = (*everything, *set_places(frame), *members)
+        words = (*everything, *Places(frame).sets(), *members)
         tubes = {member.name for member in frame.members if _wall(member.section)}
-        return tuple(word for word in words if tubes.issuperset(members_of(frame, word)))
+        return tuple(word for word in words if tubes.issuperset(Places(frame).members(word)))
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the relative change of the wall."""
@@ -86,7 +72,7 @@ class WallThickness(FrameEffect):
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with other sections."""
-        named = members_of(frame, place) if values[0] else ()
+        named = Places(frame).members(place) if values[0] else ()
         members = (
             replace(m, section=_with_wall(m.section, 1.0 + values[0])) if m.name in named else m
             for m in frame.members
@@ -96,10 +82,10 @@ class WallThickness(FrameEffect):
     def change(self, model: Model, place: str) -> Change:
         """Return the matrices of the elements, interpolated between Chebyshev points."""
         structure = model.frame_structure
-        frame, names = structure.frame, members_of(structure.frame, place)
+        frame, names = structure.frame, Places(structure.frame).members(place)
         bound = _bound(frame, place)
-        nodes = chebyshev_nodes(-bound, bound, _NODES)
-        rows = elements_of(structure, place, arms=True)
+        nodes = ChebyshevPoints(-bound, bound, _NODES)
+        rows = ModelPlaces(model).elements(place, arms=True)
         walls = partial(_walls, structure, bound)
         # Members of one section are as thick as each other; what mixes them has its own nodes.
         alone = all(_bound(frame, name) == bound for name in names)
@@ -111,7 +97,7 @@ class WallThickness(FrameEffect):
         ]
 
         def coefficients(values: FloatArray) -> FloatArray:
-            return np.repeat(barycentric(nodes, values[:, 0]), 2, axis=1)
+            return np.repeat(nodes.shares(values[:, 0]), 2, axis=1)
 
         return Change(tuple(terms), coefficients)
 
@@ -137,11 +123,11 @@ def _walls(
     first, own_kind = structure.properties.take(rows).alike(structure.mesh.member[rows])
     own = structure.properties.take(rows[first])
     which = np.array([index[int(m)] for m in structure.mesh.member[rows[first]]])
-    still = np.array([stiffness_matrices(own), mass_matrices(own)])
+    still = np.array([own.stiffness_matrices(), own.mass_matrices()])
     found = []
-    for node in chebyshev_nodes(-bound, bound, _NODES):
+    for node in ChebyshevPoints(-bound, bound, _NODES).points:
         other = _scaled(own, members, which, 1.0 + float(node))
-        found.append(np.array([stiffness_matrices(other), mass_matrices(other)]) - still)
+        found.append(np.array([other.stiffness_matrices(), other.mass_matrices()]) - still)
     kind = np.zeros(len(structure.mesh.member), dtype=np.int64)
     kind[rows] = own_kind
     return np.array(found), kind
@@ -153,7 +139,7 @@ def _wall(section: Section) -> float | None:
     tube = section.shape in ("rectangular-tube", "round-tube") and section.A > 0.0
     if width is None or height is None or not tube:
         return None
-    wall = wall_of(section)
+    wall = section.wall
     return wall if wall < (1.0 - 1e-9) * min(width, height) / 2.0 else None
 
 
@@ -198,7 +184,7 @@ def _ratio(old: float, new: float) -> float:
 
 def _bound(frame: Frame, place: str) -> float:
     """Return the largest relative change for which there is still a wall and still a hole."""
-    names = members_of(frame, place)
+    names = Places(frame).members(place)
     return min(_own_bound(frame.members[frame.member_index[name]].section) for name in names)
 
 

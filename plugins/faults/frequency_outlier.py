@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from femubench import Measurement, Model
-from femubench.effect import Corrected, Parameter, Suspect
+from femubench.effect import Parameter, Suspect
 
 _ERROR = 0.05  # a priori, relative
 _LEAST = -0.5
@@ -37,7 +37,7 @@ class FrequencyOutlier:
 
     def _corrected(
         self, number: int, model: Model, measurement: Measurement, value: float
-    ) -> Corrected:
+    ) -> tuple[Model, Measurement]:
         wrong = np.array(measurement.numbers) == number
         frequencies = measurement.frequencies / np.where(wrong, 1.0 + value, 1.0)
         return model, replace(measurement, frequencies=frequencies)

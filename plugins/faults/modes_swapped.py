@@ -11,7 +11,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from femubench import Measurement, Model
-from femubench.effect import Corrected, Suspect
+from femubench.effect import Suspect
 
 
 class ModesSwapped:
@@ -41,7 +41,7 @@ class ModesSwapped:
         model: Model,
         measurement: Measurement,
         value: float,
-    ) -> Corrected:
+    ) -> tuple[Model, Measurement]:
         order = np.arange(len(measurement))
         i, j = (measurement.numbers.index(number) for number in numbers)
         order[[i, j]] = j, i

@@ -11,7 +11,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from femubench import Measurement, Model
-from femubench.effect import Corrected, Parameter, Suspect
+from femubench.effect import Parameter, Suspect
 
 _GAIN = Parameter("gain", "", 1.0, neutral=1.0, lower=0.2, upper=5.0)
 
@@ -57,14 +57,14 @@ class SensorsSwapped:
 
     def _corrected(
         self, labels: tuple[str, str], model: Model, measurement: Measurement, value: float
-    ) -> Corrected:
+    ) -> tuple[Model, Measurement]:
         return model, swap_readings(measurement, labels)
 
 
 def _suspect_each(
     measurement: Measurement,
     wrong: str,
-    correct: Callable[[str, Model, Measurement, float], Corrected],
+    correct: Callable[[str, Model, Measurement, float], tuple[Model, Measurement]],
     parameter: Parameter | None = None,
 ) -> list[Suspect]:
     """Return the same suspicion of every sensor that was read."""
@@ -74,11 +74,15 @@ def _suspect_each(
     ]
 
 
-def _correct_gain(label: str, model: Model, measurement: Measurement, value: float) -> Corrected:
+def _correct_gain(
+    label: str, model: Model, measurement: Measurement, value: float
+) -> tuple[Model, Measurement]:
     return model, multiply_readings(measurement, label, 1.0 / value)
 
 
-def _correct_sign(label: str, model: Model, measurement: Measurement, value: float) -> Corrected:
+def _correct_sign(
+    label: str, model: Model, measurement: Measurement, value: float
+) -> tuple[Model, Measurement]:
     return model, multiply_readings(measurement, label, -1.0)
 
 

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from femubench import Measurement, Model
-from femubench.effect import Corrected
-from femubench.fem import Frame, Section, wall_of
+from femubench.fem import Frame, Section
 
 _SAME = 1e-6
 _CONSTANTS = ("A", "Iy", "Iz", "J", "Jp")
@@ -44,7 +43,7 @@ def resize_section(section: Section, sizes: Mapping[str, float]) -> Section | No
     old = sizes_of(section)
     if not old:
         return None
-    wall = wall_of(section)
+    wall = section.wall
     new = {"wall": wall, **old, **sizes}
     width, height = new["width"], new.get("height", new["width"])
     if section.shape == "round-tube" and new["wall"] > 0.499 * old["width"]:
@@ -62,7 +61,7 @@ def resize_section(section: Section, sizes: Mapping[str, float]) -> Section | No
 
 def correct_section(
     old: Section, new: Section, model: Model, measurement: Measurement, value: float
-) -> Corrected:
+) -> tuple[Model, Measurement]:
     """Return the model with one section in the place of another one of the same name."""
     structure = model.frame_structure
     members = tuple(

@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from femubench import Measurement, Model
-from femubench.effect import Corrected, Parameter, Suspect
+from femubench.effect import Parameter, Suspect
 
 _FEWEST = 4
 _QUANTITIES = {"frequencies": "frequency_std", "shapes": "shape_std"}
@@ -44,6 +44,6 @@ class SigmaMisstated:
 
     def _corrected(
         self, field: str, model: Model, measurement: Measurement, value: float
-    ) -> Corrected:
+    ) -> tuple[Model, Measurement]:
         std = getattr(measurement, field) / value
         return model, replace(measurement, **{field: std})

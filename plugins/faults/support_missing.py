@@ -8,8 +8,8 @@ from functools import partial
 from typing import ClassVar, Literal
 
 from femubench import Measurement, Model
-from femubench.effect import Corrected, Suspect
-from femubench.fem import ACTIVE, Frame, Place, Support
+from femubench.effect import Suspect
+from femubench.fem import Frame, Place, Support
 
 
 class SupportMissing:
@@ -28,7 +28,7 @@ class SupportMissing:
 
 def _forgotten(frame: Frame) -> Iterator[Suspect]:
     """Yield supports at joints: as those that there are, in all directions, in single ones."""
-    every = ACTIVE[frame.plane]
+    every = frame.active
     patterns = dict.fromkeys(tuple(sorted(s.fixed, key=every.index)) for s in frame.supports)
     patterns = dict.fromkeys((*patterns, every, *((direction,) for direction in every)))
     held = {(str(s.at), direction) for s in frame.supports for direction in s.fixed}
@@ -64,7 +64,7 @@ def _place(at: str, direction: Sequence[str]) -> str:
 
 def _held(
     supports: tuple[Support, ...], model: Model, measurement: Measurement, value: float
-) -> Corrected:
+) -> tuple[Model, Measurement]:
     structure = model.frame_structure
     frame = replace(structure.frame, supports=supports)
     return Model.of(structure.rebuilt(frame)), measurement

@@ -11,8 +11,8 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from femubench import Measurement, Model
-from femubench.effect import Corrected, Suspect
-from femubench.fem import Frame, Material, wall_of
+from femubench.effect import Suspect
+from femubench.fem import Frame, Material
 from femubench.plugins.faults.sections import (
     correct_section,
     resize_section,
@@ -63,7 +63,7 @@ def _of_sections(frame: Frame) -> Iterator[Suspect]:
     span = float(np.ptp(frame.corners, axis=0).max())
     for section in sections_of(frame):
         sizes = sizes_of(section)
-        whole = sizes | {"wall": wall_of(section)}
+        whole = sizes | {"wall": section.wall}
         options = {key: {key: typed} for key, typed in sizes.items()} | {"sizes": whole}
         for (key, typed), factor in product(options.items(), (1.0 / _KILO, _KILO)):
             new = {name: size / factor for name, size in typed.items()}
@@ -83,7 +83,7 @@ def _of_sections(frame: Frame) -> Iterator[Suspect]:
 
 def _with_material(
     wrong: Material, right: Material, model: Model, measurement: Measurement, value: float
-) -> Corrected:
+) -> tuple[Model, Measurement]:
     structure = model.frame_structure
     members = tuple(
         replace(m, material=right) if m.material == wrong else m for m in structure.frame.members

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from femubench import InputError, Sensors
-from femubench.modal import TimeSignals, join_records
+from femubench.modal import TimeSignals
 from femubench.plugins.readers.reading import ProgramReader, open_broken
 
 _END, _KIND = "***End_of_Header***", "a LabVIEW measurement (.lvm) with a table behind every header"
@@ -32,7 +32,7 @@ class LabViewReader(ProgramReader):
         if path.stat().st_size > _LARGEST:
             raise InputError("file is too large", file=path, expected=f"{_LARGEST} bytes at most")
         with open_broken(path, _KIND):
-            return join_records(list(_segments(path)))
+            return TimeSignals.joined(list(_segments(path)))
 
 
 def _segments(path: Path) -> Iterator[TimeSignals]:

@@ -9,7 +9,7 @@ from typing import Any, get_args
 import numpy as np
 
 from femubench import InputError, Sensors
-from femubench.modal import FrequencyResponses, Quantity, TimeSignals, join_records
+from femubench.modal import FrequencyResponses, Quantity, TimeSignals
 from femubench.plugins.readers.modal_variables import named_variables
 from femubench.plugins.readers.reading import words_of
 
@@ -168,4 +168,4 @@ def _over_time(found: Mapping[str, Any], path: Path) -> TimeSignals:
         some = column if points > 1 else slice(None)
         own = Sensors(forces.labels[some], forces.xyz[some], forces.directions[some])
         parts.append(TimeSignals(sensors, rate, motion[:, :, k], own, force[:, column], quantity))
-    return join_records(parts)
+    return TimeSignals.joined(parts)

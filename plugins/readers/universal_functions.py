@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from femubench import InputError, Sensors
-from femubench.modal import FrequencyResponses, TimeSignals, join_records
+from femubench.modal import FrequencyResponses, TimeSignals
 from femubench.plugins.readers.reading import DIRECTIONS
 from femubench.plugins.readers.universal_datasets import Dataset, read_datasets
 
@@ -196,4 +196,4 @@ def _signals(path: Path, functions: Sequence[_Function], known: Mapping[str, Any
         )
         (motions, forces), (values, force_values) = sides, columns
         parts.append(TimeSignals(motions, 1.0 / step, values, forces, force_values, quantity))
-    return join_records(parts)
+    return TimeSignals.joined(parts)

@@ -8,14 +8,7 @@ import numpy as np
 
 from femubench import Measurement, Model, Strategy, UpdateResult
 from femubench.fem import FloatArray, LowRank
-from femubench.update import (
-    ITERATIONS,
-    QuasiModes,
-    check_used_modes,
-    force_scale,
-    quasi_measured_modes,
-    with_stiffness_step,
-)
+from femubench.update import QuasiModes, check_used_modes, with_stiffness_step
 
 # Of eps |K| |phi|: what the modes of the model leave of K phi - lambda M phi by rounding.
 _ROUNDING = 64.0 * np.finfo(float).eps
@@ -39,7 +32,9 @@ def stiffness_change(model: Model, quasi: QuasiModes) -> LowRank:
     rotation = momentum.T @ quasi.modes.shapes[:, quasi.partners]
     energy = (rotation * quasi.modes.eigenvalues[quasi.partners]) @ rotation.T
     force = model.stiffness_times(quasi.shapes)
-    scale = force_scale(model)[:, None]
+    # Forces and moments in one unit.
+    diagonal = np.abs(model.stiffness.diagonal())
+    scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))[:, None]
     gross = np.linalg.norm(scale * (np.abs(model.stiffness) @ np.abs(quasi.shapes)), axis=0)
     rest = np.linalg.norm(scale * (force - momentum @ energy), axis=0)
     if np.all(rest <= _ROUNDING * gross):
@@ -77,11 +72,11 @@ class Baruch(Strategy):
         """
         current, history = model, []
         while True:
-            quasi = quasi_measured_modes(current, measurement)
+            quasi = QuasiModes.of(current, measurement)
             step = stiffness_change(current, quasi)
             current = with_stiffness_step(current, quasi.modes, step)
             history.append({"largest_eigenvalue_change": float(np.abs(np.diag(step.core)).max())})
-            if len(history) == ITERATIONS:
+            if len(history) == QuasiModes.ITERATIONS:
                 break
         found = check_used_modes(current, quasi.shapes, quasi.eigenvalues)
         change = current.stiffness_change

@@ -8,15 +8,11 @@ from typing import ClassVar
 from femubench import Measurement, Model
 from femubench.effect import Change
 from femubench.update import (
-    OWN,
+    Changes,
+    Joints,
     SensitivityStrategy,
     UpdateOptions,
     all_elements,
-    joint_groups,
-    list_changes,
-    scale_all_stiffness,
-    scale_groups,
-    scale_joint,
     scale_property,
 )
 
@@ -72,7 +68,7 @@ class Bayesian(SensitivityStrategy):
         """Return the parameters above with their priors, or those of the groups."""
         if model.groups:
             return model, self.list_changes(model, measurement)
-        stiffness = scale_all_stiffness(model, prior_std=self.stiffness_std)
+        stiffness = Changes(model).stiffness(prior_std=self.stiffness_std)
         structure, mass = model.structure, self._mass(model, measurement)
         if structure is None:
             return model, [stiffness, *mass]
@@ -81,20 +77,20 @@ class Bayesian(SensitivityStrategy):
             every = all_elements(structure)
             torsion = [scale_property("GJ all members", "GJ", every, prior_std=self.torsion_std)]
         joints = [
-            scale_joint(structure, group, prior_std=self.joint_std)
-            for group in joint_groups(structure.frame)
+            Changes(structure).joint(group, prior_std=self.joint_std)
+            for group in Joints(structure).groups()
         ]
         return model, [stiffness, *torsion, *mass, *joints]
 
     def list_changes(self, model: Model, measurement: Measurement) -> list[Change]:
         """Return the changes that `changes` names and the mass, each with its prior."""
-        words = "groups" if self.changes == OWN else self.changes
-        listed = list_changes(model, words, prior_std=self.stiffness_std)
+        words = "groups" if self.changes == self.OWN else self.changes
+        listed = Changes(model).listed(words, prior_std=self.stiffness_std)
         return listed + self._mass(model, measurement)
 
     def _mass(self, model: Model, measurement: Measurement) -> list[Change]:
         """Return factors on groups of the mass, or the density where the structure was weighed."""
-        mass = scale_groups(model, "mass", own_prior=True)
+        mass = Changes(model).groups("mass", own_prior=True)
         if mass or measurement.total_mass is None:
             return mass
         every = ("all",) if model.structure is None else all_elements(model.structure)

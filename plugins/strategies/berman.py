@@ -10,8 +10,8 @@ import scipy.linalg as la
 
 from femubench import Measurement, Model, Strategy, StrategyFailure, UpdateResult
 from femubench.fem import FloatArray, LowRank
-from femubench.modal import mass_normalised, rigid_modes_of
-from femubench.update import check_used_modes, expand_measured_shapes, total_change
+from femubench.modal import rigid_modes_of
+from femubench.update import check_used_modes, expand_measured_shapes
 
 # Below this share of independent motion two expanded shapes are one.
 _DEPENDENT = 1e-6
@@ -37,7 +37,7 @@ def expand_without_momentum(
     """
     shapes = expand_measured_shapes(model, measurement, rigid)
     shapes = shapes - rigid @ (rigid.T @ model.mass_times(shapes))  # what rounding left
-    shapes = mass_normalised(model, shapes)
+    shapes = model.mass_normalised(shapes)
     mass = shapes.T @ model.mass_times(shapes)
     smallest = float(la.eigvalsh(mass)[0])
     if not smallest > _DEPENDENT:
@@ -115,9 +115,9 @@ class Berman(Strategy):
         rigid = rigid_modes_of(model)
         shapes, generalised_mass = expand_without_momentum(model, measurement, rigid)
         change = mass_change(model, shapes, generalised_mass)
-        heavier = replace(model, mass_change=total_change([model.mass_change, change]))
+        heavier = replace(model, mass_change=LowRank.total([model.mass_change, change]))
         step = stiffness_change(heavier, shapes, measurement.eigenvalues, rigid)
-        updated = replace(heavier, stiffness_change=total_change([model.stiffness_change, step]))
+        updated = replace(heavier, stiffness_change=LowRank.total([model.stiffness_change, step]))
         found = check_used_modes(updated, shapes, measurement.eigenvalues)
         worst = float(np.abs(generalised_mass - np.eye(len(measurement))).max())
         return UpdateResult(

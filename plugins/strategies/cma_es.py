@@ -13,7 +13,7 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 
 from femubench import Measurement, Model, UpdateResult
-from femubench.update import ParametricStrategy, modal_space, parameterise, parametric_result
+from femubench.update import ModalSpace, ParametricStrategy
 
 
 class _Hidden(MetaPathFinder):
@@ -86,8 +86,8 @@ class CmaEs(ParametricStrategy):
             StrategyFailure: when no mode of the model looks like any measured mode.
         """
         cma = _cma()
-        parts = parameterise(model, self.changes)
-        space = modal_space(parts, measurement, shape_weight=self.shape_weight, size=self.basis)
+        parts = self.parameterise(model)
+        space = ModalSpace.of(parts, measurement, shape_weight=self.shape_weight, size=self.basis)
         low, high = space.bounds(float(np.log(self.largest)))
         options = {
             "bounds": [low, high],
@@ -107,7 +107,7 @@ class CmaEs(ParametricStrategy):
             search.tell(points, costs)
             history.append({"cost": float(min(costs)), "spread": float(search.sigma)})
         log = np.asarray(search.result.xbest)
-        return parametric_result(
+        return self.result(
             parts,
             log,
             history,

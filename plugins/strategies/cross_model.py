@@ -10,15 +10,7 @@ from scipy.optimize import lsq_linear
 
 from femubench import InputError, Measurement, Model, Modes, UpdateResult, solve_modes
 from femubench.fem import FloatArray
-from femubench.modal import mass_normalised
-from femubench.update import (
-    ParametricModel,
-    ParametricStrategy,
-    expand_measured_shapes,
-    parameterise,
-    parametric_result,
-    quasi_measured_modes,
-)
+from femubench.update import ParametricModel, ParametricStrategy, QuasiModes, expand_measured_shapes
 
 _RIDGE = 1e-3  # decides what no equation sees
 # Of factors with rotated shapes, which are so far from the measured ones that an equation errs as
@@ -71,14 +63,14 @@ class CrossModel(ParametricStrategy):
             NotApplicable: when the model has no such parameters.
             StrategyFailure: when a measured mode has no partner in the model.
         """
-        parts = parameterise(model, self.changes)
+        parts = self.parameterise(model)
         model = parts.start
         if self.expansion == "force":
             own = solve_modes(model).elastic
             own = own.take(np.arange(min(len(own), self.modes * len(measurement))))
-            shapes = mass_normalised(model, expand_measured_shapes(model, measurement))
+            shapes = model.mass_normalised(expand_measured_shapes(model, measurement))
         else:
-            quasi = quasi_measured_modes(model, measurement)
+            quasi = QuasiModes.of(model, measurement)
             own, shapes = quasi.modes.take(quasi.partners), quasi.shapes
         matrix, right = cross_equations(parts, own, shapes, measurement.eigenvalues)
         count, factor = len(parts), parts.is_property
@@ -93,7 +85,7 @@ class CrossModel(ParametricStrategy):
         )
         rest = float(np.linalg.norm(matrix @ found.x - right) / np.linalg.norm(right))
         x = np.where(factor, np.log1p(np.where(factor, found.x, 0.0)), found.x)
-        return parametric_result(parts, x, equations=float(len(right)), residual=rest)
+        return self.result(parts, x, equations=float(len(right)), residual=rest)
 
 
 def cross_equations(

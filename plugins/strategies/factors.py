@@ -8,14 +8,7 @@ from typing import ClassVar
 
 from femubench import Measurement, Model
 from femubench.effect import Change
-from femubench.update import (
-    SensitivityStrategy,
-    UpdateOptions,
-    groups_within,
-    scale_all_stiffness,
-    scale_groups_within,
-    scale_joint,
-)
+from femubench.update import Changes, Joints, SensitivityStrategy, UpdateOptions
 
 
 @dataclass(frozen=True)
@@ -51,7 +44,7 @@ class Global(SensitivityStrategy):
 
     def own_changes(self, model: Model, measurement: Measurement) -> tuple[Model, list[Change]]:
         """Return one factor on all members, or on the whole matrix."""
-        return model, [scale_all_stiffness(model)]
+        return model, [Changes(model).stiffness()]
 
 
 @dataclass(frozen=True)
@@ -89,6 +82,6 @@ class Local(SensitivityStrategy):
         """Return the factors on the elements at joints, or on groups."""
         structure, count = model.structure, len(measurement)
         if structure is None:
-            return model, scale_groups_within(model, count)
-        groups = groups_within(structure.frame, count)
-        return model, [scale_joint(structure, group) for group in groups]
+            return model, Changes(model).groups_within(count)
+        groups = Joints(structure).groups_within(count)
+        return model, [Changes(structure).joint(group) for group in groups]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from femubench.fem import Structure
-from femubench.update import OWN, ElementFamily, ElementStrategy, Symmetry, generic_family
+from femubench.update import ElementFamily, ElementStrategy, Symmetry
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class GenericLS(ElementStrategy):
     def family(self, structure: Structure) -> ElementFamily:
         """Return a core for every element, or one for all elements of a kind."""
         # Elements that share a core are turned end for end where their second end is at the joint.
-        tied = self.tied or self.changes != OWN
-        return generic_family(structure, plain=self.plain, joint=self.joint, tied=tied)
+        tied = self.tied or self.changes != self.OWN
+        return ElementFamily.generic(structure, plain=self.plain, joint=self.joint, tied=tied)
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from femubench import Measurement, Model, UpdateResult
-from femubench.update import (
-    ParametricStrategy,
-    fit_bounded,
-    modal_space,
-    parameterise,
-    parametric_result,
-)
+from femubench.update import ModalSpace, ParametricStrategy
 
 
 @dataclass(frozen=True)
@@ -60,20 +54,20 @@ class MultiStart(ParametricStrategy):
         # Here, since no other strategy has to wait for it; workers have it from the start.
         from scipy.stats.qmc import LatinHypercube
 
-        parts = parameterise(model, self.changes)
+        parts = self.parameterise(model)
         weight = self.shape_weight
-        space = modal_space(parts, measurement, shape_weight=weight, size=self.basis)
+        space = ModalSpace.of(parts, measurement, shape_weight=weight, size=self.basis)
         low, high = space.bounds(float(np.log(self.largest)))
         cube = LatinHypercube(len(parts), rng=rng).random(self.starts)
         starts = [
             np.zeros(len(parts)),
             *(0.5 * (low + high) + 0.5 * (high - low) * (2.0 * cube - 1.0)),
         ]
-        found = [fit_bounded(space, start, self.largest) for start in starts]
+        found = [space.fit_bounded(start, self.largest) for start in starts]
         best = min(found, key=lambda item: item[1])[0]
-        there = modal_space(parts, measurement, shape_weight=weight, at=best, size=self.basis)
-        log, cost = fit_bounded(there, best, self.largest)
+        there = ModalSpace.of(parts, measurement, shape_weight=weight, at=best, size=self.basis)
+        log, cost = there.fit_bounded(best, self.largest)
         costs = np.array([item[1] for item in found])
         history = tuple({"cost": float(value)} for value in costs)
         near = float(np.mean(costs <= 1.1 * costs.min()))
-        return parametric_result(parts, log, history, cost=cost, share_of_starts_at_best=near)
+        return self.result(parts, log, history, cost=cost, share_of_starts_at_best=near)

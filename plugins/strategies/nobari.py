@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from femubench.fem import Structure
-from femubench.update import ElementFamily, ElementStrategy, nobari_family
+from femubench.update import ElementFamily, ElementStrategy
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Nobari(ElementStrategy):
 
     def family(self, structure: Structure) -> ElementFamily:
         """Return factors on the kinds of entries of every element matrix."""
-        return nobari_family(structure)
+        return ElementFamily.nobari(structure)
 
 
 @dataclass(frozen=True)

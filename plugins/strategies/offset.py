@@ -10,17 +10,7 @@ import numpy as np
 from femubench import Measurement, Model
 from femubench.effect import Change
 from femubench.fem import Structure
-from femubench.update import (
-    JointGroup,
-    SensitivityStrategy,
-    available_length,
-    groups_within,
-    half_depth,
-    scale_all_stiffness,
-    select_determined,
-    set_property,
-    with_rigid_ends,
-)
+from femubench.update import Changes, JointGroup, Joints, SensitivityStrategy, set_property
 
 _SHARE_WITHOUT_DEPTH = 0.1  # of the element
 _ALMOST_NOTHING = 3.12e-6  # m, the initial offset of the passing member in table 4(e)
@@ -64,7 +54,7 @@ class Offset(SensitivityStrategy):
         """Return the frame with partly rigid elements at its joints, and what moves them."""
         structure = model.frame_structure
         count = len(measurement)
-        groups = groups_within(structure.frame, count, passing=False)
+        groups = Joints(structure).groups_within(count, passing=False)
         lengths: dict[str, tuple[float, float]] = {}
         own: dict[str, list[Change]] = {"branch": [], "end": [], "through": []}
         for group in groups:
@@ -73,17 +63,17 @@ class Offset(SensitivityStrategy):
             own[group.role].append(_length(structure, group, start))
         levels = [
             own["branch"] + own["end"],
-            [scale_all_stiffness(structure)],
+            [Changes(structure).stiffness()],
             own["through"],
         ]
-        return with_rigid_ends(structure, lengths), select_determined(levels, count)
+        return Joints(structure).with_rigid_ends(lengths), Changes.determined(levels, count)
 
     def _initial(self, structure: Structure, group: JointGroup) -> tuple[float, float]:
         """Return the rigid lengths in the stiffness and in the mass matrix in m."""
         if group.role == "through":
             return _ALMOST_NOTHING, 0.0
-        half = float(np.mean([half_depth(structure.frame, end) for end in group.ends]))
-        room = min(available_length(structure, end) for end in group.ends)
+        half = float(np.mean([Joints(structure).half_depth(end) for end in group.ends]))
+        room = min(Joints(structure).available_length(end) for end in group.ends)
         # A length moves by multiples of its start, so it must have one.
         wanted = self.length or half or _SHARE_WITHOUT_DEPTH * room
         start = min(max(wanted, _ALMOST_NOTHING), room / 2.0)
@@ -91,7 +81,7 @@ class Offset(SensitivityStrategy):
 
 
 def _length(structure: Structure, group: JointGroup, start: float) -> Change:
-    room = min(available_length(structure, end) for end in group.ends)
+    room = min(Joints(structure).available_length(end) for end in group.ends)
     limits = -_LONGEST_EXTENSION * room, room
     name = f"a {group.name}"
     return set_property(name, "rigid", group.ends, start, *limits, unit="m", signed=True)

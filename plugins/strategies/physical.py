@@ -5,16 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from femubench import Model
 from femubench.fem import Structure
-from femubench.update import (
-    OWN,
-    ElementFamily,
-    ElementStrategy,
-    Family,
-    group_family,
-    physical_family,
-)
+from femubench.update import ElementFamily, ElementStrategy
 
 
 @dataclass(frozen=True)
@@ -33,14 +25,9 @@ class Physical(ElementStrategy):
     )
     needs: ClassVar[frozenset[str]] = frozenset({"shapes", "parts"})
     cost_reference: ClassVar[bool] = True
+    takes_groups: ClassVar[bool] = True
     promises: ClassVar[frozenset[str]] = frozenset({"no-negative-eigenvalue"})
 
     def family(self, structure: Structure) -> ElementFamily:
         """Return factors on the rigidities of every element."""
-        return physical_family(structure)
-
-    def family_of(self, model: Model) -> Family:
-        """Return factors on the groups of matrices, else on the rigidities."""
-        if self.changes == "groups" or (model.structure is None and self.changes == OWN):
-            return group_family(model)
-        return super().family_of(model)
+        return ElementFamily.physical(structure)

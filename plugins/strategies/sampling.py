@@ -9,7 +9,7 @@ import numpy as np
 
 from femubench import InputError, Measurement, Model, UpdateResult
 from femubench.plugins.strategies.bayesian import Bayesian
-from femubench.update import Discrepancy, sample_posterior
+from femubench.update import sample_posterior
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,6 @@ class BayesianSampling(Bayesian):
             *self.pose(model, measurement),
             measurement,
             rng,
-            discrepancy=Discrepancy(self.discrepancy_median, self.discrepancy_spread),
+            discrepancy=(self.discrepancy_median, self.discrepancy_spread),
             options=self.options,
         )

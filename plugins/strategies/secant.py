@@ -12,7 +12,7 @@ from femubench import Measurement, Model, Strategy, UpdateResult
 from femubench.fem import FloatArray, LowRank
 from femubench.modal import rigid_modes_of
 from femubench.plugins.strategies.berman import balance_forces, expand_without_momentum
-from femubench.update import check_used_modes, total_change
+from femubench.update import check_used_modes
 
 
 class Secant(Strategy):
@@ -54,7 +54,7 @@ class Secant(Strategy):
         values, turn = la.eigh(mass)
         shapes = np.asarray(shapes @ (turn / np.sqrt(values)) @ turn.T)
         change = stiffness_change(model, shapes, measurement.eigenvalues, rigid)
-        updated = replace(model, stiffness_change=total_change([model.stiffness_change, change]))
+        updated = replace(model, stiffness_change=LowRank.total([model.stiffness_change, change]))
         found = check_used_modes(updated, shapes, measurement.eigenvalues)
         return UpdateResult(
             updated,

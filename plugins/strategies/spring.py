@@ -10,17 +10,13 @@ from femubench import Measurement, Model, NotApplicable
 from femubench.effect import Change
 from femubench.fem import Structure
 from femubench.update import (
+    Changes,
     JointGroup,
+    Joints,
     SensitivityStrategy,
     all_elements,
-    flexible_ends,
-    joint_groups,
-    scale_all_stiffness,
     scale_property,
-    select_determined,
     set_property,
-    spring_estimates,
-    with_joint_springs,
 )
 
 _BENDING, _TORSION, _TRANSLATION = ("ry", "rz"), ("rx",), ("x", "y", "z")
@@ -77,22 +73,22 @@ class Spring(SensitivityStrategy):
         groups = self._groups(structure, len(measurement))
         values = {name: self._initial(structure, ends) for name, ends in groups.items()}
         placed = {end: values[name] for name, ends in groups.items() for end in ends}
-        sprung = with_joint_springs(structure, placed, arm=self.arm, arm_factor=self.arm_factor)
+        sprung = Joints(structure).with_springs(placed, arm=self.arm, arm_factor=self.arm_factor)
         if self.variant == "global":
             mass = scale_property("rhoA all members", "rhoA", all_elements(sprung), fatal=True)
-            return sprung, [scale_all_stiffness(sprung), mass]
+            return sprung, [Changes(sprung).stiffness(), mass]
         return sprung, self._springs(sprung, groups, values, len(measurement))
 
     def _groups(self, structure: Structure, count: int) -> dict[str, tuple[str, ...]]:
         """Return flexible ends by group; one group where bending alone outnumbers the data."""
-        groups = _flexible(structure, joint_groups(structure.frame))
-        directions = spring_estimates(structure.frame, next(iter(groups.values())))
+        groups = _flexible(structure, Joints(structure).groups())
+        directions = Joints(structure).spring_estimates(next(iter(groups.values())))
         if len(groups) * sum(name in _BENDING for name in directions) > count:
             return {"all joints": tuple(end for ends in groups.values() for end in ends)}
         return groups
 
     def _initial(self, structure: Structure, ends: tuple[str, ...]) -> dict[str, float]:
-        estimates = spring_estimates(structure.frame, ends)
+        estimates = Joints(structure).spring_estimates(ends)
         return {name: self.stiffness.get(name, value) for name, value in estimates.items()}
 
     def _springs(
@@ -110,13 +106,13 @@ class Spring(SensitivityStrategy):
                 if name in values[group]
             ]
 
-        stiffness = [scale_all_stiffness(structure)] if self.free_stiffness else []
+        stiffness = [Changes(structure).stiffness()] if self.free_stiffness else []
         levels = [level(_BENDING), stiffness, level(_TORSION), level(_TRANSLATION)]
-        return select_determined(levels, count)
+        return Changes.determined(levels, count)
 
 
 def _flexible(structure: Structure, groups: tuple[JointGroup, ...]) -> dict[str, tuple[str, ...]]:
-    found = {group.name: flexible_ends(structure.frame, group) for group in groups}
+    found = {group.name: Joints(structure).flexible_ends(group) for group in groups}
     flexible = {name: ends for name, ends in found.items() if ends}
     if not flexible:
         raise NotApplicable("no member end at a joint bends and has no spring yet")

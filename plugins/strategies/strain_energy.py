@@ -9,16 +9,8 @@ import numpy as np
 
 from femubench import Measurement, Model, UpdateResult
 from femubench.fem import FloatArray
-from femubench.modal import mass_normalised, rigid_modes_of
-from femubench.update import (
-    ParametricStrategy,
-    expand_measured_shapes,
-    fit_bounded,
-    modal_space,
-    parameterise,
-    parametric_result,
-    quasi_measured_modes,
-)
+from femubench.modal import rigid_modes_of
+from femubench.update import ModalSpace, ParametricStrategy, QuasiModes, expand_measured_shapes
 
 _BARE = 1e-6  # of a mode's strain energy: where there is less, its change says nothing
 _LARGEST = 5.0
@@ -63,11 +55,11 @@ class StrainEnergy(ParametricStrategy):
             NotApplicable: when the model has no such parameters.
             StrategyFailure: when a measured mode has no partner in the model.
         """
-        parts = parameterise(model, self.changes)
-        paired = quasi_measured_modes(model, measurement)
+        parts = self.parameterise(model)
+        paired = QuasiModes.of(model, measurement)
         own = paired.modes.shapes[:, paired.partners]
         shapes = expand_measured_shapes(model, measurement, rigid_modes_of(model))
-        shapes = mass_normalised(model, shapes)
+        shapes = model.mass_normalised(shapes)
         # What softens takes energy: its size counts.
         energies = (np.abs(np.einsum("pjj->pj", parts.energies(s, s))) for s in (own, shapes))
         index = energy_change_index(*energies)
@@ -78,9 +70,9 @@ class StrainEnergy(ParametricStrategy):
         while len(chosen) > len(measurement) and count > 1:  # an effect may have several values
             count -= 1
             chosen = parts.of([int(j) for j in order[:count]])
-        space = modal_space(chosen, measurement, shape_weight=self.shape_weight)
-        log, cost = fit_bounded(space, np.zeros(len(chosen)), _LARGEST)
-        return parametric_result(chosen, log, cost=cost, named=float(len(chosen.changes)))
+        space = ModalSpace.of(chosen, measurement, shape_weight=self.shape_weight)
+        log, cost = space.fit_bounded(np.zeros(len(chosen)), _LARGEST)
+        return self.result(chosen, log, cost=cost, named=float(len(chosen.changes)))
 
 
 def energy_change_index(before: FloatArray, after: FloatArray) -> FloatArray:

@@ -26,23 +26,7 @@ from femubench.reports.summary import (
     unconfined,
 )
 from femubench.reports.twins import suspicions, twins_by_strategy
-from femubench.results import (
-    FEWEST,
-    TIE,
-    Forecasts,
-    JobResult,
-    Reporter,
-    Run,
-    Scale,
-    Standings,
-    find_basis,
-    interval_tail,
-    is_test,
-    list_rows,
-    rank_results,
-    structures_of,
-    unsteady,
-)
+from femubench.results import JobResult, PredictiveBoard, Run, Standings, unsteady
 
 BLOCKS = ("used", "higher", "modified")
 # Bytes of the details of all results together, and of the files to be downloaded once they are
@@ -50,7 +34,7 @@ BLOCKS = ("used", "higher", "modified")
 MOST_DETAILS = 5_700_000
 MOST_DOWNLOADS = 1_000_000
 _LONGEST_REASON = 500
-_FILES: tuple[tuple[str, str, Reporter], ...] = (
+_FILES: tuple[tuple[str, str, CsvReporter | JsonReporter], ...] = (
     ("Jobs (CSV)", "text/csv", CsvReporter()),
     ("Results (JSON)", "application/json", JsonReporter()),
 )
@@ -78,11 +62,13 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
         exhibits: what the store has to draw.
     """
     standings = Standings.of(run)
-    board, apart, scale = list_rows(run, standings), standings.apart, standings.own.scale
+    board, apart = standings.rows, standings.apart
     shared = {
         "finding": finding(run, board),
         "lead": lead(run),
-        "scored_on": "unseen data" if find_basis(run) == "unseen" else "the modes that were given",
+        "scored_on": "unseen data"
+        if Standings.basis_of(run) == "unseen"
+        else "the modes that were given",
         "yardstick": run.meta.get("yardstick"),
         "as_drawn": list_drawn_frequencies(run),
         "strategies": _strategies(run),
@@ -100,9 +86,9 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
             too_large.append(f"{title}: too large for the page; {more}")
     notes = [*notes_of(run), *suspicions(run), *map(plain, getattr(exhibits, "notes", ()))]
     baseline = run.meta.get("baseline")
-    run = Run(run.meta, rank_results(run.ranked, run.meta))
+    run = Run(run.meta, standings.results)
     cases, strategies = cases_of(run), strategies_of(run)
-    listed = [_case(run, case, exhibits, scale) for case in cases]
+    listed = [_case(standings, case, exhibits) for case in cases]
     stages = {case["name"]: case["stage"] for case in listed}
     details, left_out = _details(run, stages, exhibits)
     return {
@@ -111,13 +97,13 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
         "header": [list(item) for item in header(run)],
         "notes": [*notes, *left_out, *too_large],
         "blocks": list(BLOCKS),
-        "tie": TIE,
+        "tie": Standings.TIE,
         "seeds": seeds_of(run),
         "scenarios": list(dict.fromkeys(case["scenario"] for case in listed)),
         "baseline": baseline,
         "cases": listed,
         "results": [
-            _result(found, cases.index(found.case), strategies.index(found.strategy), scale)
+            _result(found, cases.index(found.case), strategies.index(found.strategy), standings)
             for found in run.results
         ],
         "board": list(map(_cleaned, board)),
@@ -128,9 +114,9 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
                 for a, b, p in apart.pairs
             ],
             "note": apart.note,
-            "fewest": FEWEST,
+            "fewest": Standings.FEWEST,
             "tails": [
-                interval_tail(n) if n > 1 else None
+                Standings.interval_tail(n) if n > 1 else None
                 for n in range(max(len(cases), len(seeds_of(run))) + 1)
             ],
         },
@@ -165,7 +151,8 @@ def _strategies(run: Run) -> list[dict[str, Any]]:
     ]
 
 
-def _case(run: Run, case: str, exhibits: ExhibitSource | None, scale: Scale) -> dict[str, Any]:
+def _case(standings: Standings, case: str, exhibits: ExhibitSource | None) -> dict[str, Any]:
+    run, scale = standings.run, standings.own.scale
     about = (run.meta.get("cases") or {}).get(case) or {}
     digest = (run.meta.get("drawings") or {}).get(case, about.get("digest"))
     stage = exhibits.case(digest) if exhibits is not None and isinstance(digest, str) else None
@@ -175,18 +162,19 @@ def _case(run: Run, case: str, exhibits: ExhibitSource | None, scale: Scale) -> 
     return {
         "name": case,
         "scenario": case.partition("/")[0],
-        "structure": structures_of(run).get(case, case),
+        "structure": run.structures.get(case, case),
         "start": _cleaned(scale.figures(case, scale.start(case, run.nominals[0]))),
         "textbook_percent": clean(100.0 * scale.textbook[case].error),
-        "counts": scale.holds_back(case) or find_basis(run) == "given",
-        "test": is_test((run.meta.get("classes") or {}).get(case)),
+        "counts": scale.holds_back(case) or Standings.basis_of(run) == "given",
+        "test": standings.is_test(case),
         "title": about.get("title") or "",
         "reference": {name: reference[name] for name in BLOCKS if name in reference},
         "stage": plain_data(stage),
     }
 
 
-def _result(result: JobResult, case: int, strategy: int, scale: Scale) -> dict[str, Any]:
+def _result(result: JobResult, case: int, strategy: int, standings: Standings) -> dict[str, Any]:
+    scale = standings.own.scale
     blocks = [result.blocks.get(name) for name in BLOCKS]
     lost = (result.rigid_body_modes_expected or 0) - (result.rigid_body_modes or 0)
     return {
@@ -204,17 +192,17 @@ def _result(result: JobResult, case: int, strategy: int, scale: Scale) -> dict[s
         "negative": result.negative_eigenvalues or 0,
         "unphysical": result.unphysical,
         "mac": [None if block is None else round_figures(block.mean_mac, 5) for block in blocks],
-        "levels": _levels(result, scale),
+        "levels": _levels(result, standings),
     }
 
 
-def _levels(result: JobResult, scale: Scale) -> list[float] | None:
+def _levels(result: JobResult, standings: Standings) -> list[float] | None:
     """Return the levels of the stated intervals that just reach the unseen modes.
 
     They are rounded up, so that a mode lies in no interval that does not hold it.
     """
-    found = Forecasts.of(scale.modes[result.case], result.blocks)
-    return [math.ceil(1e6 * v) / 1e6 for v in found.level(found.std)] if found.stated else None
+    found = PredictiveBoard.levels(standings.own.scale.modes[result.case], result.blocks)
+    return None if found is None else [math.ceil(1e6 * level) / 1e6 for level in found]
 
 
 def _details(

@@ -18,7 +18,8 @@ from playwright.sync_api import Browser, Page, sync_playwright
 from femubench import report
 from femubench.core.cli.main import bench
 from femubench.core.schema.records import read_run
-from femubench.results import JobResult, Run, rank_results
+from femubench.core.score.ranking import rank_results
+from femubench.results import JobResult, Run
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 STRATEGIES = ("unchanged", "baruch", "generic-ls", "local", "nobari", "kabe")

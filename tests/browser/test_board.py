@@ -12,15 +12,10 @@ from playwright.sync_api import Page
 from synthetic_run import synthetic_run
 
 from femubench.core.schema.records import read_run
+from femubench.core.score.leaderboard import leaderboard, list_rows
+from femubench.core.score.ranking import rank_results
 from femubench.reports.summary import finding
-from femubench.results import (
-    PredictiveBoard,
-    Run,
-    leaderboard,
-    list_rows,
-    rank_results,
-    run_to_json,
-)
+from femubench.results import PredictiveBoard, Run, run_to_json
 
 ROUNDED = {"seconds": 1e-3}  # figures that the page holds with fewer digits
 KEYS = (

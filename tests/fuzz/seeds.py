@@ -10,7 +10,8 @@ import numpy as np
 import pyuff
 
 from femubench.core.schema.records import to_plain
-from femubench.results import Block, JobResult, PairedMode, Rule, Run, run_to_json
+from femubench.core.schema.results import Block
+from femubench.results import JobResult, PairedMode, Rule, Run, run_to_json
 
 ROOT = Path(__file__).parents[2]
 CASES = sorted(

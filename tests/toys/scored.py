@@ -7,7 +7,9 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from femubench.core.schema.records import to_plain
-from femubench.results import Block, JobResult, PairedMode, Rule, Run, rank_results
+from femubench.core.schema.results import Block
+from femubench.core.score.ranking import rank_results
+from femubench.results import JobResult, PairedMode, Rule, Run
 
 HERTZ = {"used": 100.0, "higher": 200.0, "modified": 300.0}
 

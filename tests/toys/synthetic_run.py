@@ -10,7 +10,10 @@ import numpy as np
 from msgspec import structs, to_builtins
 
 from femubench.core.schema.paired_modes import ModeBefore, PartnerCandidate
-from femubench.results import Block, JobResult, PairedMode, Rule, Run, frequency_error, rank_results
+from femubench.core.schema.results import Block
+from femubench.core.score.ranking import rank_results
+from femubench.core.score.scoring import frequency_error
+from femubench.results import JobResult, PairedMode, Rule, Run
 
 BLOCKS = ("used", "higher", "modified")
 MODES = {"used": (1, 2, 3), "higher": (4, 5), "modified": (1, 4)}

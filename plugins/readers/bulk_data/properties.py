@@ -9,14 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from femubench.fem import (
-    Material,
-    Section,
-    constant_kappa,
-    rectangular_tube,
-    round_tube,
-    solid_rectangle,
-)
+from femubench.fem import Material, Section
 from femubench.plugins.readers.bulk_data.cards import Card
 
 _SAME = 1e-9
@@ -83,7 +76,7 @@ class Bar:
             J=share * of.J,
             Jp=of.I1 + of.I2,
             # 0 is a bar without shear flexibility, whose share is taken out elsewhere.
-            kappa=constant_kappa(share * of.K1 or 1.0, share * of.K2 or 1.0),
+            kappa=Section.constant_kappa(share * of.K1 or 1.0, share * of.K2 or 1.0),
             name=name,
         )
 
@@ -171,11 +164,11 @@ def _pbarl(card: Card, nu: float) -> Constants:
     if not (across > 0.0 and hollow and (kind != "BOX" or wall > 0.0)):
         raise card.error(f"sizes {', '.join(f'{d:g}' for d in sizes)}", "those of a bar", "DIM1")
     if round_one:
-        shape = round_tube(2.0 * across, across - along)
+        shape = Section.round_tube(2.0 * across, across - along)
     elif wall:
-        shape = rectangular_tube(along, across, wall)
+        shape = Section.rectangular_tube(along, across, wall)
     else:
-        shape = solid_rectangle(along, across)
+        shape = Section.solid_rectangle(along, across)
     K1, K2 = (1.0, 1.0) if shape.kappa is None else shape.kappa(nu)
     nsm = card.real(9 + len(sizes), "NSM", 0.0)
     return Constants(shape.A, shape.Iz, shape.Iy, shape.J, nsm, K1, K2, shape)

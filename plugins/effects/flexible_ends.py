@@ -21,20 +21,19 @@ from typing import Literal
 
 import numpy as np
 
-from femubench.core.change.change import Change
-from femubench.core.change.interpolation import barycentric, chebyshev_nodes
-from femubench.core.change.terms import ElementOperator, RowOperator, Term
-from femubench.core.effect.places import member_length
-from femubench.core.fem.beam import mass_matrices, stiffness_matrices
-from femubench.core.fem.frame import Frame
-from femubench.core.fem.joints import available_length, half_depth, spring_ends
-from femubench.core.fem.links import rigid_arm
-from femubench.core.fem.model import Model
-from femubench.core.fem.sensors import DIRECTIONS
-from femubench.core.fem.structure import Structure
-from femubench.core.modal.eigen import once_for
-from femubench.core.typing import FloatArray, IntArray
+from femubench import Model
+from femubench.effect import (
+    Change,
+    ChebyshevPoints,
+    ElementOperator,
+    RowOperator,
+    Term,
+    once_for,
+)
+from femubench.fem import FloatArray, Frame, IntArray, Structure
+from femubench.update import Joints
 
+_DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _MOST = 24
 _NODES = 20
 _SAME_RATE = 1e-10
@@ -50,11 +49,6 @@ def rate_nodes(rates: FloatArray) -> tuple[FloatArray, FloatArray]:
     Returns:
         nodes (q,) and weights (k, q): f(rates) = weights @ f(nodes), exactly for up to 24
         different rates, else to about 1e-6 of the largest share over a range of 1:1000.
-
-    Examples:
-        >>> nodes, weights = effect.rate_nodes(np.array([1.0, 2.0, 5.0]))
-        >>> np.allclose(weights @ nodes, [1.0, 2.0, 5.0])
-        True
     """
     if not len(rates):
         return np.zeros(0), np.zeros((0, 0))
@@ -66,8 +60,8 @@ def rate_nodes(rates: FloatArray) -> tuple[FloatArray, FloatArray]:
         weights = np.zeros((len(rates), len(nodes)))
         weights[order, np.cumsum(fresh) - 1] = 1.0
         return nodes, weights
-    points = chebyshev_nodes(float(np.log(nodes[0])), float(np.log(nodes[-1])), _NODES)
-    return np.exp(points), barycentric(points, np.log(rates))
+    points = ChebyshevPoints(float(np.log(nodes[0])), float(np.log(nodes[-1])), _NODES)
+    return np.exp(points.points), points.shares(np.log(rates))
 
 
 _Parts = tuple[FloatArray, FloatArray, FloatArray]
@@ -95,28 +89,19 @@ def end_arm(structure: Structure, end: str) -> float:
 
     Half the depth of the crossing member, as far as the end element has room for it; 0 behind a
     spring that is there already.
-
-    Examples:
-        >>> round(effect.end_arm(structure, "rung-middle@J5"), 4)
-        0.0127
     """
-    return max(0.0, min(half_depth(structure.frame, end), end_room(structure, end)))
+    return max(0.0, min(Joints(structure).half_depth(end), end_room(structure, end)))
 
 
 def end_room(structure: Structure, end: str) -> float:
-    """Return the longest arm in m that a new spring at a ``member@joint`` end may sit behind.
-
-    Examples:
-        >>> round(effect.end_room(structure, "rung-middle@J5"), 4)
-        0.0629
-    """
+    """Return the longest arm in m that a new spring at a ``member@joint`` end may sit behind."""
     member, _, joint = end.rpartition("@")
     if any((s.member, s.joint) == (member, joint) for s in structure.frame.joint_springs):
         return 0.0
     element, side = structure.element_ends[end]
     p = structure.properties
     rigid = (p.rigid_1, p.rigid_2)[side][element], (p.rigid_mass_1, p.rigid_mass_2)[side][element]
-    return available_length(structure, end) - max(0.0, *map(float, rigid))
+    return Joints(structure).available_length(end) - max(0.0, *map(float, rigid))
 
 
 def end_stiffness(frame: Frame, ends: Sequence[str]) -> tuple[float, float, float]:
@@ -124,16 +109,11 @@ def end_stiffness(frame: Frame, ends: Sequence[str]) -> tuple[float, float, floa
 
     Returns:
         4 EI/L about local y, about local z, and GJ/L; what a section does not say is as about y.
-
-    Examples:
-        >>> bending, lateral, torsion = effect.end_stiffness(frame, ["rung-middle@J5"])
-        >>> bending > torsion
-        True
     """
     rows = []
     for end in ends:
         member = frame.members[frame.member_index[end.rpartition("@")[0]]]
-        s, m, length = member.section, member.material, member_length(frame, member.name)
+        s, m, length = member.section, member.material, frame.member_length(member.name)
         bending, lateral = (4.0 * m.E * inertia / length for inertia in (s.Iy, s.Iz or s.Iy))
         rows.append((bending, lateral, m.G * s.J / length))
     own, lateral, torsion = (float(x) for x in np.mean(rows, axis=0))
@@ -150,15 +130,10 @@ def soften_ends(
         stiffness: from ``member@joint`` to local directions to N m/rad; infinite ones are rigid
             and leave the arm.
         arm: its length as a multiple of `end_arm`.
-
-    Examples:
-        >>> softer = effect.soften_ends(frame, {"rung-middle@J5": {"ry": 1e4}})
-        >>> dict(softer.joint_springs[0].stiffness)
-        {'ry': 10000.0}
     """
     structure = Structure.build(frame)
     arms = {end: arm * end_arm(structure, end) for end in stiffness}
-    return spring_ends(frame, stiffness, arms)
+    return Joints(structure).spring_ends(stiffness, arms)
 
 
 def free_arm_change(
@@ -170,17 +145,12 @@ def free_arm_change(
         model, ends, parts: as in `flexible_ends_change`.
         longest: the longest arm, as a multiple of `end_arm`, which is the last value. The matrices
             are interpolated between arms at Chebyshev points.
-
-    Examples:
-        >>> change = effect.free_arm_change(model, ["rung-middle@J5"], [("rx", "ry")], 2.0)
-        >>> change.coefficients(np.array([[1e4, 1.0]])).shape == (1, len(change.terms))
-        True
     """
-    nodes = chebyshev_nodes(0.0, longest, _ARMS)
-    fixed = [flexible_ends_change(model, ends, parts, float(node)) for node in nodes]
+    nodes = ChebyshevPoints(0.0, longest, _ARMS)
+    fixed = [flexible_ends_change(model, ends, parts, float(node)) for node in nodes.points]
 
     def coefficients(values: FloatArray) -> FloatArray:
-        shares = barycentric(nodes, values[:, -1]).T
+        shares = nodes.shares(values[:, -1]).T
         own = zip(shares, fixed, strict=True)
         return np.hstack([share[:, None] * c.coefficients(values[:, :-1]) for share, c in own])
 
@@ -198,11 +168,6 @@ def flexible_ends_change(
         parts: for every value of the change, the local directions of its springs. The values are
             stiffnesses in N m/rad, infinite for rigid connections, of which the arms remain.
         arm: its length as a multiple of `end_arm`.
-
-    Examples:
-        >>> change = effect.flexible_ends_change(model, ["rung-middle@J5"], [("rx", "ry")])
-        >>> sorted({term.matrix for term in change.terms})
-        ['mass', 'stiffness']
     """
     structure = model.frame_structure
     rows = np.array(sorted({structure.element_ends[end][0] for end in ends}), dtype=np.int64)
@@ -249,7 +214,7 @@ def _slots(
     for end in ends:
         element, side = structure.element_ends[end]
         fresh = [d for d in directions if f"{end}:{d}" not in structure.spring_index]
-        own = [6 * side + DIRECTIONS.index(d) for d in fresh]
+        own = [6 * side + _DIRECTIONS.index(d) for d in fresh]
         slots.setdefault(element, []).extend(own)
     return slots
 
@@ -290,8 +255,8 @@ class _Elements:
             return []
         structure, turned = model.frame_structure, np.swapaxes(self.motion, 1, 2)
         p = structure.properties
-        plain_k = once_for(model, "element stiffness", lambda: stiffness_matrices(p))
-        plain_m = once_for(model, "element mass", lambda: mass_matrices(p))
+        plain_k = once_for(model, "element stiffness", lambda: p.stiffness_matrices())
+        plain_m = once_for(model, "element mass", lambda: p.mass_matrices())
         stiffness = turned @ self.stiffness @ self.motion - plain_k[self.rows]
         mass = turned @ self.mass @ self.motion - plain_m[self.rows]
         return [
@@ -316,9 +281,10 @@ def _behind_arms(structure: Structure, rows: IntArray, arms: FloatArray) -> list
     p = replace(p, length=p.length - arms.sum(axis=1))
     motion = np.tile(np.eye(12), (len(rows), 1, 1))
     for side, sign in ((0, 1.0), (1, -1.0)):
-        own = slice(6 * side, 6 * side + 6)
-        motion[:, own, own] = [rigid_arm(np.array([sign * a, 0.0, 0.0])) for a in arms[:, side]]
-    return list(zip(stiffness_matrices(p), mass_matrices(p), motion, strict=True))
+        # A point at a distance a along x moves by a rz in y and by -a ry in z.
+        motion[:, 6 * side + 1, 6 * side + 5] = sign * arms[:, side]
+        motion[:, 6 * side + 2, 6 * side + 4] = -sign * arms[:, side]
+    return list(zip(p.stiffness_matrices(), p.mass_matrices(), motion, strict=True))
 
 
 def _element_items(

@@ -21,16 +21,11 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from femubench.core.change.change import Change
-from femubench.core.change.terms import RowOperator, Term
-from femubench.core.effect.attachments import point_motion
-from femubench.core.effect.places import point_of, supports_of
-from femubench.core.fem.frame import ACTIVE, Frame, GroundSpring
-from femubench.core.fem.model import Model, common_dofs
-from femubench.core.fem.sensors import DIRECTIONS
-from femubench.core.modal.eigen import cache_by_model
-from femubench.core.typing import FloatArray, IntArray, SparseArray
+from femubench import Model
+from femubench.effect import Change, ModelPlaces, Places, RowOperator, Term, once_for
+from femubench.fem import FloatArray, Frame, GroundSpring, IntArray, SparseArray
 
+_DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 Held = tuple[str, str]  # the word of a support, and a direction that it holds
 
 
@@ -41,23 +36,17 @@ def soften_supports(frame: Frame, series: Mapping[Held, float]) -> Frame:
         frame: any frame.
         series: from the word of a support and a direction, as `supports_of` has them, to N/m or
             N m/rad; infinite for a support that does not give.
-
-    Examples:
-        >>> spring = fem.GroundSpring(fem.Place(joint="J1"), "z", 1e4)
-        >>> held = frame.with_attachments((), (spring,))
-        >>> effect.soften_supports(held, {("J1", "z"): 1e4}).springs[0].stiffness
-        5000.0
     """
     given = {held: value for held, value in series.items() if np.isfinite(value)}
     supports, freed = [], {}
     for support in frame.supports:
-        word = str(point_of(frame, str(support.at)))
+        word = str(Places(frame).point(str(support.at)))
         freed.update({(word, d): given[word, d] for d in support.fixed if (word, d) in given})
         kept = tuple(d for d in support.fixed if (word, d) not in given)
         supports += [replace(support, fixed=kept)] if kept else []
-    springs = [GroundSpring(point_of(frame, word), d, k) for (word, d), k in freed.items()]
+    springs = [GroundSpring(Places(frame).point(word), d, k) for (word, d), k in freed.items()]
     for spring in frame.springs:
-        held = str(point_of(frame, str(spring.at))), spring.direction.lstrip("+-")
+        held = str(Places(frame).point(str(spring.at))), spring.direction.lstrip("+-")
         # A spring parallel to a support is at rest, and acts where that gives.
         other = np.inf if held in freed else given.get(held, np.inf)
         softer = spring.stiffness / (1.0 + spring.stiffness / other) if other else 0.0
@@ -73,27 +62,21 @@ def flexible_supports_change(model: Model, parts: Sequence[Sequence[Held]]) -> C
         parts: for every value of the change what it is the stiffness of, as `supports_of` has it.
             The values are in N/m or N m/rad, infinite for rigid supports. The geometric stiffness
             of preloads at the support is left out.
-
-    Examples:
-        >>> held = model.attach([], [fem.GroundSpring(fem.Place(joint="J1"), "z", 1e4)])
-        >>> change = effect.flexible_supports_change(held, [[("J1", "z")]])
-        >>> print(change.coefficients(np.array([[1e4]])))
-        [[-5000.]]
     """
     frame = model.frame_structure.frame
     listed = [(held, column) for column, part in enumerate(parts) for held in part]
     stiff = {
         (word, direction): value
         for word, _ in dict.fromkeys(held for held, _ in listed)
-        for direction, value in supports_of(frame, f"support:{word}")[word].items()
+        for direction, value in Places(frame).supports_of(f"support:{word}")[word].items()
     }
     fixed = [(held, column) for held, column in listed if np.isinf(stiff[held])]
     condensed = _condensed(model, [held for held, _ in fixed], [column for _, column in fixed])
     terms, present, columns = [], [], []
     for (word, direction), column in listed:
-        row = point_motion(model, point_of(frame, word))[[DIRECTIONS.index(direction)]]
+        row = ModelPlaces(model).motion(Places(frame).point(word))[[_DIRECTIONS.index(direction)]]
         for spring in frame.springs if np.isfinite(stiff[word, direction]) else ():
-            same = str(point_of(frame, str(spring.at))) == word
+            same = str(Places(frame).point(str(spring.at))) == word
             if same and spring.direction.lstrip("+-") == direction and spring.stiffness:
                 terms.append(Term("stiffness", RowOperator(row, np.eye(1))))
                 present.append(spring.stiffness)
@@ -154,27 +137,25 @@ class ReleasedSupports(NamedTuple):
         return columns[self.order] if matrix.shape[0] == len(self.order) else columns
 
 
-@cache_by_model
 def release_supports(model: Model) -> ReleasedSupports:
-    """Return a frame without its supports, which still moves as before where it is held.
+    """Return a frame without its supports, which still moves as before where it is held."""
+    return once_for(model, "released supports", lambda: _release(model))
 
-    Examples:
-        >>> effect.release_supports(model).held
-        {}
-    """
+
+def _release(model: Model) -> ReleasedSupports:
     structure = model.frame_structure
-    frame, active = structure.frame, ACTIVE[structure.frame.plane]
-    pairs = ((str(point_of(frame, str(s.at))), d) for s in frame.supports for d in s.fixed)
+    frame, active = structure.frame, structure.frame.active
+    pairs = ((str(Places(frame).point(str(s.at))), d) for s in frame.supports for d in s.fixed)
     held = list(dict.fromkeys(pair for pair in pairs if pair[1] in active))
     # Between the dofs that are held there is no stress of a preload to find.
     bare = replace(frame, preloads=())
     released = Model.of(structure.rebuilt(soften_supports(bare, dict.fromkeys(held, 0.0))))
-    frame = released.frame_structure.frame
+    places = ModelPlaces(released)
     rows = [
-        point_motion(released, point_of(frame, word))[[DIRECTIONS.index(direction)]].indices[0]
+        places.motion(places.point(word))[[_DIRECTIONS.index(direction)]].indices[0]
         for word, direction in held
     ]
-    order = np.array([*common_dofs(structure, released.frame_structure), *rows], dtype=np.int64)
+    order = np.array([*model.dofs_in(released), *rows], dtype=np.int64)
     return ReleasedSupports(released, order, {one: model.size + i for i, one in enumerate(held)})
 
 
