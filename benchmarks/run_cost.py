@@ -50,7 +50,7 @@ class Cost:
         jobs: of the run.
         parent: of the process that asks for it.
         server: from which workers fork, without its start.
-        workers: all of them, strategies and judges.
+        workers: all of them, strategies and judges, and what has raised the walls around them.
         wall: from the first job to the last.
     """
 

@@ -17,7 +17,7 @@ from itertools import pairwise
 from typing import Any
 
 from femubench.core.child.limits import Limits
-from femubench.core.child.namespaces import Walls, go_apart, libc, lower_limit
+from femubench.core.child.namespaces import Apart, libc, lower_limit
 from femubench.core.child.sandbox import enter
 
 READY = b"\1"
@@ -32,9 +32,9 @@ class Confinement:
     Arguments:
         limits: what it may take; time and volume are for its parent to watch.
         path: its search path.
-        folder: where it works; in a sandbox an empty one, where its root is made.
+        folder: where it works, but in a sandbox.
         own: whether the folder is its temporary one too, which the parent removes.
-        walls: of the sandbox; None for none.
+        walled: whether it is in a sandbox.
         environment: instead of that of the fork server; None for that.
         once: whether it is asked once.
         secret: whether other processes of the account may not read its memory (Linux).
@@ -44,13 +44,17 @@ class Confinement:
     path: Sequence[str]
     folder: str = "/"
     own: bool = True
-    walls: Walls | None = None
+    walled: bool = False
     environment: Mapping[str, str] | None = None
     once: bool = True
     secret: bool = False
 
-    def enter(self) -> None:
-        """Go on in it."""
+    def enter(self, apart: Apart | None) -> None:
+        """Go on in it.
+
+        Arguments:
+            apart: as for `answer_requests`.
+        """
         limits = self.limits
         if self.secret and sys.platform == "linux":
             libc().prctl(_PR_SET_DUMPABLE, 0)
@@ -65,10 +69,9 @@ class Confinement:
         if self.own:
             os.environ["TMPDIR"] = tempfile.tempdir = self.folder
         room = limits.file if limits.memory is None else min(limits.file, limits.memory)
-        if self.walls is not None:
-            enter(self.walls, self.folder, room, limits.processes)
-        elif limits.sandbox == "processes":
-            go_apart(None, self.folder, room, limits.processes)
+        assert self.walled == (apart == "walled")
+        if apart is not None:
+            enter(apart, room, limits.processes)
         import resource
 
         lower_limit(resource.RLIMIT_CORE, 0)
@@ -79,17 +82,20 @@ class Confinement:
             lower_limit(resource.RLIMIT_AS, address_space() + limits.memory)
 
 
-def answer_requests(requests: int, answers: int, output: int) -> None:
+def answer_requests(requests: int, answers: int, output: int, apart: Apart | None = None) -> None:
     """Answer requests until there are none; the body of every child.
 
     Arguments:
         requests: gives a `Confinement`, then functions with their arguments.
         answers: takes a byte when the child is ready, then answers, each after its length.
         output: takes what is printed.
+        apart: how it was forked apart, None where it was not.
     """
     stand_alone(output, requests, answers)
+    if apart is None:  # else it ends with the first process of its namespace
+        end_with_parent()
     confinement: Confinement = read_object(requests)
-    confinement.enter()
+    confinement.enter(apart)
     os.write(answers, READY)
     asked = True
     while asked:
@@ -107,14 +113,13 @@ def answer_requests(requests: int, answers: int, output: int) -> None:
 
 
 def stand_alone(output: int, *kept: int) -> None:
-    """Become a session of its own that dies with its parent and shares no terminal with anybody.
+    """Become a session of its own that shares no terminal with anybody.
 
     Arguments:
         output: takes what is printed.
         kept: descriptors that stay open.
     """
     os.setsid()
-    end_with_parent()
     nothing = os.open(os.devnull, os.O_RDONLY)
     for stream, source in enumerate((nothing, output, output)):
         os.dup2(source, stream)

@@ -7,10 +7,8 @@ scenarios, stores, the working folder and home are not.
 
 from __future__ import annotations
 
-import json
 import os
 import platform
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -19,13 +17,13 @@ from functools import cache
 from pathlib import Path
 from typing import Literal
 
-from femubench.core.child import namespaces
-from femubench.core.child.namespaces import FOLDER, Walls, go_apart, lower_limit
+from femubench.core.child.namespaces import FOLDER, Apart, Walls, lower_limit, settle
 from femubench.core.child.syscall_filter import knows_processor, refuse_system_calls
 from femubench.core.errors import InputError
 from femubench.core.schema.run_options import Sandbox
 
-Mode = Sandbox | Literal["processes"]  # the last: only a namespace of processes, where possible
+# The last: only a namespace of processes, where possible; and a sandbox, possible or not.
+Mode = Sandbox | Literal["processes", "try"]
 OFF = "it is switched off"
 _OLDEST = (5, 14)  # Linux: counts the processes of a user in each namespace of users apart
 _SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store")
@@ -57,14 +55,14 @@ def enclosure(mode: Mode) -> Enclosure:
 
     Arguments:
         mode: ``off`` or ``processes`` for no sandbox, ``auto`` for one where that is possible,
-            ``require`` for no run without.
+            ``require`` for no run without, ``try`` for one whether it is possible or not.
 
     Raises:
         InputError: where one is required and is not possible.
     """
     if mode in ("off", "processes"):
         return Enclosure("none", OFF)
-    reason = missing()
+    reason = None if mode == "try" else missing()
     if reason is None:
         return Enclosure("namespaces")
     if mode == "require":
@@ -94,23 +92,11 @@ def _unfit() -> str | None:
 @cache
 def _tried(path: tuple[str, ...]) -> str | None:
     """Return why a process could not go apart, None where one could."""
-    walls = walls_around(())
-    with tempfile.TemporaryDirectory(prefix="femubench-try-") as folder:
-        given = {"shown": walls.shown, "links": walls.links, "hidden": walls.hidden, "at": folder}
-        try:
-            tried = subprocess.run(
-                [sys.executable, "-I", "-S", namespaces.__file__],
-                input=json.dumps(given),
-                capture_output=True,
-                text=True,
-                timeout=_PATIENCE,
-            )
-        except (OSError, subprocess.SubprocessError) as error:
-            return f"it could not be tried: {type(error).__name__}"
-    if tried.returncode == 0:
-        return None
-    said = tried.stderr.strip().splitlines()
-    return said[-1].removeprefix("no sandbox: ") if said else f"exit code {tried.returncode}"
+    from femubench.core.child import limits, workers  # which need this module
+
+    how = limits.Limits(_PATIENCE, sandbox="try")
+    ending = workers.run_apart({0: (bytes, b"")}, how, 1, limits.__name__)[0]
+    return None if ending.how == "answer" else ending.reason.rpartition("no sandbox: ")[2]
 
 
 def walls_around(hidden: Iterable[str], code: Iterable[str] = ()) -> Walls:
@@ -139,21 +125,19 @@ def walls_around(hidden: Iterable[str], code: Iterable[str] = ()) -> Walls:
     return Walls(outermost, links, tuple(_outermost(inside)))
 
 
-def enter(walls: Walls, at: str, room: int, processes: int) -> None:
-    """Go on in a process within walls, whose environment the fork server has freed of secrets.
+def enter(apart: Apart, room: int, processes: int) -> None:
+    """Go on alone in a process that was forked apart, and within walls where there are any.
 
     Arguments:
-        walls, at, room, processes: as for `go_apart`.
-
-    Raises:
-        OSError: as for `go_apart`.
+        apart, room, processes: as for `settle`.
     """
-    import resource
+    settle(apart, room, processes)
+    if apart == "walled":
+        import resource
 
-    go_apart(walls, at, room, processes)
-    os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
-    lower_limit(resource.RLIMIT_NOFILE, _MOST_FILES)
-    refuse_system_calls()
+        os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
+        lower_limit(resource.RLIMIT_NOFILE, _MOST_FILES)
+        refuse_system_calls()
 
 
 def _environment(prefix: Path) -> Iterator[str]:
