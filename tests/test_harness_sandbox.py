@@ -30,7 +30,7 @@ import femubench
 from femubench.core.child import guarded_child, sandbox, server, syscall_filter
 from femubench.core.child.guarded_child import Ending
 from femubench.core.child.limits import MIB, Limits
-from femubench.core.child.sandbox import Enclosure, Sandbox, enclosure, walls_around
+from femubench.core.child.sandbox import Enclosure, enclosure, walls_around
 from femubench.core.child.workers import Workers, run_apart
 from femubench.core.cli.main import bench
 from femubench.core.errors import InputError
@@ -38,6 +38,7 @@ from femubench.core.run import cluster_worker
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.runner import run_jobs
 from femubench.core.schema.results import JobResult
+from femubench.core.schema.run_options import Sandbox
 
 needed = pytest.mark.skipif(sandbox.missing() is not None, reason=f"{sandbox.missing()}")
 
@@ -192,7 +193,7 @@ def test_why_there_is_none(
 @needed
 def test_a_machine_that_refuses_says_what(monkeypatch: pytest.MonkeyPatch) -> None:
     walls = sandbox.Walls(("/no/such/folder",))
-    monkeypatch.setattr("femubench.core.child.workers.walls_around", lambda *_: walls)
+    monkeypatch.setattr(sandbox, "walls_around", lambda _: walls)
     sandbox._tried.cache_clear()
     try:
         found = sandbox.missing()

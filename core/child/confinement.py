@@ -17,11 +17,12 @@ from itertools import pairwise
 from typing import Any
 
 from femubench.core.child.limits import Limits
-from femubench.core.child.namespaces import Apart, libc, lower_limit
-from femubench.core.child.sandbox import enter
+from femubench.core.child.namespaces import FOLDER, Apart, libc, lower_limit, settle
+from femubench.core.child.syscall_filter import refuse_system_calls
 
 READY = b"\1"
 LENGTH_BYTES = 8
+_MOST_FILES = 1024  # open at a time in a sandbox, for each of which is looked at what it holds
 _PR_SET_PDEATHSIG, _PR_SET_DUMPABLE = 1, 4
 
 
@@ -50,11 +51,7 @@ class Confinement:
     secret: bool = False
 
     def enter(self, apart: Apart | None) -> None:
-        """Go on in it.
-
-        Arguments:
-            apart: as for `answer_requests`.
-        """
+        """Go on in it, `apart` being that of `answer_requests`."""
         limits = self.limits
         if self.secret and sys.platform == "linux":
             libc().prctl(_PR_SET_DUMPABLE, 0)
@@ -69,11 +66,16 @@ class Confinement:
         if self.own:
             os.environ["TMPDIR"] = tempfile.tempdir = self.folder
         room = limits.file if limits.memory is None else min(limits.file, limits.memory)
-        assert self.walled == (apart == "walled")
+        if self.walled != (apart == "walled"):
+            raise RuntimeError("the walls of the sandbox are not there")
         if apart is not None:
-            enter(apart, room, limits.processes)
+            settle(apart, room, limits.processes)
         import resource
 
+        if self.walled:
+            os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
+            lower_limit(resource.RLIMIT_NOFILE, _MOST_FILES)
+            refuse_system_calls()
         lower_limit(resource.RLIMIT_CORE, 0)
         lower_limit(resource.RLIMIT_FSIZE, limits.file)
         # Without this the signal would end the process before the write could fail.

@@ -38,7 +38,6 @@ _PIVOT_ROOT = {"x86_64": 155, "aarch64": 41}
 _MOUNT_SETATTR = 442
 _READER = "/bin/cat"
 _INODES = 65536  # of the temporary folder
-_STACK = 2**24  # bytes
 FAILED = 70  # exit code where the namespaces could not be made
 FOLDER = "/own"  # /tmp may hold code that is shown
 _DEVICES = ("null", "zero", "full", "random", "urandom")
@@ -124,7 +123,7 @@ def fork_apart(apart: Apart, go_on: Callable[[], NoReturn]) -> tuple[int, int, i
             found.append(error)
         os.close(reads)
 
-    threading.stack_size(_STACK)  # of the main thread there
+    threading.stack_size(2**24)  # bytes, of the main thread there
     thread = threading.Thread(target=leave, name=threading.main_thread().name)
     thread.start()
     thread.join()

@@ -17,13 +17,14 @@ from functools import cache
 from pathlib import Path
 from typing import Literal
 
-from femubench.core.child.namespaces import FOLDER, Apart, Walls, lower_limit, settle
-from femubench.core.child.syscall_filter import knows_processor, refuse_system_calls
+from femubench.core.child.confinement import Confinement
+from femubench.core.child.guarded_child import GuardedChild, wait_for
+from femubench.core.child.limits import Limits, Mode
+from femubench.core.child.namespaces import Walls
+from femubench.core.child.server import WalledServer
+from femubench.core.child.syscall_filter import knows_processor
 from femubench.core.errors import InputError
-from femubench.core.schema.run_options import Sandbox
 
-# The last: only a namespace of processes, where possible; and a sandbox, possible or not.
-Mode = Sandbox | Literal["processes", "try"]
 OFF = "it is switched off"
 _OLDEST = (5, 14)  # Linux: counts the processes of a user in each namespace of users apart
 _SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store")
@@ -34,7 +35,6 @@ _MODULES = (".py", ".pyc", ".so", ".pth", ".zip", ".egg")
 _ABOUT = (".dist-info", ".egg-info", ".egg-link", ".libs", ".data")
 _PATIENCE = 20.0  # s
 _PACKAGE = Path(__file__).absolute().parents[2]
-_MOST_FILES = 1024  # open at a time, for each of which is looked at what it holds
 
 
 @dataclass(frozen=True)
@@ -55,14 +55,14 @@ def enclosure(mode: Mode) -> Enclosure:
 
     Arguments:
         mode: ``off`` or ``processes`` for no sandbox, ``auto`` for one where that is possible,
-            ``require`` for no run without, ``try`` for one whether it is possible or not.
+            ``require`` for no run without.
 
     Raises:
         InputError: where one is required and is not possible.
     """
     if mode in ("off", "processes"):
         return Enclosure("none", OFF)
-    reason = None if mode == "try" else missing()
+    reason = missing()
     if reason is None:
         return Enclosure("namespaces")
     if mode == "require":
@@ -92,10 +92,20 @@ def _unfit() -> str | None:
 @cache
 def _tried(path: tuple[str, ...]) -> str | None:
     """Return why a process could not go apart, None where one could."""
-    from femubench.core.child import limits, workers  # which need this module
-
-    how = limits.Limits(_PATIENCE, sandbox="try")
-    ending = workers.run_apart({0: (bytes, b"")}, how, 1, limits.__name__)[0]
+    how = Confinement(Limits(_PATIENCE), path, own=False, walled=True)
+    with tempfile.TemporaryDirectory(prefix="femubench-try-") as folder:
+        within = WalledServer(Limits.__module__, walls_around(()), folder)
+        try:
+            child = GuardedChild.start(how, Limits.__module__, within)
+            child.ask(bytes, b"", how.limits)
+            while (ending := child.progress(look=False)) is None:
+                wait_for([child], _PATIENCE)
+            child.kill()
+            child.bury()
+        except OSError as error:
+            return (within.said or str(error)).rpartition("no sandbox: ")[2]
+        finally:
+            within.end()
     return None if ending.how == "answer" else ending.reason.rpartition("no sandbox: ")[2]
 
 
@@ -123,21 +133,6 @@ def walls_around(hidden: Iterable[str], code: Iterable[str] = ()) -> Walls:
     covers.update(_elsewhere(covers, outermost))
     inside = (path for path in covers if any(Path(path).is_relative_to(top) for top in outermost))
     return Walls(outermost, links, tuple(_outermost(inside)))
-
-
-def enter(apart: Apart, room: int, processes: int) -> None:
-    """Go on alone in a process that was forked apart, and within walls where there are any.
-
-    Arguments:
-        apart, room, processes: as for `settle`.
-    """
-    settle(apart, room, processes)
-    if apart == "walled":
-        import resource
-
-        os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
-        lower_limit(resource.RLIMIT_NOFILE, _MOST_FILES)
-        refuse_system_calls()
 
 
 def _environment(prefix: Path) -> Iterator[str]:
