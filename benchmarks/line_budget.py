@@ -23,7 +23,7 @@ BUDGETS = {
     "core/case": 6_852,
     "core/challenge": 2_172,
     "core/change": 1_250,
-    "core/child": 1_899,
+    "core/child": 1_998,
     "core/cli": 2_616,
     "core/conformance": 2_350,
     "core/diagnosis": 2_839,
@@ -35,7 +35,7 @@ BUDGETS = {
     "core/inference": 3_792,
     "core/library": 2_793,
     "core/look": 1_190,
-    "core/modal": 3_585,
+    "core/modal": 3_592,
     "core/plot": 2_840,
     "core/plugin": 1_980,
     "core/publish": 1_480,
@@ -51,9 +51,9 @@ BUDGETS = {
     "papers": 3_290,
     "scenarios": 750,
     "femubench": 370,
-    "tests": 46_001,
+    "tests": 46_176,
     "truths": 13_275,
-    "benchmarks": 7_332,
+    "benchmarks": 7_340,
 }
 ADVICE = (
     "shorten the room: take out what nothing calls, make one of what is there twice; where a "

@@ -24,7 +24,6 @@ from unittest.mock import patch
 import psutil
 from threadpoolctl import threadpool_limits
 
-from femubench.core.child.sandbox import Sandbox
 from femubench.core.child.server import fork_server
 from femubench.core.library.cases import usable_plugins
 from femubench.core.library.rank import plan_run
@@ -36,6 +35,7 @@ from femubench.core.run.judging import judge_outcome
 from femubench.core.run.runner import Plan, Receivers
 from femubench.core.run.slots import Slots
 from femubench.core.run.store import Store
+from femubench.core.schema.run_options import Sandbox
 from femubench.core.score.scoring import reference_of
 
 NULL_JOBS = 60
@@ -50,7 +50,7 @@ class Cost:
         jobs: of the run.
         parent: of the process that asks for it.
         server: from which workers fork, without its start.
-        workers: all of them, strategies and judges.
+        workers: all of them, strategies and judges, and what has raised the walls around them.
         wall: from the first job to the last.
     """
 

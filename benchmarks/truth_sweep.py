@@ -54,7 +54,6 @@ from femubench.core.challenge.outcome import (
     OUTCOMES,
     Same,
     counts_as_right,
-    describe_structure,
     is_finding,
     outcome,
     record_of,
@@ -317,6 +316,15 @@ def scored(records: Mapping[str, Record], truths: Iterable[KnownCase], suite: Pa
                 )
             )
     return found
+
+
+def describe_structure(record: Record) -> str:
+    """Return what is said of the structure apart from faults of data and input."""
+    verdict = str(record["verdict"])
+    if verdict not in ("named", "ambiguous"):
+        return verdict.replace("-", " ")
+    causes = Answer.model_validate(record["answer"]).causes
+    return "a cause" if any(cause.side == "model" for cause in causes) else "none"
 
 
 def stated(truth: KnownCase, record: Record, same: Same) -> list[Statement]:

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+import runpy
+import shlex
+import shutil
+import sys
 from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
 
 import performance
 import pytest
@@ -12,6 +17,35 @@ from tuning import tuned
 
 from benchmarks.identify_sweep import one
 from tests.identify_score import NAMES, covered
+
+ROOT = Path(__file__).parents[1]
+# The least that a benchmark can be asked for; the seconds that it takes where they are many.
+SHORT = {
+    "ablation": ("frame --jobs 1", 60),
+    "board_checks": ("", 90),
+    "boards": ("default --from docs/figures/board-default.json", 0),
+    "budget_score": ("portal", 0),
+    "clean_sweep": ("1 --results clean.jsonl", 60),
+    "diagnosis_cost": ("frame", 10),
+    "diagnosis_sweep": ("run --cases 1 --jobs 1 --groups pairs --results blind.jsonl", 20),
+    "identify_sweep": ("--sets 1 --references 3 --jobs 1", 0),
+    "knowledge_free": ("--memory suite/a-frame", 5),
+    "line_budget": ("", 0),
+    "method_by_parameters": ("", 0),
+    "mutations": ("--list", 0),
+    "number_sweep": ("run --numbers sure_fault --cases 1 --results numbers.jsonl", 10),
+    "open_cells": ("--quick", 120),
+    "performance": ("--only mesh --within 1", 20),
+    "reproduce_updates": ("", 90),
+    "run_cost": ("frame -s unchanged", 20),
+    "scaling": ("'modes of a lattice' 3", 0),
+    "store": ("--results 1000", 40),
+    "time_left": ("frame", 0),
+    "truth_sweep": ("run a-frame-clean-1 --jobs 1 --results truth.jsonl", 40),
+    "tuning": ("global --structures 3 --jobs 1", 10),
+}
+# What is not for a test: packages of npm, and a browser with a store of everything.
+ELSEWHERE = {"drawing_libraries", "report_speed"}
 
 
 def test_a_setting_is_chosen_on_one_half_and_stated_on_the_other() -> None:
@@ -42,3 +76,55 @@ def test_a_hundred_fresh_sets_are_identified() -> None:
     assert sum(item.within for item in scores) >= 95
     for name in NAMES:
         assert 0.85 <= covered(scores, name) <= 0.97
+
+
+def test_every_benchmark_with_a_command_line_is_known() -> None:
+    files = (ROOT / "benchmarks").glob("*.py")
+    commands = {file.stem for file in files if "__main__" in file.read_text(encoding="utf-8")}
+    assert commands == SHORT.keys() | ELSEWHERE
+
+
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A tree with docs of its own, into which benchmarks write."""
+    made = tmp_path_factory.mktemp("tree")
+    shutil.copy(ROOT / "README.md", made)
+    for name in ("benchmarks", "docs"):
+        shutil.copytree(ROOT / name, made / name)
+    for part in ROOT.iterdir():
+        if not (made / part.name).exists() and not part.name.startswith("."):
+            (made / part.name).symlink_to(part)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        pytest.param(name, words, marks=[pytest.mark.slow(seconds)] if seconds else [], id=name)
+        for name, (words, seconds) in SHORT.items()
+    ],
+)
+def test_a_benchmark_runs(
+    name: str,
+    words: str,
+    tree: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tree)
+    monkeypatch.syspath_prepend(tree / "benchmarks")
+    monkeypatch.setattr(sys, "argv", [name, *shlex.split(words)])
+    # They import each other, and what was imported before writes to the docs of this tree.
+    own = {file.stem for file in (tree / "benchmarks").glob("*.py")} - {"conftest"}
+    before = {known: sys.modules.pop(known) for known in own & sys.modules.keys()}
+    code: object = 0
+    try:
+        runpy.run_path(str(tree / "benchmarks" / f"{name}.py"), run_name="__main__")
+    except SystemExit as end:
+        code = end.code
+    finally:
+        for known in own:
+            sys.modules.pop(known, None)
+        sys.modules.update(before)
+    assert not code
+    assert any(capfd.readouterr())

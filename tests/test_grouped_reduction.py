@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
+from scipy.sparse.linalg import ArpackNoConvergence
 
 import femubench
 from femubench import Case, InputError, Measurement, Model, Sensors, solve_modes
@@ -20,6 +21,7 @@ from femubench.core.case.writing import write_case
 from femubench.core.change.terms import ElementOperator
 from femubench.core.errors import ModelError
 from femubench.core.fem.beam import BeamProperties
+from femubench.core.modal import grouped_reduction
 from femubench.core.modal.grouped_reduction import reduce_groups
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.typing import FloatArray, SparseArray
@@ -131,6 +133,20 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def case(folder: Path) -> Case:
     """Return the case as it is read."""
     return reduce_case(read_case(folder), above=500)
+
+
+def test_a_basis_that_does_not_converge_leaves_the_whole_model(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def without(*_: object, **__: object) -> None:
+        raise ArpackNoConvergence("no convergence", np.zeros(0), np.zeros((0, 0)))
+
+    monkeypatch.setattr(grouped_reduction, "_DENSE", 10)
+    monkeypatch.setattr(grouped_reduction, "eigsh", without)
+    case = reduce_case(read_case(folder), above=500)
+    assert case.whole is None
+    assert case.model.size == MODEL.size
+    assert case.notes[-1].endswith("modes of a group with its border held do not converge")
 
 
 @pytest.mark.parametrize("name", [JOINT, "joint C", "left", "beam"])

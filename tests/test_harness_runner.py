@@ -234,7 +234,9 @@ def test_workers_that_cannot_start_end_the_run(
     run = run_jobs([everything["case"]], [toys.Unchanged(), toys.Softer()], jobs=1)
     assert {item.status for item in run.results} == {"crashed"}
     reasons = {item.reason for item in run.results}
-    assert reasons == {"the worker process ended with exit code 3 before it was ready"}
+    assert reasons == {
+        "the worker process ended with exit code 3 before it was ready: there is no room"
+    }
 
 
 def test_wrong_input_is_said() -> None:

@@ -7,12 +7,13 @@ import json
 import os
 import re
 import secrets
+import signal
 import socket
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -29,7 +30,7 @@ import femubench
 from femubench.core.child import guarded_child, sandbox, server, syscall_filter
 from femubench.core.child.guarded_child import Ending
 from femubench.core.child.limits import MIB, Limits
-from femubench.core.child.sandbox import Enclosure, Sandbox, enclosure, walls_around
+from femubench.core.child.sandbox import Enclosure, enclosure, walls_around
 from femubench.core.child.workers import Workers, run_apart
 from femubench.core.cli.main import bench
 from femubench.core.errors import InputError
@@ -37,6 +38,7 @@ from femubench.core.run import cluster_worker
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.runner import run_jobs
 from femubench.core.schema.results import JobResult
+from femubench.core.schema.run_options import Sandbox
 
 needed = pytest.mark.skipif(sandbox.missing() is not None, reason=f"{sandbox.missing()}")
 
@@ -190,14 +192,16 @@ def test_why_there_is_none(
 
 @needed
 def test_a_machine_that_refuses_says_what(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sandbox, "walls_around", lambda _: sandbox.Walls(("/no/such/folder",)))
+    walls = sandbox.Walls(("/no/such/folder",))
+    monkeypatch.setattr(sandbox, "walls_around", lambda _: walls)
     sandbox._tried.cache_clear()
     try:
         found = sandbox.missing()
     finally:
         sandbox._tried.cache_clear()
     assert found is not None
-    assert "No such file or directory" in found
+    assert found.startswith("mount of ")
+    assert found.endswith("/no/such/folder: No such file or directory")
 
 
 class TestWalls:
@@ -268,12 +272,50 @@ def test_the_first_process_leads_to_nothing_outside() -> None:
         until = time.monotonic() + 30.0
         while not (child._printed or time.monotonic() > until):
             pool.wait()
-        inside = guarded_child.processes_of(child.pid, walled=True)
+        inside = guarded_child.processes_of(child.pid, child.first)
         assert len(inside) == 2
         for process in inside:
             home = Path(f"/proc/{process.pid}")
             assert Path(os.readlink(home / "cwd")) in (Path("/"), Path("/own"))
             assert os.path.samefile(home / "cwd/..", home / "root")
+
+
+@needed
+def test_a_job_sees_nothing_of_another_within_the_same_walls() -> None:
+    limits = Limits(60.0, 400 * MIB, sandbox="require")
+    with Workers[int](2).open() as pool:
+        assert ended(scanner.leave_traces, limits, "end", pool).answer.decode() == (
+            "/own/left, /tmp/left, module, variable, process, "
+            "socket of family 2, socket of family 1"
+        )
+        assert ended(scanner.seen_traces, limits, None, pool).answer == b""
+        assert pool.start(2, scanner.leave_traces, "stay", limits) is None
+        ((_, stays),) = pool._running
+        while not stays._printed:
+            assert pool.wait() == []
+        seen = ended(scanner.seen_traces, limits, None, pool)
+        assert (seen.how, seen.answer) == ("answer", b"")
+        assert len(pool._servers) == 1
+        assert stays.alive
+    assert not psutil.pid_exists(stays.first)
+
+
+@needed
+def test_jobs_start_again_when_what_has_raised_their_walls_was_ended() -> None:
+    limits = Limits(60.0, 400 * MIB, sandbox="require")
+    with Workers[int](1).open() as pool:
+        assert pool.start(1, scanner.ready_and_waiting, None, limits) is None
+        ((_, child),) = pool._running
+        (walled,) = {psutil.Process(number).ppid() for number in (child.pid, child.first)}
+        os.kill(walled, signal.SIGKILL)
+        found: list[tuple[int, Ending]] = []
+        while not found:
+            found = pool.wait()
+        assert [(key, ending.how) for key, ending in found] == [(1, "orphaned")]
+        missed = pool.start(2, bytes, b"", limits)
+        assert missed is not None
+        assert missed.how == "no-start"
+        assert ended(bytes, limits, b"here", pool).answer == b"here"
 
 
 @needed
@@ -294,8 +336,10 @@ def _sees(walls: sandbox.Walls, path: Path) -> bool:
     return shown and not hidden
 
 
-def ended(function: object, limits: Limits, argument: object = None) -> Ending:
-    with Workers[int](1).open() as pool:
+def ended(
+    function: object, limits: Limits, argument: object = None, among: Workers[int] | None = None
+) -> Ending:
+    with nullcontext(among) if among else Workers[int](1).open() as pool:
         assert pool.start(1, function, argument, limits) is None  # type: ignore[arg-type]
         found: list[tuple[int, Ending]] = []
         while not found:

@@ -71,6 +71,17 @@ def test_indefinite_sparse_stiffness(ladder: FrameBuilder) -> None:
     assert (found < -1.0).any()
 
 
+def test_eigenvalues_far_below_zero_are_an_error_of_the_model(ladder: FrameBuilder) -> None:
+    """Lanczos cannot tell them from the highest ones; ARPACK's own error was no ModelError."""
+    model = Model.of(ladder(elements=12))
+    dip = np.zeros(model.size)
+    dip[30:33] = -1e12
+    with pytest.raises(
+        ModelError, match=r"^3 eigenvalues below -\S+ \(rad/s\)\^2 do not converge$"
+    ):
+        lowest_eigenpairs(replace(model, stiffness=model.stiffness + sp.diags_array(dip)), 12)
+
+
 def test_repeated_eigenvalues_are_all_found() -> None:
     section = Section.round_tube(0.02, 0.002)
     joints = (Joint("A", (0.0, 0.0, 0.0)), Joint("B", (0.3, 0.4, 0.5)))

@@ -122,15 +122,6 @@ def outcome(truth: KnownCase, record: Record, same: Same) -> str:
     return "one of two" if half else "wrong"
 
 
-def describe_structure(record: Record) -> str:
-    """Return what is said of the structure apart from faults of data and input."""
-    verdict = str(record["verdict"])
-    if verdict not in ("named", "ambiguous"):
-        return verdict.replace("-", " ")
-    causes = Answer.model_validate(record["answer"]).causes
-    return "a cause" if any(cause.side == "model" for cause in causes) else "none"
-
-
 def counts_as_right(truth: KnownCase, said: str) -> bool:
     """Tell whether an outcome is the best that can be said of a truth."""
     if truth.kind == "clean":

@@ -17,11 +17,12 @@ from itertools import pairwise
 from typing import Any
 
 from femubench.core.child.limits import Limits
-from femubench.core.child.namespaces import Walls, go_apart, libc, lower_limit
-from femubench.core.child.sandbox import enter
+from femubench.core.child.namespaces import FOLDER, Apart, libc, lower_limit, settle
+from femubench.core.child.syscall_filter import refuse_system_calls
 
 READY = b"\1"
 LENGTH_BYTES = 8
+_MOST_FILES = 1024  # open at a time in a sandbox, for each of which is looked at what it holds
 _PR_SET_PDEATHSIG, _PR_SET_DUMPABLE = 1, 4
 
 
@@ -32,9 +33,9 @@ class Confinement:
     Arguments:
         limits: what it may take; time and volume are for its parent to watch.
         path: its search path.
-        folder: where it works; in a sandbox an empty one, where its root is made.
+        folder: where it works, but in a sandbox.
         own: whether the folder is its temporary one too, which the parent removes.
-        walls: of the sandbox; None for none.
+        walled: whether it is in a sandbox.
         environment: instead of that of the fork server; None for that.
         once: whether it is asked once.
         secret: whether other processes of the account may not read its memory (Linux).
@@ -44,13 +45,13 @@ class Confinement:
     path: Sequence[str]
     folder: str = "/"
     own: bool = True
-    walls: Walls | None = None
+    walled: bool = False
     environment: Mapping[str, str] | None = None
     once: bool = True
     secret: bool = False
 
-    def enter(self) -> None:
-        """Go on in it."""
+    def enter(self, apart: Apart | None) -> None:
+        """Go on in it, `apart` being that of `answer_requests`."""
         limits = self.limits
         if self.secret and sys.platform == "linux":
             libc().prctl(_PR_SET_DUMPABLE, 0)
@@ -65,12 +66,16 @@ class Confinement:
         if self.own:
             os.environ["TMPDIR"] = tempfile.tempdir = self.folder
         room = limits.file if limits.memory is None else min(limits.file, limits.memory)
-        if self.walls is not None:
-            enter(self.walls, self.folder, room, limits.processes)
-        elif limits.sandbox == "processes":
-            go_apart(None, self.folder, room, limits.processes)
+        if self.walled != (apart == "walled"):
+            raise RuntimeError("the walls of the sandbox are not there")
+        if apart is not None:
+            settle(apart, room, limits.processes)
         import resource
 
+        if self.walled:
+            os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
+            lower_limit(resource.RLIMIT_NOFILE, _MOST_FILES)
+            refuse_system_calls()
         lower_limit(resource.RLIMIT_CORE, 0)
         lower_limit(resource.RLIMIT_FSIZE, limits.file)
         # Without this the signal would end the process before the write could fail.
@@ -79,17 +84,20 @@ class Confinement:
             lower_limit(resource.RLIMIT_AS, address_space() + limits.memory)
 
 
-def answer_requests(requests: int, answers: int, output: int) -> None:
+def answer_requests(requests: int, answers: int, output: int, apart: Apart | None = None) -> None:
     """Answer requests until there are none; the body of every child.
 
     Arguments:
         requests: gives a `Confinement`, then functions with their arguments.
         answers: takes a byte when the child is ready, then answers, each after its length.
         output: takes what is printed.
+        apart: how it was forked apart, None where it was not.
     """
     stand_alone(output, requests, answers)
+    if apart is None:  # else it ends with the first process of its namespace
+        end_with_parent()
     confinement: Confinement = read_object(requests)
-    confinement.enter()
+    confinement.enter(apart)
     os.write(answers, READY)
     asked = True
     while asked:
@@ -107,14 +115,13 @@ def answer_requests(requests: int, answers: int, output: int) -> None:
 
 
 def stand_alone(output: int, *kept: int) -> None:
-    """Become a session of its own that dies with its parent and shares no terminal with anybody.
+    """Become a session of its own that shares no terminal with anybody.
 
     Arguments:
         output: takes what is printed.
         kept: descriptors that stay open.
     """
     os.setsid()
-    end_with_parent()
     nothing = os.open(os.devnull, os.O_RDONLY)
     for stream, source in enumerate((nothing, output, output)):
         os.dup2(source, stream)

@@ -22,7 +22,7 @@ import psutil
 from femubench.core.child.confinement import LENGTH_BYTES, READY, Confinement, object_frames
 from femubench.core.child.limits import Limits, format_bytes
 from femubench.core.child.namespaces import FOLDER, libc
-from femubench.core.child.server import LAST_BREATH, NUMBER, end_group, end_server, fork_server
+from femubench.core.child.server import LAST_BREATH, NUMBER, WalledServer, end_group, fork_server
 
 How = Literal[
     "answer", "timeout", "memory", "output", "answer-size", "died", "no-start", "orphaned"
@@ -30,6 +30,7 @@ How = Literal[
 _START = 120.0  # s that a process may take until it is ready
 _CHUNK = 2**20
 _CHUNKS = 16  # that are read before anybody looks at the clock again
+_LONGEST = 500  # bytes of what a child says that does not get ready
 _TICK = 0.5  # s between two looks at a server that may have been stopped
 _PIDFD_GETFD = 438
 _SO_MEMINFO, _FIGURES = 55, 9  # of SK_MEMINFO
@@ -63,6 +64,7 @@ class GuardedChild:
         requests, answers, output, status: our ends of its pipes.
         confinement: how it runs.
         limits: on the request that it is at.
+        first: number of the first process of its namespace of processes, 0 where it has none.
     """
 
     pid: int
@@ -72,6 +74,7 @@ class GuardedChild:
     status: int
     confinement: Confinement
     limits: Limits
+    first: int = 0
     code: int | None = None
     _started: float = field(default_factory=time.monotonic)
     _asked: float = 0.0
@@ -79,15 +82,19 @@ class GuardedChild:
     _killed: float = math.inf
     _received: bytearray = field(default_factory=bytearray)
     _printed: int = 0
+    _said: bytes = b""
     _unsent: list[memoryview] = field(default_factory=list)
 
     @classmethod
-    def start(cls, confinement: Confinement, module: str) -> GuardedChild:
+    def start(
+        cls, confinement: Confinement, module: str, within: WalledServer | None = None
+    ) -> GuardedChild:
         """Start a child.
 
         Arguments:
             confinement: how it runs.
             module: of ours, which the fork server loads first.
+            within: from which it forks; None for the fork server itself. One that fails is ended.
 
         Raises:
             OSError: when there is none to be had.
@@ -100,17 +107,18 @@ class GuardedChild:
                 kept.callback(os.close, mine)
                 theirs.append(its)
                 ours.append(mine)
-            server = fork_server()
+            server = within or fork_server()
             try:
                 server.ask(module, theirs)
                 given.close()
-                pid = _number(ours[-1])
+                pid, first = _numbers(ours[-1])
             except OSError:
-                end_server(server)
+                server.end()
                 raise
             for end in ours:
                 os.set_blocking(end, False)
-            child = cls(pid, ours[0], ours[1], ours[2], ours[3], confinement, confinement.limits)
+            limits = confinement.limits
+            child = cls(pid, ours[0], ours[1], ours[2], ours[3], confinement, limits, first)
             child._send(confinement)
             kept.pop_all()  # else the child, where there is one, ends for want of a request
         return child
@@ -222,6 +230,8 @@ class GuardedChild:
                 self._close(name)
                 return
             if name == "output":
+                if self._ready is None:
+                    self._said = (self._said + data)[-_LONGEST:]
                 self._printed += len(data)
                 if self._printed > self.limits.output:
                     return
@@ -245,7 +255,10 @@ class GuardedChild:
                 self._close("status")
 
     def _death(self) -> str:
-        when = "" if self._ready is not None else " before it was ready"
+        when = ""
+        if self._ready is None:
+            why = self._said.decode(errors="replace").strip().rpartition("\n")[2]
+            when = " before it was ready" + f": {why}" * bool(why)
         assert self.code is not None
         if self.code >= 0:
             return f"the worker process ended with exit code {self.code}{when}"
@@ -255,8 +268,8 @@ class GuardedChild:
 
     def _excess(self) -> str | None:
         """Return of what it has more than it may, None where it keeps its limits."""
-        limits, walled = self.limits, self.confinement.walls is not None
-        processes = processes_of(self.pid, walled=walled)
+        limits, walled = self.limits, self.confinement.walled
+        processes = processes_of(self.pid, self.first)
         if len(processes) > limits.processes:
             return f"has {len(processes)} processes, allowed {limits.processes}"
         if limits.memory is not None:
@@ -309,31 +322,27 @@ def wait_for(children: Iterable[GuardedChild], seconds: float) -> None:
     poll.poll(max(1000.0 * seconds, 0.0))
 
 
-def _number(status: int) -> int:
-    """Wait for the number of a child that was asked for."""
+def _numbers(status: int) -> tuple[int, int]:
+    """Wait for the numbers of a child that was asked for and of the first of its namespace."""
     until = time.monotonic() + _START
     while not select.select([status], [], [], _TICK)[0]:
         if time.monotonic() > until:
             raise TimeoutError("the process from which all workers are started does not answer")
         fork_server().wake()
-    data = os.read(status, NUMBER)
+    data = os.read(status, 2 * NUMBER)
     if not data:
         raise BrokenPipeError("the process from which all workers are started was ended")
-    return int.from_bytes(data, "big")
+    return int.from_bytes(data[:NUMBER], "big"), int.from_bytes(data[NUMBER:], "big")
 
 
-def processes_of(leader: int, *, walled: bool) -> list[psutil.Process]:
-    """Return a worker and all processes below it.
-
-    Arguments:
-        leader: the worker.
-        walled: whether it only waits for the one in its sandbox.
-    """
-    with suppress(psutil.Error):
-        top = psutil.Process(leader)
-        below = top.children(recursive=True)
-        return below if walled else [top, *below]
-    return []
+def processes_of(*leaders: int) -> list[psutil.Process]:
+    """Return processes by their numbers, and all below them; a number may be 0 for none."""
+    found = list[psutil.Process]()
+    for leader in filter(None, leaders):
+        with suppress(psutil.Error):
+            top = psutil.Process(leader)
+            found += [top, *top.children(recursive=True)]
+    return found
 
 
 def memory_of(processes: Iterable[psutil.Process], root: str | None) -> int:

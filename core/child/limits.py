@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
-from femubench.core.child.sandbox import Mode
+from femubench.core.schema.run_options import Sandbox
 
+Mode = Sandbox | Literal["processes"]  # the last: only a namespace of processes, where possible
 MIB = 2**20
 _SHARE = 0.9  # of the memory that is there, for all workers together
 LEAST = 512 * MIB

@@ -1,11 +1,10 @@
 """A process apart from the rest of the machine: namespaces of its own around a root of few folders.
 
 Of the file system there is what `Walls` name, read-only, and an empty temporary folder; of other
-processes, the network, System V objects and the host's name there is nothing. Three processes take
-part: the caller, which waits; the first of the new namespace of processes, whose end ends all in
-it; and the one that goes on, with no capability and without the system calls of `syscall_filter`.
-
-Run as a program it tries whether this machine allows that, and needs the standard library alone.
+processes, the network, System V objects and the host's name there is nothing. One process raises
+the walls and forks all others into them, each into namespaces of its own, so that none sees what
+another has left: there is the first of a namespace of processes, whose end ends all in it, and the
+one that goes on, with no capability and without the system calls of `syscall_filter`.
 
 Source: user_namespaces(7), mount_namespaces(7), pid_namespaces(7), pivot_root(2).
 """
@@ -13,17 +12,17 @@ Source: user_namespaces(7), mount_namespaces(7), pid_namespaces(7), pivot_root(2
 from __future__ import annotations
 
 import ctypes
-import json
 import os
 import platform
-import signal
 import socket
 import struct
 import sys
+import threading
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, Literal, NoReturn
 
 _NEW_MOUNTS, _NEW_NAME, _NEW_IPC = 0x00020000, 0x04000000, 0x08000000
 _NEW_USER, _NEW_PROCESSES, _NEW_NETWORK = 0x10000000, 0x20000000, 0x40000000
@@ -42,6 +41,8 @@ _INODES = 65536  # of the temporary folder
 FAILED = 70  # exit code where the namespaces could not be made
 FOLDER = "/own"  # /tmp may hold code that is shown
 _DEVICES = ("null", "zero", "full", "random", "urandom")
+# How the children of a process are apart: all but code is elsewhere, or processes alone are.
+Apart = Literal["walled", "alone"]
 
 
 @dataclass(frozen=True)
@@ -59,52 +60,86 @@ class Walls:
     hidden: tuple[str, ...] = ()
 
 
-def go_apart(walls: Walls | None, at: str, room: int, processes: int) -> None:
-    """Return in a new process within walls; the caller waits, and ends as that one does.
+def raise_walls(walls: Walls | None, at: str) -> Apart:
+    """Leave the files of this machine, and return how children can be apart.
 
     Arguments:
-        walls: what there is inside; with None only a namespace of processes is made, where that is
-            possible, and the root, rights and network stay.
+        walls: what there is inside; None where the files stay.
         at: an empty folder, used to build the new root.
-        room: bytes that the temporary folder may hold.
-        processes: that there may be, with their threads.
 
     Raises:
         OSError: where the system refuses the namespaces; this process may then have lost rights.
     """
-    if walls is None and not _may_unshare():
-        return
-    _unshare(alone=walls is None)
-    # The first process of the namespace, whose end ends all in it, is a program that reads until
-    # the end, and small, where a copy of this process would be as large as this one. That it hears
-    # of no signal from within makes it no place for a strategy: one that ends itself would go on.
-    # Anyone who may look at it goes where its folder leads. From the root it moves to the new one.
-    os.chdir("/")
-    reads, alive = os.pipe()
-    for descriptor in range(3, alive):
-        with suppress(OSError):
-            os.set_inheritable(descriptor, False)
-    actions = [
-        (os.POSIX_SPAWN_DUP2, reads, 0),
-        *((os.POSIX_SPAWN_OPEN, stream, os.devnull, os.O_WRONLY, 0) for stream in (1, 2)),
-    ]
-    first = os.posix_spawn(_READER, [_READER], {}, file_actions=actions)
-    os.close(reads)
-    strategy = os.fork()
-    if strategy:
-        os.closerange(3, alive)
-        _, status = os.waitpid(strategy, 0)
-        os.close(alive)
-        os.kill(first, signal.SIGKILL)
-        os.waitpid(first, 0)
-        code = os.waitstatus_to_exitcode(status)
-        if code < 0:
-            with suppress(OSError):
-                signal.signal(-code, signal.SIG_DFL)
-            os.kill(os.getpid(), -code)
-            signal.pause()
-        os._exit(code)
-    os.close(alive)
+    if sys.platform != "linux":
+        raise OSError("namespaces are of Linux")
+    # Root keeps its rights.
+    if walls is None or os.geteuid() != 0 or libc().unshare(_NEW_MOUNTS) != 0:
+        own = os.open("/proc/self", os.O_PATH)
+        _own_users(_NEW_MOUNTS, own)
+        os.close(own)
+    if walls is not None:
+        _build(walls, at)
+    os.chdir("/")  # whoever may look at a process goes where its folder leads
+    return "alone" if walls is None else "walled"
+
+
+def fork_apart(apart: Apart, go_on: Callable[[], NoReturn]) -> tuple[int, int, int]:
+    """Fork a process into namespaces of its own.
+
+    The first one there, whose end ends all, is a program that reads until the end: it hears of no
+    signal from within, so that a strategy in its place that ends itself would go on, and a copy of
+    this process would be as large. Whoever has made a namespace of processes forks into it ever
+    after: a thread makes it, and ends.
+
+    Arguments:
+        apart: of this process, which has raised the walls.
+        go_on: what the new process does; it begins with `settle`.
+
+    Returns:
+        Its number, that of the first process, and what to close so that the first one ends.
+
+    Raises:
+        OSError: where the system refuses it.
+    """
+    found: list[tuple[int, int, int] | OSError] = []
+
+    def leave() -> None:
+        reads, alive = os.pipe()
+        try:
+            more = (_NEW_NAME | _NEW_IPC | _NEW_NETWORK) * (apart == "walled")
+            _call("unshare", "namespaces", _NEW_PROCESSES | _NEW_MOUNTS | more)
+            actions = [
+                (os.POSIX_SPAWN_DUP2, reads, 0),
+                *((os.POSIX_SPAWN_OPEN, stream, os.devnull, os.O_WRONLY, 0) for stream in (1, 2)),
+            ]
+            first = os.posix_spawn(_READER, [_READER], {}, file_actions=actions)
+            process = os.fork()
+            if not process:
+                os.close(alive)
+                go_on()
+            found.append((process, first, alive))
+        except OSError as error:
+            os.close(alive)
+            found.append(error)
+        os.close(reads)
+
+    threading.stack_size(2**24)  # bytes, of the main thread there
+    thread = threading.Thread(target=leave, name=threading.main_thread().name)
+    thread.start()
+    thread.join()
+    if isinstance(found[0], OSError):
+        raise found[0]
+    return found[0]
+
+
+def settle(apart: Apart, room: int, processes: int) -> None:
+    """Make what a process from `fork_apart` has to itself, and give up its rights.
+
+    Arguments:
+        apart: of the process from which it was forked.
+        room: bytes that its temporary folder may hold.
+        processes: that there may be, with their threads.
+    """
     try:
         # The limit on a user's processes does not bind root, that on their numbers does.
         release = tuple(int(part) for part in platform.release().split(".")[:2])
@@ -112,13 +147,16 @@ def go_apart(walls: Walls | None, at: str, room: int, processes: int) -> None:
         if release >= (6, 14):
             with suppress(OSError):
                 _write("/proc/sys/kernel/pid_max", str(max(processes, 301)))
-        if walls is None:
+        own = os.open("/proc/self", os.O_PATH)
+        if apart == "alone":
             with suppress(OSError):
                 _mount("", "/", flags=_RECURSIVE | _PRIVATE)
                 _mount("proc", "/proc", "proc", _NO_SUID | _NO_DEV | _NO_EXEC)
-            os.chdir(at)
         else:
-            _build(walls, at, room)
+            limits = f"mode=700,size={room},nr_inodes={_INODES}"
+            _mount("tmpfs", FOLDER, "tmpfs", _NO_SUID | _NO_DEV, limits)
+            _mount("proc", "/proc", "proc", _READ_ONLY | _NO_SUID | _NO_DEV | _NO_EXEC)
+            os.chdir(FOLDER)
             # A loopback that leads to nobody else, and another name of the host.
             _call("sethostname", "a name", b"sandbox", 7)
             import fcntl
@@ -127,13 +165,17 @@ def go_apart(walls: Walls | None, at: str, room: int, processes: int) -> None:
                 request = struct.pack("16sh14x", b"lo", 0)
                 (flags,) = struct.unpack_from("16xh", fcntl.ioctl(any_socket, _FLAGS_OF, request))
                 fcntl.ioctl(any_socket, _SET_FLAGS_OF, struct.pack("16sh14x", b"lo", flags | _UP))
+        # Else a user's limit on processes would count those of all jobs.
+        with suppress(OSError):
+            _own_users(0, own)
+        os.close(own)
+        if apart == "walled":
             capability = 0
             while libc().prctl(_DROP_BOUND, capability, 0, 0, 0) == 0:
                 capability += 1
             _call("prctl", "ambient capabilities", _AMBIENT, _CLEAR_AMBIENT, 0, 0, 0)
             head = struct.pack("=Ii", _CAPABILITY_VERSION, 0)
             _call("capset", "capabilities", head, bytes(24))
-        os.setsid()
         import resource
 
         lower_limit(resource.RLIMIT_NPROC, processes)
@@ -142,42 +184,21 @@ def go_apart(walls: Walls | None, at: str, room: int, processes: int) -> None:
         os._exit(FAILED)
 
 
-def _may_unshare() -> bool:
-    """Tell whether a namespace of processes is to be had.
-
-    Another process tries it: one that may make a namespace of users and not write their map is
-    good for nothing (Ubuntu 24.04).
-    """
-    if sys.platform != "linux" or not os.path.exists(_READER):
-        return False
-    trial = os.fork()
-    if not trial:
-        with suppress(OSError):
-            _unshare(alone=True)
-            os._exit(0)
-        os._exit(FAILED)
-    return os.waitpid(trial, 0)[1] == 0
-
-
-def _unshare(*, alone: bool) -> None:
-    """Let the next child begin namespaces of its own.
+def _own_users(wanted: int, own: int) -> None:
+    """Be the one user of a namespace, with others of which that is the owner.
 
     Arguments:
-        alone: whether one of processes is enough.
+        wanted: the others.
+        own: the folder of this process in a file system of processes that can be written to.
 
     Raises:
-        OSError: as for `go_apart`.
+        OSError: where the system refuses it.
     """
     user, group = os.geteuid(), os.getegid()
-    wanted = _NEW_PROCESSES | _NEW_MOUNTS
-    if not alone:
-        wanted |= _NEW_NAME | _NEW_IPC | _NEW_NETWORK
-    elif user == 0 and libc().unshare(wanted) == 0:  # keeps the rights of root
-        return
     _call("unshare", "namespaces", wanted | _NEW_USER)
-    _write("/proc/self/setgroups", "deny")
-    _write("/proc/self/uid_map", f"{user} {user} 1")
-    _write("/proc/self/gid_map", f"{group} {group} 1")
+    _write("setgroups", "deny", own)
+    _write("uid_map", f"{user} {user} 1", own)
+    _write("gid_map", f"{group} {group} 1", own)
 
 
 def lower_limit(what: int, wanted: int) -> None:
@@ -189,7 +210,7 @@ def lower_limit(what: int, wanted: int) -> None:
     resource.setrlimit(what, (soft, hard))
 
 
-def _build(walls: Walls, at: str, room: int) -> None:
+def _build(walls: Walls, at: str) -> None:
     """Make a root of the paths of some walls, and make it the root of this namespace."""
     mask = os.umask(0o022)
     _mount("", "/", flags=_RECURSIVE | _PRIVATE)
@@ -220,18 +241,12 @@ def _build(walls: Walls, at: str, room: int) -> None:
         _mount(f"/dev/{name}", f"{at}/dev/{name}", flags=_BIND)
         # It can be written to all the same, but whose it is and who may use it stays.
         _lock(f"{at}/dev/{name}", _ATTR_READ_ONLY | _ATTR_NO_SUID)
-    limits = f"mode=700,size={room},nr_inodes={_INODES}"
-    _mount("tmpfs", at + FOLDER, "tmpfs", _NO_SUID | _NO_DEV, limits)
-    _mount("proc", f"{at}/proc", "proc", _READ_ONLY | _NO_SUID | _NO_DEV | _NO_EXEC)
+    # Hidden by that of each job; where none is seen, none may be mounted, and none is written to.
+    _mount("/proc", f"{at}/proc", flags=_BIND | _RECURSIVE)
     os.chdir(at)
     _call("syscall", "pivot_root", _PIVOT_ROOT[platform.machine()], b".", b".")
     _call("umount2", "the old root", b".", _DETACH)
     os.umask(mask)
-    os.chdir(FOLDER)
-    # What is open was opened outside, where it is not read-only.
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.close(nothing)
 
 
 def _point(path: str, *, folder: bool) -> None:
@@ -267,27 +282,12 @@ def _mount(source: str, target: str, kind: str = "", flags: int = 0, data: str =
     _call("mount", target, *words, wanted, os.fsencode(data) if data else None)
 
 
-def _write(path: str, text: str) -> None:
+def _write(path: str, text: str, own: int | None = None) -> None:
+    """Write to a file, which may be one of the folder of a process."""
     try:
-        with open(path, "wb", buffering=0) as stream:
+        file = os.open(path, os.O_WRONLY | os.O_CREAT, 0o644, dir_fd=own)
+        with open(file, "wb", buffering=0) as stream:
             stream.write(text.encode())
     except OSError as error:
-        raise OSError(error.errno, f"write of {path}: {error.strerror}") from error
-
-
-def main() -> None:
-    """Try it with the walls and the folder on standard input; fail in one line."""
-    given = json.load(sys.stdin)
-    walls = Walls(given["shown"], given["links"], given["hidden"])
-    try:
-        go_apart(walls, given["at"], 2**20, 64)
-        with open(f"{FOLDER}/written", "w") as stream:
-            stream.write("yes")
-    except OSError as error:
-        os.write(2, f"no sandbox: {error.strerror}\n".encode())
-        os._exit(FAILED)
-    os._exit(0)
-
-
-if __name__ == "__main__":
-    main()
+        where = os.path.join("/proc/self", path)
+        raise OSError(error.errno, f"write of {where}: {error.strerror}") from error

@@ -7,10 +7,8 @@ scenarios, stores, the working folder and home are not.
 
 from __future__ import annotations
 
-import json
 import os
 import platform
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -19,13 +17,14 @@ from functools import cache
 from pathlib import Path
 from typing import Literal
 
-from femubench.core.child import namespaces
-from femubench.core.child.namespaces import FOLDER, Walls, go_apart, lower_limit
-from femubench.core.child.syscall_filter import knows_processor, refuse_system_calls
+from femubench.core.child.confinement import Confinement
+from femubench.core.child.guarded_child import GuardedChild, wait_for
+from femubench.core.child.limits import Limits, Mode
+from femubench.core.child.namespaces import Walls
+from femubench.core.child.server import WalledServer
+from femubench.core.child.syscall_filter import knows_processor
 from femubench.core.errors import InputError
-from femubench.core.schema.run_options import Sandbox
 
-Mode = Sandbox | Literal["processes"]  # the last: only a namespace of processes, where possible
 OFF = "it is switched off"
 _OLDEST = (5, 14)  # Linux: counts the processes of a user in each namespace of users apart
 _SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store")
@@ -36,7 +35,6 @@ _MODULES = (".py", ".pyc", ".so", ".pth", ".zip", ".egg")
 _ABOUT = (".dist-info", ".egg-info", ".egg-link", ".libs", ".data")
 _PATIENCE = 20.0  # s
 _PACKAGE = Path(__file__).absolute().parents[2]
-_MOST_FILES = 1024  # open at a time, for each of which is looked at what it holds
 
 
 @dataclass(frozen=True)
@@ -94,23 +92,21 @@ def _unfit() -> str | None:
 @cache
 def _tried(path: tuple[str, ...]) -> str | None:
     """Return why a process could not go apart, None where one could."""
-    walls = walls_around(())
+    how = Confinement(Limits(_PATIENCE), path, own=False, walled=True)
     with tempfile.TemporaryDirectory(prefix="femubench-try-") as folder:
-        given = {"shown": walls.shown, "links": walls.links, "hidden": walls.hidden, "at": folder}
+        within = WalledServer(Limits.__module__, walls_around(()), folder)
         try:
-            tried = subprocess.run(
-                [sys.executable, "-I", "-S", namespaces.__file__],
-                input=json.dumps(given),
-                capture_output=True,
-                text=True,
-                timeout=_PATIENCE,
-            )
-        except (OSError, subprocess.SubprocessError) as error:
-            return f"it could not be tried: {type(error).__name__}"
-    if tried.returncode == 0:
-        return None
-    said = tried.stderr.strip().splitlines()
-    return said[-1].removeprefix("no sandbox: ") if said else f"exit code {tried.returncode}"
+            child = GuardedChild.start(how, Limits.__module__, within)
+            child.ask(bytes, b"", how.limits)
+            while (ending := child.progress(look=False)) is None:
+                wait_for([child], _PATIENCE)
+            child.kill()
+            child.bury()
+        except OSError as error:
+            return (within.said or str(error)).rpartition("no sandbox: ")[2]
+        finally:
+            within.end()
+    return None if ending.how == "answer" else ending.reason.rpartition("no sandbox: ")[2]
 
 
 def walls_around(hidden: Iterable[str], code: Iterable[str] = ()) -> Walls:
@@ -137,23 +133,6 @@ def walls_around(hidden: Iterable[str], code: Iterable[str] = ()) -> Walls:
     covers.update(_elsewhere(covers, outermost))
     inside = (path for path in covers if any(Path(path).is_relative_to(top) for top in outermost))
     return Walls(outermost, links, tuple(_outermost(inside)))
-
-
-def enter(walls: Walls, at: str, room: int, processes: int) -> None:
-    """Go on in a process within walls, whose environment the fork server has freed of secrets.
-
-    Arguments:
-        walls, at, room, processes: as for `go_apart`.
-
-    Raises:
-        OSError: as for `go_apart`.
-    """
-    import resource
-
-    go_apart(walls, at, room, processes)
-    os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
-    lower_limit(resource.RLIMIT_NOFILE, _MOST_FILES)
-    refuse_system_calls()
 
 
 def _environment(prefix: Path) -> Iterator[str]:

@@ -10,7 +10,6 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -43,7 +42,8 @@ class Workers(Generic[Key]):
         self._dying: list[GuardedChild] = []
         self._root = Path()
         self._looked = 0.0
-        self._walls = lru_cache(walls_around)
+        self._servers: dict[tuple[tuple[str, ...], ...], server.WalledServer] = {}
+        self._apart = True  # whether a namespace of processes alone is to be had, as far as known
 
     @property
     def running(self) -> int:
@@ -65,6 +65,9 @@ class Workers(Generic[Key]):
                     self._end(child)
                 self._running = []
                 self._bury(wait=True)
+                for within in self._servers.values():
+                    within.end()
+                self._servers.clear()
                 self._end_strays()
 
     def start(
@@ -78,25 +81,45 @@ class Workers(Generic[Key]):
             argument: its argument; pickled.
             limits: what it may take.
         """
-        self._root.mkdir(mode=0o700, parents=True, exist_ok=True)  # a job may have removed it
-        scratch = tempfile.mkdtemp(dir=self._root)
+        within = None
         try:
-            child = GuardedChild.start(self._confinement(limits, scratch), self._module)
+            how, within = self._confinement(limits)
+            child = GuardedChild.start(how, self._module, within)
         except OSError as error:
-            return Ending("no-start", reason=f"no worker process could start: {error}")
+            if within is not None and not how.walled:  # no namespace of processes is to be had
+                self._apart = False
+                return self.start(key, function, argument, limits)
+            why = (within and within.said) or error
+            return Ending("no-start", reason=f"no worker process could start: {why}")
         self._running.append((key, child))  # first: what cannot be pickled raises
         child.ask(function, argument, limits)
         return None
 
-    def _confinement(self, limits: Limits, scratch: str) -> Confinement:
+    def _confinement(self, limits: Limits) -> tuple[Confinement, server.WalledServer | None]:
+        """Return how a task runs, and the server from which it forks where that has walls."""
         path = server.search_path()
         if enclosure(limits.sandbox).sandbox != "none":
-            walls = self._walls(limits.hidden, limits.shown)
-            return Confinement(limits, path, scratch, walls=walls)
+            within = self._server(limits.hidden, limits.shown)
+            return Confinement(limits, path, own=False, walled=True), within
         environment = {**os.environ, **server.ONE_THREAD, server.MARK: server.fork_server().mark}
         if limits.sandbox == "processes":
-            return Confinement(limits, path, os.getcwd(), own=False, environment=environment)
-        return Confinement(limits, path, scratch, environment=environment)
+            how = Confinement(limits, path, os.getcwd(), own=False, environment=environment)
+            return how, self._server() if self._apart else None
+        return Confinement(limits, path, self._scratch(), environment=environment), None
+
+    def _server(self, *seen: tuple[str, ...]) -> server.WalledServer:
+        """Return the server with the walls for `walls_around`: one for all jobs of a run."""
+        found = self._servers.get(seen)
+        if found is None or not found.alive:
+            walls = walls_around(*seen) if seen else None
+            found = server.WalledServer(self._module, walls, self._scratch())
+            self._servers[seen] = found
+        return found
+
+    def _scratch(self) -> str:
+        """Make an empty folder."""
+        self._root.mkdir(mode=0o700, parents=True, exist_ok=True)  # a job may have removed it
+        return tempfile.mkdtemp(dir=self._root)
 
     def wait(self, others: Sequence[GuardedChild] = ()) -> list[tuple[Key, Ending]]:
         """Wait until some task has ended, and return those that have; none after a short while.
@@ -144,7 +167,7 @@ class Workers(Generic[Key]):
         with suppress(psutil.Error):
             for child in psutil.Process().children():
                 if child.pid != running.process.pid and self._is_stray(child, running.mark):
-                    for process in processes_of(child.pid, walled=False):
+                    for process in processes_of(child.pid):
                         server.end_group(process.pid)
                     with suppress(ChildProcessError):
                         os.waitpid(child.pid, 0)

@@ -29,7 +29,7 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
@@ -416,8 +416,11 @@ def _held_modes(
     operator = LinearOperator((size, size), matvec=solve, dtype=float)
     modes, values = np.zeros((size, 0)), np.zeros(0)
     for count in (min(most, loaded // 2) for most in (8, 24, _MOST_HELD) if loaded > 1):
-        values, modes = eigsh(stiffness, k=count, M=mass, sigma=0.0, OPinv=operator, which="LM",
-                              v0=np.ones(size))  # fmt: skip
+        try:
+            values, modes = eigsh(stiffness, k=count, M=mass, sigma=0.0, OPinv=operator,
+                                  which="LM", v0=np.ones(size))  # fmt: skip
+        except ArpackError as error:
+            raise ModelError("modes of a group with its border held do not converge") from error
         if values.max() > limit:
             break
     return np.asarray(modes / np.sqrt(values))[:, values <= limit]

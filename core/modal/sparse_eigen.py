@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
-from scipy.sparse.linalg import LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import LowRank, Model
@@ -25,6 +25,7 @@ _BELOW_SMOOTH = 1e-3  # shift over the softest smooth field's eigenvalue
 _NEGATIVE = 1e-6  # of the highest eigenvalue found: above it a negative one is a zero
 _SPARE = 2  # modes found above those that are wanted
 _ROUNDS = 12
+_RESTARTS = 100  # of Lanczos, for eigenvalues below a shift
 _SEPARATE = 1e-5  # of an eigenvalue: closer ones are counted as one
 _ROUNDING = 1e-13  # of the largest k/m, below which K - shift M may be indefinite by rounding
 _FLAT = 1e-3  # extent of a planar structure across its plane, over its size
@@ -257,12 +258,18 @@ def _shift_invert(
     count = min(count, size - known.modes.shape[1] - 1)
     first = operate(model.mass_times(start))
     pieces = []
-    for which, k in (("LA", count), ("SA", below)):
-        if k > 0:
+    for which, side, k, most in (("LA", "above", count, None), ("SA", "below", below, _RESTARTS)):
+        if k <= 0:
+            continue
+        try:
             pieces.append(
                 eigsh(stiffness, k=k, M=mass, sigma=shifted.shift, OPinv=inverse,
-                      which=which, v0=first, tol=0.0)
+                      which=which, v0=first, tol=0.0, maxiter=most)
             )  # fmt: skip
+        except ArpackError as error:
+            # Far below the shift they lie next to the highest ones of its inverse.
+            what = f"{k} eigenvalues {side} {shifted.shift:.3g} (rad/s)^2 do not converge"
+            raise ModelError(what) from error
     eigenvalues = np.concatenate([values for values, _ in pieces])
     shapes = pieces[0][1] if len(pieces) == 1 else np.hstack([vectors for _, vectors in pieces])
     order = np.argsort(eigenvalues, kind="stable")

@@ -28,7 +28,6 @@ from femubench.core.schema.bounds import (
 from femubench.core.schema.paired_modes import PairedMode
 
 Status = Literal["ok", "failed", "timeout", "crashed", "diverged", "not-applicable"]
-STATUSES: tuple[Status, ...] = get_args(Status)
 # A result, though there may be no model; everything else is a failure and no result.
 DONE: frozenset[Status] = frozenset({"ok", "not-applicable"})
 BLOCKS = ("used", "higher", "modified")

@@ -391,9 +391,10 @@ def standing(_: object) -> bytes:
 
 
 class NoStart(Confinement):
-    """Ends a worker before it is ready."""
+    """Ends a worker before it is ready, and says why."""
 
-    def enter(self) -> None:
+    def enter(self, apart: object) -> None:
+        print("a line", "there is no room", sep="\n", flush=True)
         os._exit(3)
 
 
