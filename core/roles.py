@@ -25,7 +25,7 @@ Scaling = Literal["linear", "exponential", "compliance", "factor", "log"]
 Wording = Literal["value", "change", "share"]
 # Where something is wrong: in the structure's model, in what was measured, in what was typed in.
 Side = Literal["model", "data", "input"]
-CAPABILITIES = ("shapes", "parts", "elements", "geometry", "joints")
+CAPABILITIES = ("shapes", "parts", "elements", "geometry", "joints", "responses")
 
 
 @runtime_checkable

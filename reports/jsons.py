@@ -22,7 +22,8 @@ from femubench.results import (
 _SAME = (
     *("error_percent", "textbook_percent", "better_share", "worse_share", "error_gain"),
     *("change_gain", "gain_drawn", "gain_tests", "band_percent", "shape_error", "false_modes"),
-    *("higher_percent", "modified_percent", "answered", "ok"),
+    *("higher_percent", "modified_percent", "responses_db", "responses_floor_db"),
+    *("answered", "ok"),
 )
 _FIGURES = {**dict(zip(_SAME, _SAME, strict=True)), "given_percent": "used_percent", "of": "total"}
 

@@ -59,6 +59,8 @@ _FIGURES = {
     "shape_error": Column("1-MAC", 5, digits=3),
     "false_modes": Column("false\nmodes", 5, digits=2),
     "used_percent": Column("given\n%", 5, digits=2),
+    "responses_db": Column("resp.\ndB", 5, digits=2),
+    "responses_floor_db": Column("noise\ndB", 5, digits=2),
     "parameters": Column("par.", 5),
     "seconds": Column("s", 4, digits=3),
     "better_than": Column("above", 5),
@@ -74,6 +76,8 @@ _LEGEND = {
     "the given frequencies nearly are the answer; shapes; modes that a test would see and did not",
     "given": "rms error in percent of the modes that were given; median over the cases, as are "
     "par. and s: unknowns that were free, wall time",
+    "resp., noise": "rms error of the log-magnitude of held-out responses, and what the noise of "
+    "the test makes of it; median over the cases, no part of the gain",
     "above, below": "number of lines that it is shown to be better and worse than",
     "=": "yardstick that knows nothing of the structure; without rank",
     "!": "some models lost rigid-body modes or have negative eigenvalues",

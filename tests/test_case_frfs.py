@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
+import pickle
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 import femubench
-from femubench import Case, InputError, Sensors, read_case
+from femubench import (
+    Case,
+    InputError,
+    Measurement,
+    Model,
+    Sensors,
+    Strategy,
+    UpdateResult,
+    read_case,
+)
 from femubench.core.case.response_files import responses_npz
 from femubench.core.case.writing import write_case
 from femubench.core.drawing.prediction import drive_sensor, frequency_axis, list_receptances
+from femubench.core.study.conditions import vary_case
+from femubench.core.twin.twins import twins_of
 from femubench.modal import FrequencyResponses, receptance
 
 DRIVEN = 4
@@ -52,8 +66,126 @@ def test_a_case_has_its_responses(with_frfs: Case, plain: Case) -> None:
 
 def test_strategies_see_no_response(with_frfs: Case) -> None:
     """They hold the held-out modes."""
-    used = with_frfs.used_measurement()
-    assert not any(isinstance(part, FrequencyResponses) for part in vars(used).values())
+    assert with_frfs.used_measurement().responses is None
+
+
+USED, HIDDEN = "used = [[170, 190], [210.0, 250]]", "{label!r}"
+SPLIT = f"{USED}, held_out = [[260, 280]], held_out_sensors = [{HIDDEN}], std = 0.02, floor = 1e-9"
+
+
+def split_case(case: Case, keys: str) -> Case:
+    """Return a case whose responses are split by keys, with the label of its last sensor."""
+    words = keys.format(label=case.measurement.sensors.labels[-1])
+    toml = case.folder / "case.toml"
+    text = toml.read_text("utf-8")
+    text = text.replace("[measurement]", f"[measurement]\nresponses = {{{words}}}", 1)
+    toml.write_text(text, "utf-8")
+    return read_case(case.folder)
+
+
+@dataclass(frozen=True)
+class Snoop(Strategy):
+    """Searches all that it is given for numbers that it must not have."""
+
+    name: ClassVar[str] = "snoop"
+    citation: ClassVar[str] = "none"
+
+    hidden: tuple[complex, ...] = ()
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        content = pickle.dumps((model, measurement))
+        held = [v for v in self.hidden if np.complex128(v).tobytes() in content]
+        given = measurement.responses
+        assert given is not None
+        return UpdateResult(model, diagnostics={"seen": len(held), "lines": len(given.frequencies)})
+
+
+@pytest.mark.slow(20)
+def test_a_strategy_finds_no_response_that_is_held_out(with_frfs: Case) -> None:
+    """Neither in what it is handed in this process nor in the isolated job of a run."""
+    case = split_case(with_frfs, SPLIT)
+    frfs = case.frfs
+    assert frfs is not None
+    assert case.split is not None
+    lines = [np.flatnonzero(frfs.frequencies >= hz)[5] for hz in (150.0, 200.0, 260.0)]
+    hidden = [frfs.values[line, 2, 0] for line in lines] + [frfs.values[40, -1, 0]]
+    given = case.used_measurement().responses
+    assert given is not None
+    assert (len(given.responses), given.values.base) == (12, None)
+    shown = frfs.values[np.flatnonzero(frfs.frequencies > 215.0)[0], 2, 0]
+    spies = [Snoop(hidden=tuple(map(complex, hidden))), Snoop(hidden=(complex(shown),))]
+    for spy, seen in zip(spies, (0.0, 1.0), strict=True):
+        run = femubench.rank([case.folder], [spy], twins=0, jobs=1, nominal="drawn")
+        (result,) = (r for r in run.results)
+        assert result.status == "ok", result.reason
+        assert result.diagnostics["seen"] == seen
+        assert result.diagnostics["lines"] == len(given.frequencies)
+
+
+def test_noise_of_a_seed_has_the_stated_deviations(with_frfs: Case) -> None:
+    case = split_case(with_frfs, SPLIT)
+    plain, drawn = (case.used_measurement(seed).responses for seed in (0, 1))
+    assert plain is not None
+    assert drawn is not None
+    assert plain.deviations == pytest.approx(np.hypot(0.02 * abs(plain.values), 1e-9))
+    errors = (drawn.values - plain.values) / plain.deviations
+    assert np.std(errors.real) == pytest.approx(1.0, rel=0.05)
+    assert np.std(errors.imag) == pytest.approx(1.0, rel=0.05)
+    louder = vary_case(case, 3.0, 4).used_measurement(1).responses
+    assert louder is not None
+    known = [plain.responses.labels.index(label) for label in louder.responses.labels]
+    assert len(known) in (8, 9)  # one of the four is held out already, or none
+    assert louder.deviations == pytest.approx(3.0 * plain.deviations[:, known])
+
+
+def test_a_twin_has_no_responses_of_the_structure(with_frfs: Case) -> None:
+    (twin,) = twins_of([split_case(with_frfs, SPLIT)], 1, 0)
+    assert (twin.frfs, twin.split, twin.used_measurement(1).responses) == (None, None, None)
+
+
+def test_a_case_with_split_responses_is_written_and_read_back(
+    with_frfs: Case, tmp_path: Path
+) -> None:
+    case = split_case(with_frfs, SPLIT)
+    write_case(tmp_path / "copy", case)
+    back = read_case(tmp_path / "copy")
+    assert back.split == case.split
+    assert "used lines" in str(back)
+    assert back.frfs is not None
+    assert case.frfs is not None
+    assert np.array_equal(back.frfs.receptance_std, case.frfs.receptance_std)
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ("used = []", "one at least"),
+        ("used = [[190, 170]], std = 0.01", "the band is empty"),
+        ("used = [[1, 2]], std = 0.01", "no line lies in the band"),
+        ("used = [[170, 200], [180, 250]], std = 0.01", "meets another"),
+        ("used = [[170, 190]], held_out = [[180, 250]], std = 0.01", "meets another"),
+        ("used = [[170, 190]]", "the file has no deviations"),
+        ("used = [[170, 190]], std = 0.01, held_out_sensors = ['q']", "no response of 'q'"),
+        ("used = [[170, 190]], std = 0.01, lines = 3", "lines"),
+    ],
+)
+def test_a_wrong_split_is_one_line(with_frfs: Case, keys: str, says: str) -> None:
+    with pytest.raises(InputError, match=says) as caught:
+        split_case(with_frfs, keys)
+    assert "responses" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_used_lines_have_no_resonance_that_is_held_out(with_frfs: Case) -> None:
+    hertz = with_frfs.measurement.select(with_frfs.held_out).frequencies[0]
+    frfs = with_frfs.frfs
+    assert frfs is not None
+    wide = replace(frfs, frequencies=np.linspace(100.0, 1.1 * hertz, len(frfs.frequencies)))
+    (with_frfs.folder / "measured.npz").write_bytes(responses_npz(wide))
+    with pytest.raises(InputError, match="have the resonance of held-out mode"):
+        split_case(with_frfs, f"used = [[110, {1.01 * hertz}]], std = 0.01")
 
 
 def test_the_measured_curve_is_drawn(with_frfs: Case, plain: Case) -> None:

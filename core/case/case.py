@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from femubench.core.display import Shown, modes_line
+from femubench.core.display import Shown, count_noun, modes_line
 from femubench.core.fem.alteration import Alteration, alter_model
 from femubench.core.fem.frame import GroundSpring, Place, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import DENSE_LIMIT, once_for
-from femubench.core.modal.frf import FrequencyResponses
+from femubench.core.modal.frf import FrequencyResponses, ResponseSplit
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray
 
@@ -119,7 +119,8 @@ class Case(Shown):
         lines: that draw the structure of the test, in m along the axes of the model, (k, 2, 3).
         whole: the model as it came, where `model` is its reduction to groups; None elsewhere.
         frfs: measured frequency responses of the structure as tested; they hold the held-out modes
-            too, and are drawn, never handed to a strategy.
+            too, and are drawn.
+        split: which of them a strategy is given and which only the score sees; None for neither.
     """
 
     name: str
@@ -143,6 +144,7 @@ class Case(Shown):
     matches: tuple[Match, ...] = ()
     lines: FloatArray | None = None
     frfs: FrequencyResponses | None = None
+    split: ResponseSplit | None = None
     whole: Model | None = None
 
     def rows(self) -> list[tuple[str, str]]:
@@ -165,6 +167,10 @@ class Case(Shown):
             found.append(("reference", modes_line(self.reference_used, known)))
         if self.frfs is not None:
             found.append(("frfs", self.frfs.rows()[0][1]))
+            if self.split is not None:
+                given = self.split.given(self.frfs)
+                where = count_noun(len(given.responses), "sensor")
+                found.append(("used lines", f"{given.rows()[1][1]}, at {where}"))
         found += [("modified", str(change)) for change in self.modifications]
         return [*found, *(("note", note) for note in self.notes)]
 
@@ -187,11 +193,13 @@ class Case(Shown):
         return self.name
 
     def used_measurement(self, seed: int = 0) -> Measurement:
-        """Return what a strategy may know: the used modes, noise added for a seed other than 0.
+        """Return what a strategy may know: used modes and responses, with noise of a seed but 0.
 
         Seed 0 is the data as recorded; every other seed is one draw at the stated deviations.
         """
         used = self.measurement.select(self.used)
+        if self.frfs is not None and self.split is not None:
+            used = replace(used, responses=self.split.given(self.frfs))
         if seed == 0:
             return used
         words = [seed, *self.drawn_as.encode()]

@@ -201,8 +201,4 @@ def observe_at(measurement: Measurement, sensors: Sensors) -> Measurement:
 
 def select_measured(sensors: Sensors, shapes: FloatArray) -> Sensors:
     """Return the sensors at which some mode has a shape."""
-    keep = [int(i) for i in np.flatnonzero(np.isfinite(shapes).any(axis=1))]
-    labels, directions = (
-        [names[i] for i in keep] for names in (sensors.labels, sensors.directions)
-    )
-    return Sensors(tuple(labels), sensors.xyz[keep], tuple(directions))
+    return sensors.take(np.flatnonzero(np.isfinite(shapes).any(axis=1)))

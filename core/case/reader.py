@@ -41,6 +41,7 @@ from femubench.core.case.nodes import MatrixGeometry, with_mesh
 from femubench.core.case.reducing import reduce_case
 from femubench.core.case.repeats import with_covariance, with_repeats
 from femubench.core.case.response_files import read_responses
+from femubench.core.case.response_split import split_responses
 from femubench.core.case.schema import (
     CaseSpec,
     FileSpec,
@@ -56,7 +57,7 @@ from femubench.core.fem.frame import Frame, Member
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
 from femubench.core.files import read_text
-from femubench.core.modal.frf import FrequencyResponses
+from femubench.core.modal.frf import FrequencyResponses, ResponseSplit
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Reader
 from femubench.core.typing import FloatArray
@@ -140,7 +141,7 @@ class _Building:
         info = self.spec.case
         modifications = self.modifications(model, site, measurement.sensors)
         reference = self.reference(site, measurement.sensors)
-        frfs = self.frfs(measurement.sensors)
+        frfs, split = self.frfs(measurement)
         return Case(
             name=info.name if name is None else name,
             title=info.title or info.name,
@@ -159,6 +160,7 @@ class _Building:
             beam_share=self.spec.diagnosis.beam_share,
             structure=info.structure,
             frfs=frfs,
+            split=split,
             digest=self.files.digest(),  # of all that was read
             notes=tuple(self.notes),
             matches=self.matches,
@@ -253,12 +255,14 @@ class _Building:
         self.notes |= dict.fromkeys((*stated, *more))
         return found
 
-    def frfs(self, sensors: Sensors) -> FrequencyResponses | None:
-        """Return the measured frequency responses."""
-        name = self.spec.measurement.frfs
+    def frfs(self, measured: Measurement) -> tuple[FrequencyResponses | None, ResponseSplit | None]:
+        """Return the measured frequency responses, and which of them a strategy is given."""
+        name, spec = self.spec.measurement.frfs, self.spec.measurement.responses
+        key, sensors = ("measurement", "frfs"), measured.sensors
         if name is None:
-            return None
-        key = ("measurement", "frfs")
+            if spec is not None:
+                raise BadKey(("measurement", "responses"), "no responses", "a file in frfs")
+            return None, None
         with at_key(*key):
             path = self.files.path(name)
         found = read_responses(path, self.readers, sensors)
@@ -267,7 +271,8 @@ class _Building:
         if not set(found.responses.labels) & set(sensors.labels):
             expected = f"labels as in the file, e.g. {found.responses.labels[0]!r}"
             raise BadKey(key, "no response belongs to a sensor of the case", expected)
-        return found
+        held_out = set(self.spec.measurement.held_out)
+        return (found, None) if spec is None else split_responses(found, spec, measured, held_out)
 
     @property
     def reference_used(self) -> tuple[int, ...]:

@@ -162,7 +162,8 @@ def _of_arrays(file: Path) -> FrequencyResponses:
             names = [tuple(held[side].tolist()) for side in ("responses", "references")]
             first, second = map(Sensors.unplaced, names)
             hz, values, quantity = (held[key] for key in ("frequencies", "values", "quantity"))
-            return FrequencyResponses(first, second, hz, values, str(quantity[0]))  # type: ignore[arg-type]
+            more = str(quantity[0]), held.get("deviations")
+            return FrequencyResponses(first, second, hz, values, *more)  # type: ignore[arg-type]
     except Exception as error:  # whatever a broken file makes of this reader
         what = f"cannot be read: {' '.join(str(error).split())[:200]}"
         raise InputError(what, file=file, expected="responses in arrays by name") from None
@@ -182,11 +183,10 @@ def _labelled(file: Path, found: Responses, known: Sensors | None) -> Responses:
         raise InputError(what, file=file, expected="motions of one kind, in m/s2, m/s or m")
     values = found.values * [factor for _, factor, _ in named]
     labels = [label or f"?{k}" for k, (_, _, label) in enumerate(named)]
-    motions, forces = ([labels[k] for k in np.flatnonzero(some)] for some in (~acting, acting))
-    ways = tuple(np.array(found.sensors.directions)[~acting].tolist())
-    sensors, own = Sensors(tuple(motions), found.sensors.xyz[~acting], ways), found.forces
+    named_so, own = replace(found.sensors, labels=tuple(labels)), found.forces
+    sensors = named_so.take(np.flatnonzero(~acting))
     if acting.any():
-        own = Sensors.unplaced(forces)
+        own = Sensors.unplaced(labels[k] for k in np.flatnonzero(acting))
         found = replace(found, force_values=values[:, acting])
     sensors, own = _both_sides(file, (sensors, own), known)
     quantity: Any = quantities.pop()
@@ -250,7 +250,8 @@ def _sensors(file: Path, side: Sensors, known: Sensors | None) -> Sensors:
 
 def responses_npz(measured: FrequencyResponses) -> bytes:
     """Return frequency responses as a NumPy file that `read_responses` reads."""
-    held = BytesIO()
+    held, stds = BytesIO(), measured.deviations
+    more: dict[str, Any] = {} if stds is None else {"deviations": stds}
     np.savez_compressed(
         held,
         frequencies=measured.frequencies,
@@ -258,6 +259,7 @@ def responses_npz(measured: FrequencyResponses) -> bytes:
         responses=np.array(measured.responses.labels),
         references=np.array(measured.references.labels),
         quantity=np.array([measured.quantity]),
+        **more,
     )
     return held.getvalue()
 

@@ -73,6 +73,7 @@ At = Annotated[InstanceOf[Place], BeforeValidator(_place)]
 DofName = Annotated[int | str, PlainValidator(_dof_name)]
 Vector = tuple[Number, Number, Number]
 Many = tuple[T, ...]
+Bands = Annotated[Many[tuple[Positive, Positive]], Field(max_length=1000)]
 DIRECTIONS = "one of x, y, z, rx, ry, rz, with an optional sign"
 NAME = "a name without @, / and :, in quotes"
 BAND = "[low, high] in Hz with low < high"
@@ -387,6 +388,20 @@ class ScatterSpec(TomlTable):
     shapes: NotNegative = Field(SCATTER[1], description="a number >= 0, of the largest reading")
 
 
+class ResponsesSpec(TomlTable):
+    """`responses` in `[measurement]`."""
+
+    used: Annotated[Bands, Field(min_length=1)] = Field(
+        description="a list of bands [low, high] in Hz, one at least"
+    )
+    held_out: Bands = Field((), description="a list of bands [low, high] in Hz")
+    held_out_sensors: Many[Text] = Field(
+        (), max_length=1000, description="a list of labels of sensors"
+    )
+    std: Positive | None = Field(None, description="a number > 0, of the magnitude of a line")
+    floor: NotNegative = Field(0.0, description="a number >= 0, in the unit of the responses")
+
+
 class MeasurementSpec(TomlTable):
     """`[measurement]`."""
 
@@ -415,6 +430,7 @@ class MeasurementSpec(TomlTable):
         {}, description='names of variables, e.g. {frequencies = "f_exp", shapes = "Psi"}'
     )
     frfs: FileName | None = Field(None, description="a file in the case folder")
+    responses: ResponsesSpec | None = Field(None, description="{used, held_out, std} with bands")
 
 
 class ReferenceSpec(TomlTable):

@@ -93,7 +93,17 @@ _SAME_MATRIX = 1e-9  # of the diagonal: far above rounding, far below any change
 
 
 _SETTINGS = (
-    *("name", "title", "source", "structure", "used", "held_out", "band", "reference_used"),
+    *(
+        "name",
+        "title",
+        "source",
+        "structure",
+        "used",
+        "held_out",
+        "band",
+        "reference_used",
+        "split",
+    ),
     *("tolerance", "model_error", "beam_share"),
 )
 
@@ -134,11 +144,13 @@ def _same_responses(one: FrequencyResponses | None, other: FrequencyResponses | 
     if one is None or other is None:
         return one is other
     sides = ("responses", "references")
+    stds = [np.asarray(item.deviations, dtype=float) for item in (one, other)]  # None is nan
     return (
         all(getattr(one, side).labels == getattr(other, side).labels for side in sides)
         and one.quantity == other.quantity
         and np.array_equal(one.frequencies, other.frequencies)
         and np.array_equal(one.values, other.values, equal_nan=True)
+        and np.array_equal(stds[0], stds[1], equal_nan=True)
     )
 
 
@@ -263,6 +275,8 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
     if case.frfs is not None:
         measurement["frfs"] = "frfs.npz"
         files["frfs.npz"] = responses_npz(case.frfs)
+        if case.split is not None:
+            measurement["responses"] = {k: own for k, own in vars(case.split).items() if own}
     stated = {key: getattr(case, key) for key in ("name", "title", "source", "structure")}
     info = {key: value for key, value in stated.items() if value}
     content: Keys = {"case": info, "model": keys, "measurement": measurement}

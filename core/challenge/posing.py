@@ -46,8 +46,8 @@ def overlay(
 ) -> None:
     """Write the case of a structure with the files of a truth over its own.
 
-    Modifications are dropped: those of the structure were computed on the healthy one. `mass` is
-    what a balance reads of the structure as it is, and its deviation, in kg.
+    Modifications and responses are dropped: those of the structure are of the healthy one. `mass`
+    is what a balance reads of the structure as it is, and its deviation, in kg.
 
     Raises:
         InputError: when the target is not empty, or the reference is not there.
@@ -71,6 +71,8 @@ def overlay(
         for path in sorted(folder.iterdir()):
             if path.is_file() and path.name not in left_out and path.suffix not in _ABOUT:
                 shutil.copyfile(path, target / path.name)
+    for key in () if file == changed else ("frfs", "responses"):
+        document["measurement"].pop(key, None)
     healthy = document["measurement"].get("mass")
     if mass is not None:
         document["measurement"]["mass"] = {"value": mass[0], "std": mass[1]}

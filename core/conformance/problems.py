@@ -28,12 +28,14 @@ from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import solve_modes
+from femubench.core.modal.frf import FrequencyResponses, receptance
 from femubench.core.modal.measurement import Measurement
 
 NOMINAL_E, TRUE_E = 72.0e9, 69.0e9  # Pa
 ELEMENTS, FINER = 2, 6  # of a member; the truth has three times as many
 USED = 4  # modes
-_FREQUENCY_STD, _SHAPE_STD = 0.002, 0.01
+_FREQUENCY_STD, _SHAPE_STD, _RESPONSE_STD = 0.002, 0.01, 0.02
+_LINES, _DAMPING = 40, 0.005
 _JOINTS = {"A": (0.0, 0.0), "B": (0.5, 0.0), "C": (0.9, 0.0), "D": (0.45, 0.37), "F": (0.0, 0.3)}
 _MEMBERS = ("AB", "BC", "BD", "AF", "FD")  # a closed mesh and an arm
 _SPRINGS: Mapping[Plane, Mapping[str, float]] = {
@@ -123,17 +125,22 @@ def sensors_of(frame: Frame) -> Sensors:
 
 
 def measure(truth: Model, sensors: Sensors) -> Measurement:
-    """Return the lowest elastic modes of a model as a test would give them."""
-    count = USED
-    modes = solve_modes(truth).elastic.take(np.arange(count))
-    shapes = np.asarray(truth.observe(sensors) @ modes.shapes)
+    """Return the lowest elastic modes of a model, and its responses, as a test would give them."""
+    count, every, rows = USED, solve_modes(truth), truth.observe(sensors)
+    modes = every.elastic.take(np.arange(count))
+    shapes = np.asarray(rows @ modes.shapes)
     # Every shape has its own scale and sign, as in any test.
     shapes = shapes / np.abs(shapes).max(axis=0) * np.array([-1.0, 1.5, 0.5, -2.0])[:count]
     largest = np.abs(shapes).max(axis=0)
     f = modes.natural_frequencies
+    lines = np.linspace(0.5 * f[0], 1.1 * f[-1], _LINES)
+    values = receptance(every, rows, rows[:1], lines, _DAMPING)
+    std = _RESPONSE_STD * np.abs(values)
+    force = sensors.take([0])
     return Measurement(
         sensors, tuple(range(1, count + 1)), f, _FREQUENCY_STD * f, np.full(count, np.nan),
         shapes, np.broadcast_to(_SHAPE_STD * largest, shapes.shape).copy(),
+        responses=FrequencyResponses(sensors, force, lines, values, deviations=std),
     )  # fmt: skip
 
 
@@ -234,6 +241,10 @@ _CHANGED: Mapping[str, tuple[str, Callable[[UpdatingProblem], UpdatingProblem]]]
     "some shape cells missing": (PLAIN, lambda p: _without(p, (1, _ALL), (0, 2), (3, 0))),
     "one mode without a shape": (PLAIN, lambda p: _without(p, (_ALL, 1))),
     "no shapes at all": (PLAIN, lambda p: _without(p, (_ALL, _ALL))),
+    "no responses": (
+        PLAIN,
+        lambda p: replace(p, measurement=replace(p.measurement, responses=None)),
+    ),
     "one used mode": (PLAIN, lambda p: replace(p, measurement=p.measurement.select([1]))),
     **{
         f"{name} with noise, draw {draw}": (name, partial(_noisy, draw=draw))

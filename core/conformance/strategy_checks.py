@@ -257,6 +257,7 @@ def _withheld(bench: Bench) -> list[tuple[str, Want]]:
     frame = needs & {"elements", "geometry", "joints"}
     bare = GROUPED if "parts" in needs else "matrices alone"
     lacking = {"shapes": "no shapes at all", "elements": bare, "joints": "one member"}
+    lacking["responses"] = "no responses"
     return [
         (capability, Want(lacking[capability]))
         for capability in CAPABILITIES

@@ -33,7 +33,6 @@ MOST_CHANGED = 8  # of one modification
 _SHAPE_DECIMALS = 3  # of the largest component
 _ABOVE = 1.2  # modes up to this times the highest measured frequency are shown
 _POINTS = 400
-_DAMPING = 0.005  # where none was measured
 
 
 def case_drawing(case: Case) -> dict[str, Any] | None:
@@ -161,20 +160,13 @@ def frequency_axis(case: Case) -> FloatArray:
     return np.linspace(2.0, _ABOVE * float(max(found, default=0.0)), _POINTS)
 
 
-def damping_of(case: Case) -> float:
-    """Return the median of the measured damping ratios, a half per cent where there is none."""
-    known = case.measurement.damping[np.isfinite(case.measurement.damping)]
-    return float(np.median(known)) if len(known) else _DAMPING
-
-
 def _drive(case: Case, label: str | None = None) -> Sensors | None:
     """Return the one sensor of a label, the drive sensor where none is given."""
     label = label or drive_sensor(case)
     if label is None:
         return None
     sensors = case.measurement.sensors
-    k = sensors.labels.index(label)
-    return Sensors((label,), sensors.xyz[[k]], (sensors.directions[k],))
+    return sensors.take([sensors.labels.index(label)])
 
 
 def receptances(case: Case, model: Model, sensor: str | None = None) -> dict[str, list[float]]:
@@ -188,7 +180,7 @@ def receptances(case: Case, model: Model, sensor: str | None = None) -> dict[str
     drive = _drive(case, sensor)
     if drive is None:
         return {}
-    hz, damping = frequency_axis(case), damping_of(case)
+    hz, damping = frequency_axis(case), case.measurement.usual_damping
     found = {}
     for name, changed, _ in _structures(case, model):
         row = changed.observe(drive)
@@ -234,7 +226,7 @@ def list_receptances(case: Case, sensor: str | None = None) -> dict[str, Any]:
         note += f" Measured modes without a partner there are not in it: {', '.join(alone)}."
     return {
         "hz": round_values(frequency_axis(case)),
-        "damping": damping_of(case),
+        "damping": case.measurement.usual_damping,
         "measured": measured,
         "note": note,
     }
@@ -294,7 +286,8 @@ def _stand_in(
         readings[own] = float(np.real(scale).item()) * shape[row]
         eigenvalues[own] = data.eigenvalues[k]
     seen = readings[None]
-    return _decibels(modal_sum(eigenvalues, seen, seen, frequency_axis(case), damping_of(case)))
+    damping = case.measurement.usual_damping
+    return _decibels(modal_sum(eigenvalues, seen, seen, frequency_axis(case), damping))
 
 
 def round_values(values: Any) -> Any:  # noqa: ANN401 - arrays of any shape

@@ -79,13 +79,9 @@ class _Remaining:
 
     def observe(self, sensors: Sensors) -> SparseArray:
         there = np.flatnonzero([self._has(xyz) for xyz in sensors.xyz])
-        own = Sensors(
-            tuple(sensors.labels[i] for i in there),
-            sensors.xyz[there],
-            tuple(sensors.directions[i] for i in there),
-        )
         place = np.ones(len(there)), (there, np.arange(len(there)))
-        return sp.csr_array(place, shape=(len(sensors), len(there))) @ self.base.observe(own)
+        own = self.base.observe(sensors.take(there))
+        return sp.csr_array(place, shape=(len(sensors), len(there))) @ own
 
     def assemble_attachments(
         self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]

@@ -203,17 +203,18 @@ class Derivatives:
             stiffness += self.springs @ (slip * (self.spring_rows @ right))
         return stiffness.T, mass.T
 
-    def inner(self, left: FloatArray, right: FloatArray) -> FloatArray:
-        """Return left' dK/dp right of every parameter, (n_parameters, m_left, m_right)."""
+    def inner(self, left: FloatArray, right: FloatArray, matrix: str = "stiffness") -> FloatArray:
+        """Return left' dK/dp right, or that of the mass, (n_parameters, m_left, m_right)."""
         u = (self.gather @ left).reshape(-1, 12, left.shape[1])
         v = (self.gather @ right).reshape(-1, 12, right.shape[1])
         found = np.zeros((self.count, left.shape[1], right.shape[1]))
         for part in self.parts:
-            if part.stiffness is not None:
-                force = part.stiffness @ v
+            batch = part.stiffness if matrix == "stiffness" else part.mass
+            if batch is not None:
+                force = batch @ v
                 for i in range(left.shape[1]):  # all at once are as many as elements times m^2
                     found[:, i] += part.incidence @ np.einsum("ei,eim->em", u[:, :, i], force)
-        if self.spring_rows.shape[0]:
+        if self.spring_rows.shape[0] and matrix == "stiffness":
             slips = (self.spring_rows @ left)[:, :, None] * (self.spring_rows @ right)[:, None]
             found += (self.springs @ slips.reshape(len(slips), -1)).reshape(found.shape)
         return found

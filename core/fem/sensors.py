@@ -105,6 +105,12 @@ class Sensors:
     def __len__(self) -> int:
         return len(self.labels)
 
+    def take(self, rows: Iterable[int]) -> Sensors:
+        """Return some of the sensors, in the given order."""
+        own = [int(row) for row in rows]
+        labels, directions = ([side[k] for k in own] for side in (self.labels, self.directions))
+        return Sensors(tuple(labels), self.xyz[own], tuple(directions))
+
     @property
     def axes(self) -> FloatArray:
         """Return the signed unit vectors in (x, y, z, rx, ry, rz), (n_sensors, 6)."""

@@ -87,11 +87,11 @@ class JoinedSlopes:
             found[:, :, own] = part.quadratic(left, right)
         return found[0], found[1]
 
-    def inner(self, left: FloatArray, right: FloatArray) -> FloatArray:
-        """Return left' dK/dx right of every parameter, (n_parameters, m_left, m_right)."""
+    def inner(self, left: FloatArray, right: FloatArray, matrix: str = "stiffness") -> FloatArray:
+        """Return left' dK/dx right, or that of the mass, (n_parameters, m_left, m_right)."""
         found = np.zeros((self.count, left.shape[1], right.shape[1]))
         for part, own in self.parts:
-            found[own] = part.inner(left, right)
+            found[own] = part.inner(left, right, matrix)
         return found
 
     def combine(self, vector: FloatArray, weights: FloatArray) -> FloatArray:

@@ -21,7 +21,7 @@ from femubench.core.library.cases import CaseLike, as_list, case_words, read_cas
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import check_strategy, choose_names
 from femubench.core.plugin.variants import Variant, label_variant, strategy_of
-from femubench.core.roles import Strategy
+from femubench.core.roles import Strategy, list_declared
 from femubench.core.run.companions import Companions, choose_companions
 from femubench.core.run.executor import open_executor
 from femubench.core.run.frames import modes_frame, results_frame
@@ -108,6 +108,7 @@ class Run(results.Run):
 
         Columns: case strategy seed nominal status reason seconds; ``used_percent``, ``used_mac``
         and the same for ``higher`` and ``modified`` (nan where the case has no such block);
+        ``responses_db`` and ``responses_floor_db`` of held-out responses;
         rigid_body_modes rigid_body_modes_expected negative_eigenvalues unphysical
         parameter_count evaluations gain rank. Of a study also the values of its axes:
         ``plain_case`` and ``plain_strategy``, noise, sensors_left_out, and every option as
@@ -257,6 +258,8 @@ def plan_run(
         )
     found = _strategies(wanted, plugins)
     read = read_cases(cases, plugins)
+    if not wanted and all(case.split is None for case in read):  # unasked, a line of refusals
+        found = [item for item in found if "responses" not in list_declared(item, "needs")]
     plain = all(isinstance(item, (str, PathLike)) for item in words)
     request = Request(
         cases=case_words(map(str, words), plugins) if plain else tuple(c.name for c in read),

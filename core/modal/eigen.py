@@ -338,6 +338,23 @@ def modes_of(model: Model, count: int | None = None) -> Modes:
     return modes.take(np.arange(min(wanted, len(modes)))) if small else modes
 
 
+def modes_up_to(model: Model, hertz: float, count: int = _MANY) -> Modes:
+    """Return the modes of a large model up to a frequency and perhaps more, half of all at most.
+
+    Arguments:
+        count: of modes to begin with.
+
+    Raises:
+        ModelError: when the model has no modes.
+    """
+    limit = model.size // 2
+    modes = modes_of(model, min(count, limit))
+    while modes.natural_frequencies[-1] < hertz and count < limit:
+        count = min(2 * count, limit)
+        modes = modes_of(model, count)
+    return modes
+
+
 @cache_by_model
 def loose_motions(model: Model) -> FloatArray:
     """Return how a model that is known to hang free moves as a body, mass-orthonormal, (n, r).

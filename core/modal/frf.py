@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
@@ -12,7 +12,7 @@ from femubench.core.display import Shown, count_noun
 from femubench.core.errors import ModelError
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import Modes
-from femubench.core.typing import AnyArray, FloatArray, SparseArray
+from femubench.core.typing import AnyArray, BoolArray, FloatArray, SparseArray
 
 Quantity: TypeAlias = Literal["receptance", "mobility", "accelerance", "free decay"]
 # How often displacement was derived with respect to time.
@@ -64,17 +64,42 @@ class FrequencyResponses(Shown):
     @property
     def receptances(self) -> AnyArray:
         """Return displacement over force in m/N; nan at 0 Hz where motion was no displacement."""
-        derivative = DERIVATIVES[self.quantity]
-        if not derivative:
-            return self.values
-        jw = 2j * np.pi * self.frequencies
-        jw[jw == 0.0] = np.nan
-        return np.asarray(self.values / (jw**derivative)[:, None, None])
+        return self.values if DERIVATIVES[self.quantity] == 0 else self.values / self._derived
+
+    @property
+    def receptance_std(self) -> FloatArray:
+        """Return the standard deviations of their real and imaginary parts; inf where unknown."""
+        if self.deviations is None:
+            return np.full(self.values.shape, np.inf)
+        known = np.isfinite(self.values) & np.isfinite(self.deviations)
+        return np.asarray(np.where(known, self.deviations, np.inf) / np.abs(self._derived))
+
+    @property
+    def _derived(self) -> AnyArray:
+        """Return (i w)^k of every line, k times derived; nan at 0 Hz, (n_f, 1, 1)."""
+        derivative, jw = DERIVATIVES[self.quantity], 2j * np.pi * self.frequencies
+        jw[(jw == 0.0) & (derivative > 0)] = np.nan
+        return np.asarray((jw**derivative)[:, None, None])
 
     def within(self, low: float, high: float) -> FrequencyResponses:
         """Return the lines between two frequencies in Hz."""
-        keep = (self.frequencies >= low) & (self.frequencies <= high)
+        return self.at_lines(in_bands(self.frequencies, [(low, high)]))
+
+    def at_lines(self, keep: BoolArray) -> FrequencyResponses:
+        """Return some of the lines, (n_f,)."""
         return self._with_values(lambda values: values[keep], frequencies=self.frequencies[keep])
+
+    def take(self, rows: Iterable[int]) -> FrequencyResponses:
+        """Return the motions of some of the response sensors, in the given order."""
+        own = [int(row) for row in rows]
+        return self._with_values(lambda v: v[:, own], responses=self.responses.take(own))
+
+    def with_noise(self, rng: np.random.Generator) -> FrequencyResponses:
+        """Return the same with a draw of Gaussian noise of real and imaginary parts, if known."""
+        if self.deviations is None:
+            return self
+        real, imaginary = rng.standard_normal((2, *self.values.shape))
+        return replace(self, values=self.values + self.deviations * (real + 1j * imaginary))
 
     def transpose(self) -> FrequencyResponses:
         """Return the responses with forces and motions exchanged, as reciprocity allows."""
@@ -84,6 +109,39 @@ class FrequencyResponses(Shown):
     def _with_values(self, of: Callable[[AnyArray], AnyArray], **more: Any) -> FrequencyResponses:  # noqa: ANN401
         deviations = None if self.deviations is None else of(self.deviations)
         return replace(self, values=of(self.values), deviations=deviations, **more)
+
+
+def in_bands(frequencies: FloatArray, bands: Iterable[tuple[float, float]]) -> BoolArray:
+    """Tell which frequencies lie in any of some bands, ends included, (n_f,)."""
+    inside = [(frequencies >= low) & (frequencies <= high) for low, high in bands]
+    return np.asarray(np.any(inside, axis=0) if inside else np.zeros(len(frequencies), dtype=bool))
+
+
+@dataclass(frozen=True)
+class ResponseSplit:
+    """Which frequency responses a strategy is given, and which only the score sees.
+
+    Arguments:
+        used: bands of the lines that a strategy is given, in Hz.
+        held_out: bands of the lines that only the score sees.
+        held_out_sensors: labels of the sensors of which it sees all lines of both.
+    """
+
+    used: tuple[tuple[float, float], ...]
+    held_out: tuple[tuple[float, float], ...] = ()
+    held_out_sensors: tuple[str, ...] = ()
+
+    def given(self, measured: FrequencyResponses) -> FrequencyResponses:
+        """Return the used lines of the used sensors, and nothing else of the responses."""
+        labels = enumerate(measured.responses.labels)
+        own = [k for k, label in labels if label not in self.held_out_sensors]
+        return measured.take(own).at_lines(in_bands(measured.frequencies, self.used))
+
+    def unseen(self, measured: FrequencyResponses) -> BoolArray:
+        """Tell which responses only the score sees, (n_f, n_responses)."""
+        hidden = [label in self.held_out_sensors for label in measured.responses.labels]
+        lines = [in_bands(measured.frequencies, own)[:, None] for own in (self.used, self.held_out)]
+        return np.asarray(lines[1] | lines[0] & np.array(hidden, dtype=bool))
 
 
 def receptance(
@@ -133,9 +191,16 @@ def modal_sum(
     Raises:
         ModelError: at the very frequency of an undamped mode.
     """
+    compliance = 1.0 / dynamic_stiffness(eigenvalues, frequencies, damping)
+    return np.asarray((compliance[:, None, :] * out) @ into.T)
+
+
+def dynamic_stiffness(
+    eigenvalues: FloatArray, frequencies: FloatArray, damping: FloatArray | float
+) -> AnyArray:
+    """Return lambda - w^2 + 2 i z w_r w of modes, (n_f, m); raises ModelError where it is 0."""
     omega = 2.0 * np.pi * np.asarray(frequencies)[:, None]
-    root = np.sqrt(np.abs(eigenvalues))
-    dynamic = eigenvalues - omega**2 + 2j * damping * root * omega
+    dynamic = eigenvalues - omega**2 + 2j * damping * np.sqrt(np.abs(eigenvalues)) * omega
     if not dynamic.all():
         raise ModelError("the receptance is infinite at a frequency of an undamped mode")
-    return np.asarray(np.einsum("im,fm,jm->fij", out, 1.0 / dynamic, into))
+    return np.asarray(dynamic)

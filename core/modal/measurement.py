@@ -9,7 +9,10 @@ import numpy as np
 
 from femubench.core.display import Shown, count_noun
 from femubench.core.fem.sensors import Sensors
-from femubench.core.typing import FloatArray
+from femubench.core.modal.frf import FrequencyResponses
+from femubench.core.typing import FloatArray, IntArray
+
+_DAMPING = 0.005  # where none was measured
 
 
 @dataclass(frozen=True, repr=False)
@@ -28,6 +31,8 @@ class Measurement(Shown):
         frequency_correlation: of the errors of the frequencies, (m, m); None where they are
             independent.
         assumed: whether a scatter that nobody has measured is in the deviations.
+        responses: frequency responses at some of the sensors with their standard deviations; None
+            where none are given.
     """
 
     sensors: Sensors
@@ -40,6 +45,7 @@ class Measurement(Shown):
     total_mass: tuple[float, float] | None = None
     frequency_correlation: FloatArray | None = None
     assumed: bool = False
+    responses: FrequencyResponses | None = None
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -56,6 +62,8 @@ class Measurement(Shown):
             found.append((f"mode {row[0]}", f"{row[1]:.6g} Hz, std {row[2]:.2g} Hz{damping}"))
         if self.total_mass is not None:
             found.insert(1, ("mass", "{:.6g} kg, std {:.2g} kg".format(*self.total_mass)))
+        if self.responses is not None:
+            found += [("responses", text) for _, text in self.responses.rows()]
         return found
 
     @property
@@ -71,6 +79,24 @@ class Measurement(Shown):
         return np.asarray(
             self.frequency_std[:, None] * self.frequency_correlation * self.frequency_std
         )
+
+    @property
+    def usual_damping(self) -> float:
+        """Return the median of the measured damping ratios, a half per cent where there is none."""
+        known = self.damping[np.isfinite(self.damping)]
+        return float(np.median(known)) if len(known) else _DAMPING
+
+    def damping_of(self, partner: IntArray, count: int) -> FloatArray:
+        """Return the damping ratio of every mode of a model: the usual one where none is measured.
+
+        Arguments:
+            partner: which of them belongs to every measured mode; -1 where none does, (m,).
+            count: of the modes of the model.
+        """
+        found = np.full(count, self.usual_damping)
+        known = (partner >= 0) & np.isfinite(self.damping)
+        found[partner[known]] = self.damping[known]
+        return found
 
     def widen(self, std: FloatArray) -> Measurement:
         """Return the same modes with errors of their own as well.
@@ -120,4 +146,5 @@ class Measurement(Shown):
             drawn = np.linalg.cholesky(self.frequency_correlation) @ drawn
         frequencies = self.frequencies + self.frequency_std * drawn
         shapes = self.shapes + self.shape_std * rng.standard_normal(self.shapes.shape)
-        return replace(self, frequencies=np.abs(frequencies), shapes=shapes)
+        own = self.responses and self.responses.with_noise(rng)  # last: the draws above stay
+        return replace(self, frequencies=np.abs(frequencies), shapes=shapes, responses=own)

@@ -169,6 +169,7 @@ def _judged_figures(result: JobResult) -> list[float]:
     modes = [mode for name in BLOCKS if name in result.blocks for mode in result.blocks[name].modes]
     found: list[float | None] = [result.status == "ok", result.rigid_modes_lost]
     found.append(result.negative_eigenvalues)
+    found.append(None if result.responses is None else result.responses.rms_db)
     for mode in modes:
         found += [mode.predicted_hz, mode.mac, mode.predicted_std_hz, len(mode.candidates)]
         found += [x for one in mode.candidates for x in (one.hz, one.weight, one.mac)]

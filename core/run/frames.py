@@ -26,6 +26,8 @@ def results_frame(run: Run) -> pd.DataFrame:
         row = {name: getattr(result, name) for name in (*_JOB, *_COUNTS)}
         for name, block in result.blocks.items():
             row |= {f"{name}_percent": block.rms_percent, f"{name}_mac": block.mean_mac}
+        if (seen := result.responses) is not None:
+            row |= dict(zip(_RESPONSES, (seen.rms_db, seen.floor_db), strict=True))
         if study is not None:
             place = study.place(result.case, result.strategy, result.nominal)
             row |= {_PLAIN.get(name, name): value for name, value in place.items()}
@@ -72,5 +74,6 @@ _COUNTS = (
     *("rigid_body_modes", "rigid_body_modes_expected", "negative_eigenvalues", "unphysical"),
     *("parameter_count", "evaluations", "gain", "rank"),
 )
-_ERRORS = tuple(f"{name}_{what}" for name in BLOCKS for what in ("percent", "mac"))
+_RESPONSES = ("responses_db", "responses_floor_db")
+_ERRORS = (*(f"{name}_{what}" for name in BLOCKS for what in ("percent", "mac")), *_RESPONSES)
 _FLOATS = ("seconds", *_ERRORS, "gain")

@@ -135,6 +135,8 @@ def missing_capability(needs: frozenset[str], model: Model, measurement: Measure
         raise ValueError(f"unknown need {unknown[0]!r}, expected one of {', '.join(CAPABILITIES)}")
     if "shapes" in needs and not measurement.has_shapes:
         return "needs measured mode shapes, and a used mode has none"
+    if "responses" in needs and measurement.responses is None:
+        return "needs frequency responses: declare frfs and responses in [measurement] of the case"
     if model.structure is None:
         # Who takes groups needs joints of frames alone.
         kinds = ("elements", "geometry", *(() if "parts" in needs else ("joints",)))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict, get_args
 from femubench.core.display import Shown, count_noun
 from femubench.core.schema.bounds import (
     LONGEST_TEXT,
+    Decibels,
     Figure,
     GainFigure,
     Mac,
@@ -54,6 +55,21 @@ class Block:
     modes: tuple[PairedMode, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class ResponseBlock:
+    """The error of frequency responses at lines and sensors that no strategy was given.
+
+    Arguments:
+        rms_db: root mean square error of the log-magnitude, 20 log10 |H|.
+        floor_db: what the noise of the measurement makes of it.
+        count: of responses, lines times sensors times forces.
+    """
+
+    rms_db: Decibels
+    floor_db: Decibels
+    count: Whole
+
+
 if TYPE_CHECKING:
     Blocks: TypeAlias = Mapping[str, Block]
 else:
@@ -83,6 +99,7 @@ class JobResult:
         provenance: versions, libraries, processor, commit and digests, in plain data.
         nominal: the model that the strategy started from; ``textbook`` too where the model as drawn
             has all that handbooks give.
+        responses: error at held-out frequency responses; None where the case has none.
     """
 
     case: Name
@@ -106,6 +123,7 @@ class JobResult:
     key: Name = ""
     provenance: Mapping[str, Note] = field(default_factory=dict)
     nominal: Nominal = "drawn"
+    responses: ResponseBlock | None = None
 
     def __post_init__(self) -> None:
         """Keep texts to what can be read again, and take null of JSON for nan."""

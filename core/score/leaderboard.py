@@ -44,6 +44,7 @@ COLUMNS = (
     *("error_gain", "change_gain"),
     *("gain_drawn", "gain_tests", "band_percent", "shape_error", "false_modes"),
     *(f"{block}_percent" for block in BLOCKS),
+    *("responses_db", "responses_floor_db"),
     *("rigid_modes_lost", "negative_eigenvalues", "parameters", "evaluations", "seconds"),
     *("answered", "ok", "not_applicable", "total", "unphysical", "better_than", "worse_than"),
 )
@@ -404,11 +405,14 @@ def _row(
     tests = [case for case in table.cases if is_test(classes.get(case))]
     fine = [result for result in results if result.status == "ok"]
     medians: dict[str, dict[str, list[float]]] = {
-        name: defaultdict(list) for name in (*BLOCKS, *_COUNTS)
+        name: defaultdict(list) for name in (*BLOCKS, *_COUNTS, "rms_db", "floor_db")
     }
     for result in fine:
         for name, block in result.blocks.items():
             medians[name][result.case].append(block.rms_percent)
+        if (seen := result.responses) is not None:
+            medians["rms_db"][result.case].append(seen.rms_db)
+            medians["floor_db"][result.case].append(seen.floor_db)
         for name, value in zip(_COUNTS, attrgetter(*_COUNTS)(result), strict=True):
             if value is not None:
                 medians[name][result.case].append(value)
@@ -426,6 +430,8 @@ def _row(
         if 0 < len(tests) < len(table.cases)
         else math.nan,
         **{f"{block}_percent": _median(medians[block]) for block in BLOCKS},
+        "responses_db": _median(medians["rms_db"]),
+        "responses_floor_db": _median(medians["floor_db"]),
         "rigid_modes_lost": sum(result.rigid_modes_lost for result in fine),
         "negative_eigenvalues": sum(result.negative_eigenvalues or 0 for result in fine),
         "parameters": _median(medians["parameter_count"]),

@@ -19,6 +19,7 @@ from femubench.core.modal.eigen import (
     Modes,
     enough_modes,
     modes_of,
+    modes_up_to,
     once_for,
     zero_tolerance,
 )
@@ -27,9 +28,10 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import LEAST_SENSORS, WINDOW, pair_measured
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.schema.paired_modes import PairedMode
-from femubench.core.schema.results import Block
+from femubench.core.schema.results import Block, ResponseBlock
 from femubench.core.score.bounded_gain import find_candidates, find_tested_modes
 from femubench.core.score.predicted_spread import MORE, Spread
+from femubench.core.score.responses import score_responses
 from femubench.core.typing import FloatArray
 
 _SAME_MOTION = 0.9  # squared cosine between a zero mode and the nominal rigid-body motions
@@ -63,11 +65,13 @@ class JudgedModel:
         blocks: errors by block name.
         rigid_body_modes: zero-frequency modes that are rigid-body motions of the nominal model.
         negative_eigenvalues: of the model as tested, without modifications.
+        responses: error at held-out frequency responses; None where the case has none.
     """
 
     blocks: dict[str, Block]
     rigid_body_modes: int
     negative_eigenvalues: int
+    responses: ResponseBlock | None = None
 
 
 def frequency_error(mode: PairedMode) -> float:
@@ -209,7 +213,7 @@ def judge(
         basis = still @ (turn[:, keep] / np.sqrt(values[keep]))
         cosines = la.svdvals(rigid.T @ (mass @ basis))
         kept = int(np.count_nonzero(np.square(cosines) > _SAME_MOTION))
-    return JudgedModel(blocks, kept, negative)
+    return JudgedModel(blocks, kept, negative, score_responses(case, model))
 
 
 def _modes_for(model: Model, measurements: Sequence[Measurement]) -> Modes:
@@ -217,12 +221,7 @@ def _modes_for(model: Model, measurements: Sequence[Measurement]) -> Modes:
     if model.size <= DENSE_LIMIT:
         return modes_of(model)
     top, most = _highest(measurements), max(len(item) for item in measurements)
-    count, limit = enough_modes(model, most) or model.size, model.size // 2
-    modes = modes_of(model, min(count, limit))
-    while modes.natural_frequencies[-1] < top and count < limit:
-        count = min(2 * count, limit)
-        modes = modes_of(model, count)
-    return modes
+    return modes_up_to(model, top, enough_modes(model, most) or model.size)
 
 
 def _highest(measurements: Sequence[Measurement]) -> float:

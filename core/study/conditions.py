@@ -10,7 +10,6 @@ import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.display import count_noun
-from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import IntArray
 
@@ -44,17 +43,18 @@ class VariedCase(Case):
             frequency_std=self.noise * self.origin.measurement.frequency_std,
             shape_std=self.noise * self.origin.measurement.shape_std,
         )
-        whole = replace(self.origin, measurement=louder).used_measurement(seed)
+        frfs = self.origin.frfs
+        if frfs is not None and frfs.deviations is not None:
+            frfs = replace(frfs, deviations=self.noise * frfs.deviations)
+        whole = replace(self.origin, measurement=louder, frfs=frfs).used_measurement(seed)
         rows = np.setdiff1d(np.arange(len(whole.sensors)), self._hidden(seed))
-        known = whole.sensors
-        fewer = Sensors(
-            tuple(known.labels[row] for row in rows),
-            known.xyz[rows],
-            tuple(known.directions[row] for row in rows),
-        )
+        fewer, own = whole.sensors.take(rows), whole.responses
+        labels = enumerate(() if own is None else own.responses.labels)
+        kept = [k for k, label in labels if label in fewer.labels]
         return replace(
-            whole, sensors=fewer, shapes=whole.shapes[rows], shape_std=whole.shape_std[rows]
-        )
+            whole, sensors=fewer, shapes=whole.shapes[rows], shape_std=whole.shape_std[rows],
+            responses=own and own.take(kept),
+        )  # fmt: skip
 
     def conditions(self, seed: int) -> Mapping[str, float | str]:
         """Return the factor on the noise, and the labels of the sensors left out."""

@@ -13,7 +13,6 @@ from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.frame import Frame, Joint, Member, MemberSet, Place
 from femubench.core.fem.model import Model
-from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import SparseArray
 
@@ -180,14 +179,9 @@ def _relabelled(measured: Measurement, labels: Names, *, shuffled: bool) -> Meas
     known = measured.sensors
     new = [labels[label] for label in known.labels]
     order = sorted(range(len(known)), key=new.__getitem__) if shuffled else range(len(known))
-    sensors = Sensors(
-        tuple(new[row] for row in order),
-        known.xyz[list(order)],
-        tuple(known.directions[row] for row in order),
-    )
     return replace(
         measured,
-        sensors=sensors,
+        sensors=replace(known, labels=tuple(new)).take(order),
         shapes=measured.shapes[list(order)],
         shape_std=measured.shape_std[list(order)],
     )

@@ -122,7 +122,6 @@ def similar_case(case: Case, by: Similarity) -> Case:
         notes=(),
         matches=(),
         lines=None,
-        frfs=None,
     )
 
 

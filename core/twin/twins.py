@@ -118,6 +118,8 @@ def twin_of(
         title=f"{case.title} (twin {number})",
         digest=hashlib.sha256(stated.encode()).hexdigest(),
         structure=case.structure or case.name,
+        frfs=None,
+        split=None,
     )
     own = {field.name: getattr(renamed, field.name) for field in fields(Case)}
     return Twin(**own, origin=case.name, twin_seed=seed, families=tuple(used))

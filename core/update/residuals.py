@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -44,6 +44,16 @@ class Targets:
     statistical: bool = False
     shapes: bool = False
     weigh: bool = False
+    scattered: ClassVar[bool] = False
+
+    @cached_property
+    def norm(self) -> float:
+        """Return the norm of the weighted modal quantities."""
+        return float(np.linalg.norm(self.weight * self.target))
+
+    def predict(self, model: Model, previous: Prediction | None, mass: float) -> Prediction:
+        """Return the prediction of a model of a mass, its pairs continued from a previous one."""
+        return predict(self, model, previous, mass=mass)
 
     @cached_property
     def target(self) -> FloatArray:
@@ -235,6 +245,6 @@ def _followed(partner: IntArray, model: Model, modes: Modes, previous: Predictio
     return result
 
 
-def common_rows(first: Prediction, second: Prediction) -> BoolArray:
-    """Tell which data both predictions have a partner for, (n_rows,)."""
-    return np.isfinite(first.residual) & np.isfinite(second.residual)
+def common_rows(first: FloatArray, second: FloatArray) -> BoolArray:
+    """Tell which data two predictions with these residuals have a partner for, (n_rows,)."""
+    return np.isfinite(first) & np.isfinite(second)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,8 @@ from femubench.core.fit.dual_least_squares import MANY, DualPosterior
 from femubench.core.fit.gauss_newton import Linearised
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import BoolArray, FloatArray
-from femubench.core.update.residuals import Prediction, Residual, Targets, common_rows, predict
+from femubench.core.update.residuals import Prediction, Residual, Targets, common_rows
+from femubench.core.update.response_residuals import ResponsePrediction, ResponseTargets
 from femubench.core.update.strategy import ParameterEstimate, UpdateResult
 from femubench.core.update.uncertainty import Uncertainty, standard_normal
 
@@ -38,6 +40,9 @@ class UpdateOptions:
             ``frequency``.
         weighting: ``unit`` for W_ee = I, ``statistical`` for the inverse covariance of the data.
         shapes: take mode shapes as data too (statistical weighting).
+        responses: fit the given frequency responses, weighted by their deviations, in place of the
+            modes, from the parameters that fit the frequencies: responses alone have an optimum
+            of their own wherever a resonance lies on a wrong one.
         damping: beta, which stands for alpha / pct^2 of the paper, as a share of z_m'W z_m: of
             what s's is for a factor on the whole stiffness.
         max_iterations: steps at most.
@@ -53,6 +58,7 @@ class UpdateOptions:
     residual: Residual = "eigenvalue"
     weighting: str = "unit"
     shapes: bool = False
+    responses: bool = False
     damping: float = 1e-5
     max_iterations: int = 100
     tolerance: float = 1e-6
@@ -73,7 +79,7 @@ class Iterate:
     """Coordinates q, (p,), and what the model predicts there."""
 
     q: FloatArray
-    prediction: Prediction
+    prediction: Prediction | ResponsePrediction
 
     def cost(self, rows: BoolArray, precision: FloatArray) -> float:
         """Return r'Wr over some data plus the prior's share."""
@@ -84,7 +90,9 @@ class Iterate:
 class Iteration:
     """State of one update."""
 
-    def __init__(self, parametric: ParametricModel, data: Targets, options: UpdateOptions) -> None:
+    def __init__(
+        self, parametric: ParametricModel, data: Targets | ResponseTargets, options: UpdateOptions
+    ) -> None:
         self.parametric, self.data, self.options = parametric, data, options
         self.history: list[Mapping[str, float]] = []
         self.beta = 0.0
@@ -94,11 +102,11 @@ class Iteration:
         """Return the model at coordinates, (p,), taken within their limits."""
         return self.parametric.at(np.clip(q, self.parametric.lower, self.parametric.upper))
 
-    def at(self, q: FloatArray, previous: Prediction | None = None) -> Iterate:
+    def at(self, q: FloatArray, previous: Any = None) -> Iterate:  # noqa: ANN401 - of its kind
         """Return the prediction at coordinates, its pairs continued from a previous one."""
         model = self.parametric.at(q)
         mass = self.parametric.mass(q, model)
-        return Iterate(q, predict(self.data, model, previous, mass=mass))
+        return Iterate(q, self.data.predict(model, previous, mass))
 
     def linearise(self, point: Iterate) -> Linearised:
         """Return the least-squares problem about a point, of the data that have a partner."""
@@ -112,7 +120,7 @@ class Iteration:
     def gain(self, before: Iterate, after: Iterate) -> float:
         """Return the share of the cost that a step took away."""
         rows, precision = (
-            common_rows(before.prediction, after.prediction),
+            common_rows(before.prediction.residual, after.prediction.residual),
             self.parametric.precision,
         )
         cost = before.cost(rows, precision)
@@ -120,7 +128,7 @@ class Iteration:
 
     def rounding(self, cost: float) -> float:
         """Return how much two costs near a given one may differ by rounding alone."""
-        blur = _ROUNDING * float(np.linalg.norm(self.data.weight * self.data.target))
+        blur = _ROUNDING * self.data.norm
         return blur * (2.0 * float(np.sqrt(cost)) + blur)
 
     def advance(self, point: Iterate, step: FloatArray) -> Iterate | None:
@@ -138,21 +146,21 @@ class Iteration:
                 trial = self.at(q, point.prediction)
             except ModelError:
                 continue
-            rows = common_rows(point.prediction, trial.prediction)
+            rows = common_rows(point.prediction.residual, trial.prediction.residual)
             cost = point.cost(rows, precision)
             if rows.any() and trial.cost(rows, precision) <= cost + self.rounding(cost):
                 return trial
         return None
 
-    def run(self) -> Iterate:
-        """Return the optimum; raises StrategyFailure or Diverged where there is none."""
+    def run(self, start: FloatArray | None = None) -> Iterate:
+        """Return the optimum, from a start, (p,), or 0; raises StrategyFailure or Diverged."""
         parametric = self.parametric
         _ = parametric.start  # raises where changes do not go together
-        point = self.at(np.clip(np.zeros(len(parametric)), parametric.lower, parametric.upper))
+        begun = np.zeros(len(parametric)) if start is None else start
+        point = self.at(np.clip(begun, parametric.lower, parametric.upper))
         if not (point.prediction.partner >= 0).any():
             raise StrategyFailure("no mode of the model looks like any measured mode")
-        data = self.data
-        self.beta = self.options.damping * float(np.square(data.weight * data.target).sum())
+        self.beta = self.options.damping * self.data.norm**2
         self.record(0, point, 0.0)
         point, rng = self.descend(point), np.random.default_rng(0)
         for _ in range(self.options.restarts):
@@ -219,11 +227,20 @@ class Iteration:
                     f" at iteration {len(self.history) - 1}"
                 )
 
+    def concluded(self, point: Iterate) -> Linearised:
+        """Return the problem about the end; deviations are as wide as what is left over says."""
+        problem = self.linearise(point)
+        spare = len(problem.residual) - len(point.q)
+        if not self.data.scattered or spare <= 0:
+            return problem
+        wide = max(float(np.sqrt(np.square(problem.residual).sum() / spare)), 1.0)
+        return replace(problem, jacobian=problem.jacobian / wide, residual=problem.residual / wide)
+
     def covariance(self, point: Iterate) -> FloatArray | None:
         """Return the posterior covariance of q, (p, p); None without statistics."""
         if not self.data.statistical:
             return None
-        normal = self.linearise(point).normal
+        normal = self.concluded(point).normal
         try:
             return np.asarray(np.linalg.inv(normal))
         except np.linalg.LinAlgError:
@@ -252,7 +269,7 @@ class Iteration:
         precision = self.parametric.precision
         if not self.data.statistical or not (precision > 0.0).all():
             return None, None
-        posterior = DualPosterior.of(self.linearise(point).jacobian, precision)
+        posterior = DualPosterior.of(self.concluded(point).jacobian, precision)
         draws = posterior.draws(standard_normal(len(point.q)))
         return posterior.std, Uncertainty.of_draws(self.model_at, point.q + draws)
 
@@ -286,7 +303,7 @@ def sensitivity_update(
     measurement: Measurement,
     options: UpdateOptions | None = None,
 ) -> UpdateResult:
-    """Return a model whose parameters fit the measured modes.
+    """Return a model whose parameters fit the measured modes, or responses.
 
     Every iteration pairs by shape and makes one eigenvalue solution; a step after which the cost
     is larger is halved, at one solution each.
@@ -314,10 +331,15 @@ def sensitivity_update(
         raise NotApplicable("there is no parameter to update")
     options = UpdateOptions() if options is None else options
     statistical = options.weighting == "statistical"
+    data: Targets | ResponseTargets
     data = Targets(measurement, options.residual, statistical, options.shapes, statistical)
     model = Model.of(source) if isinstance(source, Structure) else source
-    iteration = Iteration(ParametricModel(model, tuple(changes)), data, options)
-    point = iteration.run()
+    parametric, start = ParametricModel(model, tuple(changes)), None
+    if options.responses:
+        start = Iteration(parametric, Targets(measurement, "frequency", True), options).run().q
+        data = ResponseTargets(measurement)
+    iteration = Iteration(parametric, data, options)
+    point = iteration.run(start)
     std, uncertainty = iteration.estimate_deviations(point)
     return UpdateResult(
         model=point.prediction.model,

@@ -90,7 +90,8 @@ class Strategy(ABC):
         needs: capabilities that model or measurement must have: ``shapes`` measured mode shapes,
             ``parts`` members of a frame or groups of matrices, whose stiffness has factors,
             ``elements`` element matrices, ``geometry`` members that can be rebuilt with other
-            parameters, ``joints`` places where members of a frame meet.
+            parameters, ``joints`` places where members of a frame meet, ``responses`` measured
+            frequency responses.
         promises: what every result keeps (of ``used-modes``, ``used-modes-or-stated``,
             ``rigid-body-modes``, ``no-negative-eigenvalue``); `bench plugins check` measures it.
         settings: other values of its options that are as good a reading of its source, in the words

@@ -37,6 +37,7 @@ _OVER_TIME: Mapping[str, tuple[str, ...]] = {
 _OVER_FREQUENCY: Mapping[str, tuple[str, ...]] = {
     "frequencies": ("frequencies", "frequency", "freq", "freqs", "f", "fn", "hz"),
     "values": ("values", "h", "h1", "frf", "frfs", "tf", *_MOTIONS),
+    "deviations": ("deviations", "deviation", "std", "stds"),
     **_LABELS,
 }
 EXPECTED = (
@@ -125,13 +126,21 @@ def _quantity(found: Mapping[str, Any], key: str, path: Path) -> Quantity:
 
 def _over_frequency(found: Mapping[str, Any], path: Path) -> FrequencyResponses:
     hz = _numbers(found, "frequencies", path).real.reshape(-1)
-    values = _by_lines(found, "values", len(hz), path).astype(complex)
-    if values.ndim < 3:  # the responses to one force, or of one response to several
-        roving = np.size(found.get("references", ())) == values.shape[1] > 1
-        values = values[:, None, :] if roving else values[:, :, None]
+    given = [key for key in ("values", "deviations") if key in found]
+    parts = [_by_lines(found, key, len(hz), path) for key in given]
+    if parts[0].ndim < 3:  # the responses to one force, or of one response to several
+        roving = np.size(found.get("references", ())) == parts[0].shape[1] > 1
+        parts = [np.expand_dims(part, 1 if roving else 2) for part in parts]
+    values, *stds = parts
+    if stds and stds[0].shape != values.shape:
+        what = f"{stds[0].shape} for values {values.shape}"
+        raise InputError(what, file=path, key="deviations", expected="one for every value")
     first = _side(found, "responses", values.shape[1], path)
     second = _side(found, "references", values.shape[2], path)
-    return FrequencyResponses(first, second, hz, values, _quantity(found, "values", path))
+    quantity = _quantity(found, "values", path)
+    return FrequencyResponses(
+        first, second, hz, values.astype(complex), quantity, *(s.real for s in stds)
+    )
 
 
 def _over_time(found: Mapping[str, Any], path: Path) -> TimeSignals:

@@ -31,6 +31,7 @@ CLASSES = {
     "multi-start": "multi_start:MultiStart",
     "cma-es": "cma_es:CmaEs",
     "bayesian-sampling": "sampling:BayesianSampling",
+    "response-function": "response_function:ResponseFunction",
     "diagnosed": "diagnosed:Diagnosed",
 }
 

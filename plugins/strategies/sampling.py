@@ -48,13 +48,12 @@ class BayesianSampling(Bayesian):
         """Return the model at the posterior mean, with samples and the discrepancy.
 
         Raises:
-            InputError: for shapes as data, of which the likelihood knows none.
+            InputError: for shapes or responses as data, of which the likelihood knows none.
             StrategyFailure: when the chain has not converged, with the figure that says so.
         """
-        if self.options.shapes:
-            raise InputError(
-                "the likelihood is of frequencies alone", key="shapes", expected="false"
-            )
+        if self.options.shapes or self.options.responses:
+            key = "shapes" if self.options.shapes else "responses"
+            raise InputError("the likelihood is of frequencies alone", key=key, expected="false")
         return sample_posterior(
             *self.pose(model, measurement),
             measurement,

@@ -188,6 +188,9 @@ def _result(result: JobResult, case: int, strategy: int, standings: Standings) -
         "rms": [None if block is None else clean(block.rms_percent) for block in blocks],
         "seconds": round_figures(result.seconds, 4),
         "parameters": result.parameter_count,
+        "responses": None
+        if result.responses is None
+        else round_figures(result.responses.rms_db, 4),
         "lost": max(lost, 0) if result.status == "ok" else 0,
         "negative": result.negative_eigenvalues or 0,
         "unphysical": result.unphysical,

@@ -35,6 +35,7 @@
     { key: "coverage", title: "Answered", hint: "jobs that gave a possible model", cell: coverageCell },
     { key: "better_than", title: "Above", right: true, down: true, hint: "lines of the board that it is shown to be better than, after correction for all pairs", cell: (row) => cell(row.better_than.length, count, { title: row.better_than.join(", ") }) },
     { key: "worse_than", title: "Below", right: true, hint: "lines of the board that it is shown to be worse than", cell: (row) => cell(row.worse_than.length, count, { title: row.worse_than.join(", ") }) },
+    known("responses_db") && figure("responses_db", "Responses, dB", "rms error of the log-magnitude of held-out frequency responses; no part of the gain; median over the cases", small),
     figure("parameters", "Un\u00adknowns", "free parameters, median over the cases", count),
     figure("seconds", "Time, s", "wall time, median over the cases", small),
   ].filter(Boolean);

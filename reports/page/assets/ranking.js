@@ -43,7 +43,7 @@
       better_share: share((e, r) => e < r * (1 - data.tie)), worse_share: share((e, r) => e > 1.25 * r),
       gain_tests: grid.tests && mean(byStructure(s, grid.tests, "gain")),
       rigid_modes_lost: d3.sum(fine, (r) => r.lost), negative_eigenvalues: d3.sum(fine, (r) => r.negative),
-      parameters: middle(fine, (r) => r.parameters), seconds: middle(fine, (r) => r.seconds),
+      parameters: middle(fine, (r) => r.parameters), seconds: middle(fine, (r) => r.seconds), responses_db: middle(fine, (r) => r.responses),
       ...Object.fromEntries(data.blocks.map((block, k) => [`${block}_percent`, middle(fine, (r) => r.rms[k])])),
       ok: fine.length, answered: results.filter((r) => r.answered).length, not_applicable: results.filter((r) => r.status === "not-applicable").length,
       total: cases.length * seeds.length, unphysical: results.some((r) => r.unphysical), better_than: [], worse_than: [],

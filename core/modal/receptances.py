@@ -1,0 +1,126 @@
+"""Receptances of a model: the modes and static responses that they take, and their slopes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from femubench.core.errors import ModelError
+from femubench.core.fem.model import Model
+from femubench.core.fem.slopes import MatrixSlopes
+from femubench.core.modal.eigen import DENSE_LIMIT, Modes, modes_of, modes_up_to
+from femubench.core.modal.frf import dynamic_stiffness
+from femubench.core.modal.sparse_eigen import ShiftedModel
+from femubench.core.typing import AnyArray, FloatArray, SparseArray
+
+_ABOVE = 1.5  # times the highest line: modes up to there are exact, the rest responds statically
+_SHIFT = 0.5  # of the first elastic eigenvalue, below zero
+_APART = 1e-12  # squared sine below which a response lies in the span of the others
+_REPEATED = 1e-8  # of eigenvalues, relative
+
+
+def response_modes(model: Model, rows: SparseArray, highest: float) -> Modes:
+    """Return what gives receptances at rows up to a frequency: all modes of a small model.
+
+    Of a large one these are the modes up to 1.5 times the frequency and, behind them, what the
+    static response to forces along the rows adds: vectors orthogonal to the modes, each with
+    the eigenvalue of its Rayleigh quotient, which stand for all modes above.
+
+    Arguments:
+        model: any model; where forces act it has mass.
+        rows: readings and forces from dofs, (n_rows, n).
+        highest: frequency in Hz.
+
+    Raises:
+        ModelError: when the model has no modes.
+
+    Source: MacNeal (1971), A hybrid method of component mode synthesis: residual flexibility.
+    """
+    if model.size <= DENSE_LIMIT:
+        return modes_of(model)
+    modes = modes_up_to(model, _ABOVE * highest)
+    elastic = np.abs(modes.eigenvalues[~modes.rigid])
+    if not len(elastic):
+        raise ModelError("the model has no elastic mode")
+    shift = min(-_SHIFT * float(elastic.min()), 2.0 * float(modes.eigenvalues.min()))
+    momentum = model.mass_times(modes.shapes)
+    force = np.asarray(rows.T.toarray())
+    moved = ShiftedModel(model, shift).solve(force - momentum @ (modes.shapes.T @ force))
+    for _ in range(2):  # the second time what rounding left of the modes
+        moved -= modes.shapes @ (momentum.T @ moved)
+        size = np.sqrt(np.einsum("ij,ij->j", moved, model.mass_times(moved)))
+        moved = moved[:, size > 0.0] / size[size > 0.0]
+        values, turn = np.linalg.eigh(moved.T @ model.mass_times(moved))
+        kept = values > _APART * max(values[-1:], default=0.0)
+        moved = moved @ (turn[:, kept] / np.sqrt(values[kept]))
+    values, turn = np.linalg.eigh(moved.T @ model.stiffness_times(moved))
+    return Modes(
+        np.concatenate([modes.eigenvalues, values]),
+        np.hstack([modes.shapes, moved @ turn]),
+        np.append(modes.rigid, np.zeros(len(values), dtype=bool)),
+    )
+
+
+def receptance_slopes(
+    modes: Modes,
+    response: SparseArray,
+    excitation: SparseArray,
+    frequencies: FloatArray,
+    slopes: MatrixSlopes,
+    damping: FloatArray | float = 0.0,
+) -> AnyArray:
+    """Return d receptance / d parameter, complex, (n_frequencies, n_response, n_excitation, p).
+
+    dH = -H dZ H with dZ = dK - w^2 dM + i w dC. The damping ratio of every mode stays, so that the
+    damping C = sum 2 z_r w_r M phi_r phi_r' M moves with the modes.
+
+    Arguments:
+        modes: mass-normalised; all of them give exact slopes, those of `response_modes` of a large
+            model slopes that are as good as its receptances.
+        response, excitation, frequencies, damping: as of `receptance`.
+        slopes: of the matrices, such as `ParametricModel.slopes` gives.
+
+    Raises:
+        ModelError: at the very frequency of an undamped mode.
+
+    Source: Lin & Ewins (1990), the linear term of their equation; Fox & Kapoor (1968) for dC.
+    """
+    ratio = np.broadcast_to(np.nan_to_num(np.asarray(damping, dtype=float)), len(modes))
+    out, into = (np.asarray(rows @ modes.shapes) for rows in (response, excitation))
+    compliance = 1.0 / dynamic_stiffness(modes.eigenvalues, frequencies, ratio)
+    of_stiffness, of_mass = _damping_slopes(modes.eigenvalues, ratio)
+    omega = 2.0 * np.pi * np.asarray(frequencies)[None, :, None]
+    lines, size = compliance.shape
+    # Modal coordinates under each force, (m, n_f n_excitation), as pairs of real numbers.
+    coordinates = compliance.T[:, :, None] * into.T[:, None, :]
+    pairs = np.ascontiguousarray(coordinates.reshape(size, -1)).view(float)
+    read = compliance[:, None, :] * out  # (n_f, n_response, m)
+    found = np.empty((lines, len(out), len(into), slopes.count), dtype=complex)
+    stiffness = slopes.inner(modes.shapes, modes.shapes)
+    mass = slopes.inner(modes.shapes, modes.shapes, "mass")
+    for p, (k, m) in enumerate(zip(stiffness, mass, strict=True)):
+        parts = (k, m, of_stiffness * k + of_mass * m)
+        force, inertia, damped = (
+            (part @ pairs).view(complex).reshape(coordinates.shape) if part.any() else 0.0
+            for part in parts
+        )
+        exerted = force - np.square(omega) * inertia + 1j * omega * damped
+        found[..., p] = -read @ np.broadcast_to(exerted, coordinates.shape).transpose(1, 0, 2)
+    return found
+
+
+def _damping_slopes(eigenvalues: FloatArray, ratio: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return G and L, (m, m), with phi_r' dC phi_s = G_rs phi_r' dK phi_s + L_rs phi_r' dM phi_s.
+
+    With h = z w and g = lambda_r - lambda_s they are 2 (h_r - h_s) / g and 2 (lambda_r h_s -
+    lambda_s h_r) / g. Modes that share an eigenvalue have their mean ratio.
+    """
+    root = np.sqrt(np.abs(eigenvalues))
+    half, gap = ratio * root, eigenvalues[:, None] - eigenvalues
+    total = root[:, None] + root
+    same = np.abs(gap) <= _REPEATED * np.maximum(np.square(total), 1.0)
+    gap, total = np.where(same, np.inf, gap), np.where(total > 0.0, total, np.inf)
+    mean = np.where(same, ratio[:, None] + ratio, 0.0) / total
+    crossed = eigenvalues[:, None] * half
+    of_stiffness = 2.0 * (half[:, None] - half) / gap + mean
+    of_mass = 2.0 * (crossed - crossed.T) / gap + mean * np.outer(root, root)
+    return of_stiffness, of_mass

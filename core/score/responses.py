@@ -1,0 +1,48 @@
+"""How well a model predicts the frequency responses that no strategy was given."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from femubench.core.case.case import Case
+from femubench.core.errors import ModelError
+from femubench.core.fem.model import Model
+from femubench.core.schema.results import ResponseBlock
+from femubench.core.typing import FloatArray
+from femubench.core.update.response_residuals import ResponseTargets
+
+_TINY = 1e-300
+_DECIBEL = 20.0 / np.log(10.0)
+
+
+def score_responses(case: Case, model: Model) -> ResponseBlock | None:
+    """Return the error of a model's log-magnitudes at held-out lines and sensors.
+
+    Its modes have the damping ratios of the measured modes, held-out ones among them, that they are
+    paired with: no strategy is asked for damping. A model that has no response has no block.
+    """
+    if case.frfs is None or case.split is None:
+        return None
+    hidden = case.split.unseen(case.frfs)
+    shown = np.asarray(hidden.any(axis=1))
+    lines = case.frfs.at_lines(shown)
+    size = np.abs(np.nan_to_num(lines.receptances))
+    counted = hidden[shown][:, :, None] & (size > 0.0)
+    if not counted.any():
+        return None
+    targets = ResponseTargets(replace(case.measurement, responses=lines))
+    try:
+        predicted = np.abs(targets.predict(model, None, 0.0).receptances)
+    except ModelError:
+        return None
+    ratio = np.maximum(predicted[counted], _TINY) / size[counted]
+    noise = lines.receptance_std[counted] / size[counted]
+    # Of more noise than signal a magnitude is off by about as much as the signal.
+    floor = _rms(_DECIBEL * np.minimum(noise, 1.0))
+    return ResponseBlock(_rms(_DECIBEL * np.log(ratio)), floor, int(counted.sum()))
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

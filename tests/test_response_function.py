@@ -1,0 +1,172 @@
+"""Updating by frequency responses: factors of a known truth, refusals, where it starts."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from response_problems import DAMPING, simulate, simulated_case
+
+import femubench
+from femubench import NotApplicable, RunOptions
+from femubench.core.case.writing import write_case
+from femubench.core.library.rank import plan_run
+from femubench.core.plugin.loader import load_plugins
+from femubench.core.run.jobs import Job, execute
+from femubench.core.schema.records import run_from_json, run_to_json
+from femubench.core.score.responses import score_responses
+from femubench.core.update.response_residuals import ResponseTargets
+from femubench.core.update.sensitivity_update import Iteration
+from femubench.fem import Place, PointMass
+from femubench.plugins.strategies.response_function import ResponseFunction
+from femubench.reports.runs import TerminalReporter
+from femubench.update import Changes
+
+FACTORS = np.array([1.12, 0.9, 1.05])
+RNG = np.random.default_rng(0)
+
+
+def deviations_off(draws: range) -> np.ndarray:  # type: ignore[type-arg]
+    """Return how far the factors are off in their stated deviations, (draws, 3)."""
+    model, test = simulate(FACTORS)
+    found = []
+    for draw in draws:
+        noisy = test.with_noise(np.random.default_rng(draw))
+        parameters = ResponseFunction().update(model, noisy, RNG).parameters
+        after, std = np.array([(p.after, p.std) for p in parameters], dtype=float).T
+        found.append((after - FACTORS) / std)
+    return np.array(found)
+
+
+def test_factors_lie_within_two_stated_deviations() -> None:
+    off = deviations_off(range(20))
+    assert (np.abs(off) < 2.0).all(axis=1).sum() >= 17
+    assert 0.7 < off.std() < 1.3  # nor are they wider than the noise
+
+
+@pytest.mark.nightly
+def test_factors_lie_within_two_stated_deviations_in_ninety_of_a_hundred_draws() -> None:
+    off = np.abs(deviations_off(range(100))) < 2.0
+    assert off.all(axis=1).sum() >= 90
+    assert (off.sum(axis=0) >= 93).all()
+
+
+def test_far_factors_are_found_from_where_the_frequencies_lead() -> None:
+    """Responses alone stay at a wrong resonance."""
+    far = np.array([2.0, 0.5, 1.0])
+    model, test = simulate(far)
+    noisy = test.with_noise(np.random.default_rng(1))
+    found = [p.after for p in ResponseFunction().update(model, noisy, RNG).parameters]
+    assert found == pytest.approx(far, rel=0.01)
+    parametric = Changes(model).parameterise("members")
+    alone = Iteration(parametric, ResponseTargets(noisy), ResponseFunction().options).run()
+    assert np.abs(np.exp(alone.q) / far - 1.0).max() > 0.3
+
+
+def test_what_no_factor_follows_widens_the_deviations() -> None:
+    model, test = simulate(FACTORS)
+    responses = test.responses
+    assert responses is not None
+    heavy = model.attach([PointMass(Place(joint="B"), 0.05)], [])
+    stated = [
+        np.array([p.std for p in ResponseFunction().update(m, test, RNG).parameters], dtype=float)
+        for m in (model, heavy)
+    ]
+    assert (stated[1] > 2.0 * stated[0]).all()
+
+
+def test_a_channel_that_was_not_measured_says_nothing() -> None:
+    model, test = simulate(FACTORS)
+    responses = test.responses
+    assert responses is not None
+    values = responses.values.copy()
+    values[:, 2] = np.nan  # what the prior pulls is a millionth
+    holed = replace(test, responses=replace(responses, values=values))
+    found = ResponseFunction().update(model, holed, RNG)
+    assert [p.after for p in found.parameters] == pytest.approx(FACTORS, rel=1e-5)
+
+
+def test_without_responses_it_is_not_applicable() -> None:
+    case = femubench.cases["frame"]
+    parts = (ResponseFunction(), case.model, case.used_measurement())
+    outcome = execute(Job(*map(pickle.dumps, parts), words=(1,)))
+    assert (outcome.status, outcome.reason) == (
+        "not-applicable",
+        "needs frequency responses: declare frfs and responses in [measurement] of the case",
+    )
+    with pytest.raises(NotApplicable, match="no frequency responses"):
+        femubench.strategies["bayesian"](responses=True).update(
+            case.model, case.used_measurement(), RNG
+        )
+
+
+def test_held_out_responses_are_scored_in_decibels() -> None:
+    """Against a plain sum over lines and sensors of what dense solutions give."""
+    case = simulated_case(FACTORS)
+    frfs = case.frfs
+    assert frfs is not None
+    assert frfs.deviations is not None
+    modes, rows = femubench.solve_modes(case.model), case.model.observe(frfs.responses)
+    ratio = np.full(len(modes), np.median(DAMPING))
+    ratio[:4] = DAMPING  # the nominal model has its modes in the order of the measured ones
+    mass = case.model.mass.toarray()
+    weighted = mass @ modes.shapes
+    viscous = (weighted * (2.0 * ratio * np.sqrt(modes.eigenvalues))) @ weighted.T
+    errors, noise = [], []
+    for f, hertz in enumerate(frfs.frequencies):
+        w = 2.0 * np.pi * hertz
+        dynamic = case.model.stiffness.toarray() - w**2 * mass + 1j * w * viscous
+        found = rows @ np.linalg.solve(dynamic, rows[[0]].toarray()[0])
+        for o, label in enumerate(frfs.responses.labels):
+            known = hertz < 250.0 and label == frfs.responses.labels[-1]
+            if known or hertz > 255.0:
+                size = abs(frfs.values[f, o, 0])
+                errors.append(20.0 * np.log10(abs(found[o]) / size))
+                noise.append(20.0 / np.log(10.0) * min(frfs.deviations[f, o, 0] / size, 1.0))
+    scored = score_responses(case, case.model)
+    assert scored is not None
+    assert scored.count == len(errors)
+    assert scored.rms_db == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=1e-6)
+    assert scored.floor_db == pytest.approx(np.sqrt(np.mean(np.square(noise))), rel=1e-6)
+    assert score_responses(replace(case, split=None), case.model) is None
+    truth = Changes(case.model).parameterise("members").at(np.log(FACTORS))
+    best = score_responses(case, truth)
+    assert best is not None
+    assert best.rms_db == pytest.approx(best.floor_db, rel=0.1)
+    assert scored.rms_db > 3.0 * best.rms_db
+
+
+def test_unasked_it_runs_only_where_a_case_has_responses(tmp_path: Path) -> None:
+    case, plugins = simulated_case(FACTORS), load_plugins()
+    write_case(tmp_path / "with", case)
+    write_case(tmp_path / "without", replace(case, split=None))
+    ran = {}
+    for name in ("with", "without"):
+        plan = plan_run([tmp_path / name], (), plugins, {"nominal": "drawn"})
+        ran[name] = [strategy.name for strategy in plan.strategies]
+    assert ran["with"] == list(plugins.strategies)
+    assert ran["without"] == [name for name in ran["with"] if name != "response-function"]
+
+
+@pytest.mark.slow(30)
+def test_a_run_shows_responses_next_to_gains_that_are_as_without(tmp_path: Path) -> None:
+    case = simulated_case(FACTORS)
+    write_case(tmp_path / "with", case)
+    write_case(tmp_path / "without", replace(case, split=None))
+    given = RunOptions(twins=0, nominal="drawn")
+    run = femubench.rank(tmp_path / "with", ["unchanged", "response-function"], given, jobs=1)
+    frame = run.table.set_index("strategy")
+    found = frame.loc["response-function"]
+    assert found["responses_db"] == pytest.approx(found["responses_floor_db"], rel=0.1)
+    assert frame.loc["unchanged", "responses_db"] > 3.0 * found["responses_db"]
+    plain = femubench.rank(tmp_path / "without", ["unchanged"], given, jobs=1)
+    (one,), (other,) = plain.results, [r for r in run.results if r.strategy == "unchanged"]
+    assert (one.blocks, one.gain, one.responses) == (other.blocks, other.gain, None)
+    text = TerminalReporter().render(run)
+    assert "resp." in text
+    assert "resp." not in TerminalReporter().render(plain)
+    again = run_from_json(run_to_json(run))
+    assert [r.responses for r in again.results] == [r.responses for r in run.results]
