@@ -168,28 +168,28 @@ class Posterior:
     def _missed(self, names: frozenset[str]) -> bool:
         """Tell whether the best explanation with textbook effects is much better than without.
 
-        Better by the evidence and by the data alone. Textbook physics is weighed against the same
-        effects without it, of which as many or more are fitted, not against another one that is
-        fitted to stand for it; where nobody tried these, the textbook models alone are compared.
+        Better by the evidence and by the data alone. Textbook physics is weighed against the model
+        without it, not against another effect that is fitted to stand for it; where nobody tried
+        the same causes without it, the two textbook models alone are compared.
         """
         best = next((e for e in self.explanations if names <= set(e.base.names)), None)
         if best is None:
             return False
-        fitted = set(best.searched) - names
-        without = [e for e in self._with(best.effects - names) if fitted <= set(e.searched)]
-        if not without:
+        rest, fitted = best.effects - names, tuple(n for n in best.searched if n not in names)
+        without = self._first(rest, fitted)
+        if without is None:
             physics = frozenset(best.base.names)
-            bare = [e for e in self._with(physics) if not e.parts]
-            best = bare[0] if bare else best
-            without = [e for e in self._with(physics - names) if not e.parts]
-        gains = (
-            (best.fit.log_evidence - e.fit.log_evidence, fits_better(best, e)) for e in without
-        )
-        return all(min(gain) > log(settings.earned_factor) for gain in gains)
+            bare, without = self._first(physics, ()), self._first(physics - names, ())
+            best = bare or best
+        if without is None:
+            return True
+        gains = best.fit.log_evidence - without.fit.log_evidence, fits_better(best, without)
+        return min(gains) > log(settings.earned_factor)
 
-    def _with(self, effects: frozenset[str]) -> list[Explanation]:
-        """Return the explanations with these effects in all, most probable first."""
-        return [e for e in self.explanations if e.effects == effects]
+    def _first(self, effects: frozenset[str], searched: Key) -> Explanation | None:
+        """Return the best explanation with these effects in all and these of them fitted."""
+        found = (e for e in self.explanations if (e.effects, e.searched) == (effects, searched))
+        return next(found, None)
 
     def key(self, explanation: Explanation) -> Key:
         """Return the name of an explanation: its causes and the textbook effects that count."""

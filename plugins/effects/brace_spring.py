@@ -26,7 +26,7 @@ from femubench.effect import (
 )
 from femubench.fem import Brace, Frame
 
-_SHARE = 0.01  # of the squared lowest elastic frequency, as of springs to ground
+_SHARE = 0.1  # of the squared lowest elastic frequency: the scale of a brace that shows
 _MOST = 300
 _STRAIGHT = np.cos(np.radians(5.0))
 
