@@ -33,7 +33,7 @@ OWN = 0.25  # of its size, by which definitions of a truth differ (five, twenty,
 LEAST = 0.05  # % of frequency; smaller in truth and budget says nothing
 KINDS = {
     **dict.fromkeys(("support", "joint-stiffness", "joint stiffness"), "joint"),
-    **dict.fromkeys(("joint-mass", "joint mass", "added-mass"), "mass"),
+    **dict.fromkeys(("joint-mass", "joint mass", "overlap of members", "added-mass"), "mass"),
     **dict.fromkeys(("shear-deformation", "rotary-inertia"), "shear"),
 }
 

@@ -24,14 +24,18 @@ from femubench.core.diagnosis.budget import (
     log_frequencies,
 )
 from femubench.core.errors import InputError
-from femubench.core.fem.frame import MADE, JointKind
+from femubench.core.fem.frame import MADE, Frame, Joint, JointKind, Material, Member
+from femubench.core.fem.joints import joint_groups, length_drawn_twice, without_overlaps
 from femubench.core.fem.model import Model
+from femubench.core.fem.sections import Section, rectangular_tube, round_tube, solid_rectangle
+from femubench.core.fem.structure import Structure
 from femubench.core.fit.modal_fit import state_at
 from femubench.core.inference.settings import settings
 from femubench.core.library.cases import cases
 from femubench.core.modal.eigen import modes_of
 from femubench.core.plugin.loader import list_effects
 from femubench.reports.diagnosis_words import as_drawn, budget
+from truths.lacks_file import LACKS, read_lacks
 
 STD = 1e-3
 
@@ -145,6 +149,58 @@ def test_how_a_joint_is_made_sets_its_room(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=said):
             femubench.read_case(written(kind, made))
+
+
+def branch(own: Section, other: Section, angle: float, beyond: bool = False) -> Frame:
+    """Return a beam of two members along x through O, and one that branches off, up at an angle."""
+    ends = {"A": (-1.0, 0.0), "O": (0.0, 0.0), "B": (1.0, 0.0)}
+    x, z = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    ends |= {"C": (x, z)} | ({"D": (-x, -z)} if beyond else {})
+    steel = Material(2.1e11, 0.3, 7850.0)
+    beam = [Member(n, tuple(n), 4, other, steel) for n in ("AO", "OB")]
+    off = [Member(n, tuple(n), 4, own, steel) for n in (("OC", "DO") if beyond else ("OC",))]
+    joints = tuple(Joint(name, (x, 0.0, z)) for name, (x, z) in ends.items())
+    return Frame("3d", "euler-bernoulli", joints, (*beam, *off))
+
+
+def test_a_branch_weighs_from_the_face_that_it_ends_at() -> None:
+    tube, small = rectangular_tube(0.05, 0.08, 0.003), rectangular_tube(0.04, 0.04, 0.003)
+    deep, bar = rectangular_tube(0.06, 0.04, 0.003), solid_rectangle(0.04, 0.04)
+    pipe = round_tube(0.06, 0.003)
+    for own, other, angle, beyond, expected in (
+        (small, tube, 90.0, False, 0.04),
+        (small, tube, 30.0, False, 0.08),
+        (small, pipe, 45.0, False, 0.03 * np.sqrt(2.0)),
+        (deep, tube, 90.0, False, 0.0),
+        (small, tube, 90.0, True, 0.0),  # which is cut?
+        (bar, bar, 90.0, True, 0.02),
+        (small, replace(tube, shape="", width=None, height=None), 90.0, False, 0.0),
+    ):
+        frame = branch(own, other, angle, beyond)
+        assert length_drawn_twice(frame, "OC@O") == pytest.approx(expected)
+        assert length_drawn_twice(frame, "AO@O") == 0.0
+        structure = Structure.build(frame)
+        groups = joint_groups(frame)
+        for group in groups:
+            structure = without_overlaps(structure, group)
+        lost = Model.of(Structure.build(frame)).total_mass - Model.of(structure).total_mass
+        assert lost == pytest.approx((1 + beyond) * 7850.0 * own.A * expected, abs=1e-9)
+        # What is out is not taken out again.
+        assert all(without_overlaps(structure, group) is structure for group in groups)
+
+
+@pytest.mark.parametrize("name", ["a-frame", "mast-lumps", "vierendeel"])
+def test_overlaps_are_those_of_the_solid(name: str) -> None:
+    found = budget_of(cases[f"suite/{name}"], ())
+    assert found is not None
+    (line,) = (line for line in found.lines if line.name == "overlap of members")
+    truth = read_lacks(LACKS / f"{name}.toml")
+    (true,) = (
+        100.0 * np.array(part.contribution)
+        for part in truth.features
+        if part.what == "mass of the overlap as it is" and part.place == f"type:{line.place}"
+    )
+    assert np.linalg.norm(line.percent - true) < 0.25 * np.linalg.norm(true)
 
 
 def test_there_is_no_budget_of_matrices(drawn: Case) -> None:

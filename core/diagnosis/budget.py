@@ -30,7 +30,7 @@ from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.textbook import textbook_values
 from femubench.core.fem.beam import BEND_XY, BEND_XZ, TWIST
 from femubench.core.fem.frame import ACTIVE, MADE, Factor, Frame, Place, PointMass
-from femubench.core.fem.joints import half_depth, joint_groups, whole_members
+from femubench.core.fem.joints import half_depth, joint_groups, whole_members, without_overlaps
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.mesh_error import mesh_bias
@@ -157,13 +157,22 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
         start = _as_it_is(model, every)
     last, drawn = log_frequencies(start), np.log(np.abs(start.frequencies[start.partner]))
     lines = [_line("all", "mesh", last - drawn, np.zeros((len(every),) * 2), "handbook")]
+
+    def take(place: str, name: str, better: Model, share: float) -> None:
+        nonlocal model, last
+        now = log_frequencies(_as_it_is(better, every))
+        std = share * np.abs(now - last)
+        lines.append(_line(place, name, now - last, np.outer(std, std), "handbook"))
+        model, last = better, now
+
     for effect in effects:
         for place, values in textbook_values(effect, model).items():
-            model = cast(Model, effect.extend(model, place, values))
-            now = log_frequencies(_as_it_is(model, every))
-            std = settings.budget_handbook * np.abs(now - last)
-            lines.append(_line(place, effect.name, now - last, np.outer(std, std), "handbook"))
-            last = now
+            better = cast(Model, effect.extend(model, place, values))
+            take(place, effect.name, better, settings.budget_handbook)
+    for group in joint_groups(model.frame_structure.frame):
+        cut = without_overlaps(model.frame_structure, group)
+        if cut is not model.frame_structure:
+            take(group.type, "overlap of members", Model.of(cut), settings.own_error_of_change)
     entries = list_entries(model)
     hypotheses = [entry.hypothesis for entry in entries]
     problem, parts = _pose(model, every.select(used), hypotheses, every)
