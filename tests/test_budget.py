@@ -14,6 +14,7 @@ import femubench
 from femubench import plot
 from femubench.core.case.case import Case
 from femubench.core.case.writing import write_case
+from femubench.core.change.terms import sparse_matrix
 from femubench.core.diagnosis.budget import (
     Budget,
     advise_modes,
@@ -201,6 +202,54 @@ def test_overlaps_are_those_of_the_solid(name: str) -> None:
         if part.what == "mass of the overlap as it is" and part.place == f"type:{line.place}"
     )
     assert np.linalg.norm(line.percent - true) < 0.25 * np.linalg.norm(true)
+
+
+def test_drawn_springs_and_masses_are_open_and_go_into_the_frame() -> None:
+    case = cases["suite/trailer"]
+    structure, entries = case.model.frame_structure, list_entries(case.model)
+    of = {(e.place, e.kind): e for e in entries if e.kind.startswith(("springs", "rotary"))}
+    assert {key: e.names for key, e in of.items()} == {
+        ("wheel", "springs to ground"): ("x", "z", "y"),
+        ("hitch", "springs to ground"): ("y", "z"),
+        ("wheel", "rotary inertia of masses"): ("wheel",),
+    }
+    sizes = {"wheel": 0.7, "z": -1.0}  # of the inertia of a cube of steel; of a prior deviation
+    x = np.array([sizes.get(n, 0.0) * (e in of.values()) for e in entries for n in e.names])
+    frame = extend_frame(structure.frame, entries, x)
+    k = {(str(s.at), s.direction): s.stiffness for s in frame.springs}
+    softer = np.exp(-settings.budget_known[4])
+    assert k["SW", "z"] == pytest.approx(1.5e5 * softer) == k["NW", "z"]
+    assert (k["SW", "x"], k["H", "z"]) == (3e5, pytest.approx(4e5 * softer))
+    parts = [m for m in frame.masses if m.at.joint == "SW"]
+    mass, arms = np.array([m.mass for m in parts]), np.array([m.offset for m in parts])
+    side = np.cbrt(5.0 / 7850.0)
+    second = np.einsum("p,pi,pj->ij", mass, arms, arms)
+    np.testing.assert_allclose(mass @ arms, 0.0, atol=1e-15)
+    np.testing.assert_allclose(second, 0.7 * 5.0 * side**2 / 12.0 * np.eye(3), atol=1e-12)
+    (term,) = of["wheel", "rotary inertia of masses"].terms
+    grown = (Model.of(structure.rebuilt(frame)).mass - case.model.mass).toarray()
+    own = 0.7 * sparse_matrix(term.operator, case.model.size).toarray()
+    np.testing.assert_allclose(own, grown, atol=1e-9 * np.abs(grown).max())
+
+
+def test_a_spring_that_is_softer_than_drawn_is_found() -> None:
+    drawn = cases["suite/trailer"]
+    structure, entries = drawn.model.frame_structure, list_entries(drawn.model)
+    soft = [
+        1.5 * (e.place == "wheel" and n == "z" and e.kind.startswith("springs"))
+        for e in entries
+        for n in e.names
+    ]
+    frame = extend_frame(structure.frame, entries, -np.array(soft))
+    found = budget_of(measured_as(drawn, Model.of(structure.rebuilt(frame))), [])
+    assert found is not None
+    top = max(
+        (line for line in found.lines if line.source != "handbook"),
+        key=lambda line: abs(line.rms_percent),
+    )
+    assert (top.place, top.name, top.source) == ("wheel", "springs to ground", "data")
+    assert top.rms_percent < 0.0
+    assert "z" not in top.unseen
 
 
 def test_there_is_no_budget_of_matrices(drawn: Case) -> None:

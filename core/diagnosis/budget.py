@@ -29,7 +29,7 @@ from femubench.core.change.terms import ElementOperator, Term
 from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.textbook import textbook_values
 from femubench.core.fem.beam import BEND_XY, BEND_XZ, TWIST
-from femubench.core.fem.frame import ACTIVE, MADE, Factor, Frame, Place, PointMass
+from femubench.core.fem.frame import ACTIVE, MADE, Factor, Frame, GroundSpring, Place, PointMass
 from femubench.core.fem.joints import half_depth, joint_groups, whole_members, without_overlaps
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
@@ -53,7 +53,7 @@ from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray, IntArray
 
 # Of every axis of a joint zone the displacements of an element, and what a factor multiplies.
-_JOINTS = "joint stiffness"
+_JOINTS, _SPRINGS, _LUMPS = "joint stiffness", "springs to ground", "rotary inertia of masses"
 _WHOLES = ("E", "GJ", "density")  # of everything
 _AXES = {"rx": (TWIST, "GJ"), "ry": (BEND_XZ, "bending ry"), "rz": (BEND_XY, "bending rz")}
 Source = Literal["handbook", "data", "drawing"]
@@ -198,23 +198,29 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
 
 
 def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame:
-    """Return a frame with some entries at coordinates, (k,), as factors and masses.
+    """Return a frame with some entries at coordinates, (k,), as factors, masses and springs.
 
     Changes of the matrices add up, as in the fit, where factors of a frame multiply.
     """
     everywhere: dict[str, float] = {}
     zones: dict[tuple[str, str], float] = {}
-    masses = []
+    added: list[PointMass] = []
+    held: dict[tuple[str, str], float] = {}
+    inertia: dict[str, float] = {}
     for entry, own in zip(entries, _split(entries), strict=True):
         values = entry.grow(x[None, own])[0].tolist()
-        for quantity, value in zip(entry.quantities, values, strict=False):
-            if entry.kind != _JOINTS:
-                everywhere[quantity] = value
-            else:
+        if entry.kind == _JOINTS:
+            for quantity, value in zip(entry.quantities, values, strict=True):
                 for label in entry.at:
                     zones[quantity, label] = zones.get((quantity, label), 0.0) + value
-        if not entry.quantities:
-            masses += [PointMass(Place(joint=name), values[0]) for name in entry.at if values[0]]
+        elif entry.kind == _SPRINGS:
+            held |= {(entry.place, k): 1.0 + v for k, v in zip(entry.names, values, strict=True)}
+        elif entry.kind == _LUMPS:
+            inertia[entry.place] = values[0]
+        elif entry.quantities:
+            everywhere[entry.quantities[0]] = values[0]
+        else:
+            added += [PointMass(Place(joint=name), values[0]) for name in entry.at if values[0]]
     stiffer, twist, heavier = (everywhere.get(quantity, 0.0) for quantity in _WHOLES)
     stiffer, twisted = 1.0 + stiffer, 1.0 + stiffer + twist
     values = (stiffer, twisted / stiffer, 1.0 + heavier)
@@ -229,11 +235,20 @@ def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame
         )
     factors += [Factor(name, tuple(labels), factor) for (name, factor), labels in alike.items()]
     wanted = tuple(factor for factor in factors if factor.factor != 1.0)
-    return replace(frame, factors=(*frame.factors, *wanted), masses=(*frame.masses, *masses))
+    bodies = [(mass, inertia.get(_family(frame, mass.at), 0.0)) for mass in frame.masses]
+    masses = [part for mass, share in bodies for part in _spread(mass, share)]
+    firm = [(spring, (_family(frame, spring.at), _along(spring))) for spring in frame.springs]
+    springs = [replace(one, stiffness=one.stiffness * held.get(key, 1.0)) for one, key in firm]
+    return replace(
+        frame,
+        factors=(*frame.factors, *wanted),
+        masses=(*masses, *added),
+        springs=tuple(springs),
+    )
 
 
 def list_entries(model: Model) -> list[Entry]:
-    """Return all that the drawing of a frame leaves open: joint zones, E, density, masses."""
+    """Return all that the drawing of a frame leaves open: joint zones, E, masses, springs."""
     structure = model.frame_structure
     frame = structure.frame
     p = structure.properties
@@ -265,7 +280,7 @@ def list_entries(model: Model) -> list[Entry]:
     twist = np.zeros_like(stiff)
     index = slice(None), TWIST[:, None], TWIST
     twist[index] = stiff[index]
-    *wholes, mass = settings.budget_known
+    *wholes, mass = settings.budget_known[:4]
     for quantity, blocks, std in zip(_WHOLES, (stiff, twist, heavy), wholes, strict=True):
         if blocks.any():
             operator = ElementOperator(structure, every, blocks)
@@ -279,7 +294,50 @@ def list_entries(model: Model) -> list[Entry]:
         for name in alike_joints:
             term = ModelPlaces(model).mass_term([Place(joint=name)])
             found.append(_alone(place, "joint mass", term, std, (), (name,)))
+    return [*found, *_attached(structure)]
+
+
+def _attached(structure: Structure) -> list[Entry]:
+    """Return what is open of drawn springs to ground, and of drawn masses, which have no extent."""
+    frame = structure.frame
+    springs: dict[str, dict[str, list[GroundSpring]]] = {}
+    for one in frame.springs:
+        alike_springs = springs.setdefault(_family(frame, one.at), {})
+        alike_springs.setdefault(_along(one), []).append(one)
+    found = []
+    for place, groups in springs.items():
+        held = [structure.assemble_attachments((), alike)[1] for alike in groups.values()]
+        terms = tuple(Term.of("stiffness", matrix) for matrix in held)
+        root, count = settings.budget_known[4] * np.eye(len(terms)), len(terms)
+        found.append(Entry(place, _SPRINGS, tuple(groups), terms, root, (_SPRINGS,) * count, ()))
+    lumps: dict[str, list[PointMass]] = {}
+    for mass in frame.masses:
+        lumps.setdefault(_family(frame, mass.at), []).append(mass)
+    for place, alike in lumps.items():
+        wide = [part for mass in alike for part in _spread(mass, 1.0)]
+        bodies, points = (structure.assemble_attachments(m, ())[0] for m in (wide, alike))
+        term = Term.of("mass", bodies - points)
+        found.append(_alone(place, _LUMPS, term, 1.0, (), (place,)))
     return found
+
+
+def _family(frame: Frame, at: Place) -> str:
+    """Return the type of the joint where something is attached, or the member."""
+    return str(at.member) if at.joint is None else frame.joint(at.joint).family
+
+
+def _along(spring: GroundSpring) -> str:
+    return spring.direction.lstrip("+-")
+
+
+def _spread(mass: PointMass, share: float) -> tuple[PointMass, ...]:
+    """Return a mass as six of its sixths, with a share of the inertia of a cube of steel."""
+    if not share:
+        return (mass,)
+    # A cube has m a^2 / 6 about every axis, six sixths at a radius r have 2 m r^2 / 3.
+    radius = 0.5 * np.sqrt(share) * np.cbrt(mass.mass / settings.budget_known[5])
+    arms = radius * np.vstack([np.eye(3), -np.eye(3)]) + mass.offset
+    return tuple(PointMass(mass.at, mass.mass / 6.0, (x, y, z)) for x, y, z in arms.tolist())
 
 
 def _alone(
