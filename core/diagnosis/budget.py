@@ -147,13 +147,17 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
     if model.structure is None:
         return None
     start = _as_it_is(model, every)
-    # What the drawing has as a rigid motion has no ratio of frequencies.
-    still = start.problem.space.still(start.eigenvalues[start.partner])
-    every = every.select([n for n, rigid in zip(every.numbers, still, strict=True) if not rigid])
+    # What the drawing has as a rigid motion has no ratio of frequencies, and which of its modes one
+    # without a shape is, that no fit has seen, nobody knows where others have theirs.
+    out = start.problem.space.still(start.eigenvalues[start.partner])
+    shaped = np.isfinite(every.shapes).any(axis=0)
+    if shaped.any():
+        out |= ~shaped & ~np.isin(every.numbers, case.used)
+    every = every.select([n for n, without in zip(every.numbers, out, strict=True) if not without])
     used = [number for number in case.used if number in every.numbers]
     if not used:
         return None
-    if still.any():
+    if out.any():
         start = _as_it_is(model, every)
     last, drawn = log_frequencies(start), np.log(np.abs(start.frequencies[start.partner]))
     lines = [_line("all", "mesh", last - drawn, np.zeros((len(every),) * 2), "handbook")]
@@ -437,8 +441,8 @@ def advise_modes(budget: Budget, case: Case) -> tuple[Advice, ...]:
     those of what no class of a budget is.
     """
     state, count = budget.state, len(case.used)
-    numbers = np.array(case.measurement.numbers)
-    used = state.partner[np.isin(numbers, case.used)]
+    numbers = np.array([mode.mode for mode in budget.modes])
+    used = state.partner[[mode.used for mode in budget.modes]]
     moving = np.flatnonzero(~state.problem.space.still(state.eigenvalues))
     further = np.setdiff1d(moving, used)[:count]
     slopes = frequency_slopes(state, further)
