@@ -27,8 +27,10 @@ from femubench.core.diagnosis.budget import (
 )
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import MADE, Frame, Joint, JointKind, Material, Member
+from femubench.core.fem.group_factors import Groups
 from femubench.core.fem.joints import joint_groups, length_drawn_twice, without_overlaps
 from femubench.core.fem.model import Model
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import Section, rectangular_tube, round_tube, solid_rectangle
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.modal_fit import state_at
@@ -253,9 +255,26 @@ def test_a_spring_that_is_softer_than_drawn_is_found() -> None:
     assert "z" not in top.unseen
 
 
-def test_there_is_no_budget_of_matrices(drawn: Case) -> None:
+def test_there_is_no_budget_of_matrices_without_groups(drawn: Case) -> None:
     bare = replace(drawn.model, structure=None)
     assert budget_of(replace(drawn, model=bare), []) is None
+
+
+def test_a_group_of_matrices_is_found_with_its_own_prior(drawn: Case) -> None:
+    (zone,) = (e for e in list_entries(drawn.model) if "branch ry" in e.names)
+    part = sum(sparse_matrix(term.operator, drawn.model.size) for term in zone.terms)
+    groups = {"zone": part, "rest": drawn.model.stiffness - part}
+    model = replace(drawn.model, structure=None, groups=groups, group_priors={"zone": 2.0})
+    factor = Property("zone", "E", ("group:zone",))
+    real = measured_as(drawn, Groups(model).with_factors([factor], [0.4]))
+    found = budget_of(replace(real, model=model), ())
+    assert found is not None
+    top = found.lines[0]
+    assert (top.place, top.name, top.source) == ("group:zone", "stiffness", "data")
+    assert 0.35 < abs(found.extended.groups["zone"]).sum() / abs(part).sum() < 0.5
+    solved = modes_of(found.extended, 20).elastic.natural_frequencies
+    fitted = np.sort(found.state.frequencies)
+    np.testing.assert_allclose(solved[:7], fitted[fitted > 1.0][:7], rtol=1e-6)
 
 
 @pytest.mark.slow(15)

@@ -30,8 +30,11 @@ from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.textbook import textbook_values
 from femubench.core.fem.beam import BEND_XY, BEND_XZ, TWIST
 from femubench.core.fem.frame import ACTIVE, MADE, Factor, Frame, GroundSpring, Place, PointMass
+from femubench.core.fem.group_factors import Groups
 from femubench.core.fem.joints import half_depth, joint_groups, whole_members, without_overlaps
 from femubench.core.fem.model import Model
+from femubench.core.fem.parameters import Property
+from femubench.core.fem.slopes import Matrix
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.mesh_error import mesh_bias
 from femubench.core.fit.modal_fit import Problem, State, fit, state_at
@@ -46,6 +49,7 @@ from femubench.core.fit.static_response import (
 )
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import zero_tolerance
+from femubench.core.modal.group_prior import GroupPriors
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import Advice, BudgetLine, BudgetMode
@@ -133,7 +137,7 @@ class Budget:
 
 
 def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
-    """Return what the drawing of a case lacks; None for a model that came as matrices.
+    """Return what the drawing of a case lacks; None for matrices without groups.
 
     Arguments:
         case: only its used modes are fitted; the others are predicted.
@@ -144,7 +148,7 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
         ModelError: when the model has no modes.
     """
     model, every = case.model, case.measurement
-    if model.structure is None:
+    if model.structure is None and not model.groups:
         return None
     start = _as_it_is(model, every)
     # What the drawing has as a rigid motion has no ratio of frequencies, and which of its modes one
@@ -173,7 +177,7 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
         for place, values in textbook_values(effect, model).items():
             better = cast(Model, effect.extend(model, place, values))
             take(place, effect.name, better, settings.budget_handbook)
-    for group in joint_groups(model.frame_structure.frame):
+    for group in joint_groups(model.structure.frame) if model.structure else ():
         cut = without_overlaps(model.frame_structure, group)
         if cut is not model.frame_structure:
             take(group.type, "overlap of members", Model.of(cut), settings.own_error_of_change)
@@ -195,10 +199,21 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
     figures = 100.0 * np.column_stack([measured - drawn, measured - found, deviation])
     numbers = zip(every.numbers, figures.tolist(), strict=True)
     modes = tuple(BudgetMode(number, number in case.used, *row) for number, row in numbers)
-    frame = extend_frame(model.frame_structure.frame, entries, x)
-    extended = Model.of(model.frame_structure.rebuilt(frame))
+    extended = extend_model(model, entries, x)
     lines.sort(key=lambda line: -abs(line.rms_percent))
     return Budget(tuple(lines), modes, extended, state, covariance)
+
+
+def extend_model(model: Model, entries: Sequence[Entry], x: FloatArray) -> Model:
+    """Return a model with some entries at coordinates, (k,)."""
+    if model.structure is not None:
+        return Model.of(model.structure.rebuilt(extend_frame(model.structure.frame, entries, x)))
+    factors = [Property(entry.kind, entry.quantities[0], (entry.place,)) for entry in entries]
+    grown = [
+        1.0 + entry.grow(x[None, own])[0, 0]
+        for entry, own in zip(entries, _split(entries), strict=True)
+    ]
+    return Groups(model).with_factors(factors, grown)
 
 
 def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame:
@@ -252,8 +267,10 @@ def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame
 
 
 def list_entries(model: Model) -> list[Entry]:
-    """Return all that the drawing of a frame leaves open: joint zones, E, masses, springs."""
-    structure = model.frame_structure
+    """Return all that a drawing leaves open: joint zones, E, masses, springs; or groups."""
+    if model.structure is None:
+        return _list_groups(model)
+    structure = model.structure
     frame = structure.frame
     p = structure.properties
     stiff, heavy = p.stiffness_matrices(), p.mass_matrices()
@@ -299,6 +316,22 @@ def list_entries(model: Model) -> list[Entry]:
             term = ModelPlaces(model).mass_term([Place(joint=name)])
             found.append(_alone(place, "joint mass", term, std, (), (name,)))
     return [*found, *_attached(structure)]
+
+
+def _list_groups(model: Model) -> list[Entry]:
+    """Return the groups of matrices, each with the prior of its own, or density for all masses."""
+    found = []
+    groups, priors = Groups(model), GroupPriors(model)
+    pairs: tuple[tuple[Matrix, str], ...] = ("stiffness", "E"), ("mass", "density")
+    for matrix, quantity in pairs:
+        for place in groups.places(matrix):
+            std = priors.std(place.removeprefix(groups.PREFIX))
+            term = Term.of(matrix, groups.matrix(matrix, place))
+            found.append(_alone(place, matrix, term, std, (quantity,), ()))
+    if not model.mass_groups:
+        term = Term.of("mass", model.mass)
+        found.append(_alone("all", "density", term, settings.budget_known[2], ("density",), ()))
+    return found
 
 
 def _attached(structure: Structure) -> list[Entry]:
