@@ -31,7 +31,7 @@ from femubench.core.fem.group_factors import Groups
 from femubench.core.fem.joints import joint_groups, length_drawn_twice, without_overlaps
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
-from femubench.core.fem.sections import Section, rectangular_tube, round_tube, solid_rectangle
+from femubench.core.fem.sections import Section
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.modal_fit import state_at
 from femubench.core.inference.settings import settings
@@ -168,9 +168,12 @@ def branch(own: Section, other: Section, angle: float, beyond: bool = False) -> 
 
 
 def test_a_branch_weighs_from_the_face_that_it_ends_at() -> None:
-    tube, small = rectangular_tube(0.05, 0.08, 0.003), rectangular_tube(0.04, 0.04, 0.003)
-    deep, bar = rectangular_tube(0.06, 0.04, 0.003), solid_rectangle(0.04, 0.04)
-    pipe = round_tube(0.06, 0.003)
+    tube, small = (
+        Section.rectangular_tube(0.05, 0.08, 0.003),
+        Section.rectangular_tube(0.04, 0.04, 0.003),
+    )
+    deep, bar = Section.rectangular_tube(0.06, 0.04, 0.003), Section.solid_rectangle(0.04, 0.04)
+    pipe = Section.round_tube(0.06, 0.003)
     for own, other, angle, beyond, expected in (
         (small, tube, 90.0, False, 0.04),
         (small, tube, 30.0, False, 0.08),
