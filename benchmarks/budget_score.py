@@ -32,8 +32,11 @@ CLEAR = 1.645  # deviations of a 90 % interval
 OWN = 0.25  # of its size, by which definitions of a truth differ (five, twenty, 200 times as stiff)
 LEAST = 0.05  # % of frequency; smaller in truth and budget says nothing
 KINDS = {
-    **dict.fromkeys(("support", "joint-stiffness", "joint stiffness"), "joint"),
-    **dict.fromkeys(("joint-mass", "joint mass", "added-mass"), "mass"),
+    **dict.fromkeys(
+        ("support", "joint-stiffness", "joint stiffness", "springs to ground"), "joint"
+    ),
+    **dict.fromkeys(("joint-mass", "joint mass", "overlap of members", "added-mass"), "mass"),
+    "rotary inertia of masses": "mass",
     **dict.fromkeys(("shear-deformation", "rotary-inertia"), "shear"),
 }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from femubench.reports.cells import (
@@ -50,6 +50,7 @@ INDICATORS = {
 }
 _MOST_CHANGES, _MOST_PLACES = 8, 5
 _FAR = 3.0  # times its error is what a drawing hides at least
+_BY_MODE = "percent", "std"
 _MOST_LINES, _LEAST_SHARE, _SURE = 4, 0.1, 2.0  # of a budget; of its largest; deviations
 _NOISE, _LIMIT = 0.05, 1e-3
 _NOTABLE, _MOST_MOVED = 3.0, 3  # deviations; modes
@@ -90,14 +91,19 @@ def budget(data: Data) -> str:
             if rows
         )
 
-    least = _LEAST_SHARE * max((abs(line["rms_percent"]) for line in lines), default=0.0)
-    sure = (x for x in lines if abs(x["rms_percent"]) >= max(least, _SURE * x["rms_std"]))
-    said = [budget_line(line) for line in sure]
+    near = [_of_modes(line, [mode["used"] for mode in modes]) for line in lines]
+    least = _LEAST_SHARE * max((abs(line["rms_percent"]) for line in near), default=0.0)
+    near.sort(key=lambda line: -abs(line["rms_percent"]))
+    large = [x for x in near if abs(x["rms_percent"]) >= max(least, x["rms_std"])]
+    sure = [x for x in large if abs(x["rms_percent"]) >= _SURE * x["rms_std"]]
+    said = first_of([*map(budget_line, sure)], _MOST_LINES)
+    maybe = first_of([budget_line(x) for x in large if x not in sure], _MOST_LINES)
     parts = [f"The drawing is off by {off('error_percent')} (rms)."]
     # Lines of a drawing that is as near as any may cancel each other.
     off_by = root_mean_square(row["error_percent"] for row in used)
-    if said and _FAR * off_by >= (data["hidden_percent"] or 0.0):
-        parts.append(f"It lacks {first_of(said, _MOST_LINES)}.")
+    if (sure or maybe) and _FAR * off_by >= (data["hidden_percent"] or 0.0):
+        perhaps = f", and perhaps {maybe}" if maybe else ""
+        parts.append(f"It lacks {said}{perhaps}." if sure else f"Perhaps it lacks {maybe}.")
     parts.append(f"This leaves {off('left_percent')}.")
     vague = max(others, key=lambda m: m["std_percent"], default=None)
     if vague is not None and vague["std_percent"] >= _SURE * root_mean_square(
@@ -108,6 +114,13 @@ def budget(data: Data) -> str:
     hidden = figure(data["hidden_percent"], 2)
     parts.append(f"Next to that no defect shows that moves frequencies by less than {hidden} %.")
     return " ".join(parts)
+
+
+def _of_modes(line: Data, wanted: Sequence[bool]) -> Data:
+    """Return a line of a budget with the figures of some modes alone, as rms over them."""
+    sizes, stds = ([v for v, own in zip(line[k], wanted, strict=True) if own] for k in _BY_MODE)
+    size = math.copysign(root_mean_square(sizes), sum(sizes))
+    return {**line, "rms_percent": size, "rms_std": root_mean_square(stds)}
 
 
 def budget_line(line: Data) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import femubench
 from femubench import plot
 from femubench.core.case.case import Case
 from femubench.core.case.writing import write_case
+from femubench.core.change.terms import sparse_matrix
 from femubench.core.diagnosis.budget import (
     Budget,
     advise_modes,
@@ -24,14 +26,20 @@ from femubench.core.diagnosis.budget import (
     log_frequencies,
 )
 from femubench.core.errors import InputError
-from femubench.core.fem.frame import MADE, JointKind
+from femubench.core.fem.frame import MADE, Frame, Joint, JointKind, Material, Member
+from femubench.core.fem.group_factors import Groups
+from femubench.core.fem.joints import joint_groups, length_drawn_twice, without_overlaps
 from femubench.core.fem.model import Model
+from femubench.core.fem.parameters import Property
+from femubench.core.fem.sections import Section
+from femubench.core.fem.structure import Structure
 from femubench.core.fit.modal_fit import state_at
 from femubench.core.inference.settings import settings
 from femubench.core.library.cases import cases
 from femubench.core.modal.eigen import modes_of
 from femubench.core.plugin.loader import list_effects
 from femubench.reports.diagnosis_words import as_drawn, budget
+from truths.lacks_file import LACKS, read_lacks
 
 STD = 1e-3
 
@@ -147,9 +155,129 @@ def test_how_a_joint_is_made_sets_its_room(tmp_path: Path) -> None:
             femubench.read_case(written(kind, made))
 
 
-def test_there_is_no_budget_of_matrices(drawn: Case) -> None:
+def branch(own: Section, other: Section, angle: float, beyond: bool = False) -> Frame:
+    """Return a beam of two members along x through O, and one that branches off, up at an angle."""
+    ends = {"A": (-1.0, 0.0), "O": (0.0, 0.0), "B": (1.0, 0.0)}
+    x, z = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    ends |= {"C": (x, z)} | ({"D": (-x, -z)} if beyond else {})
+    steel = Material(2.1e11, 0.3, 7850.0)
+    beam = [Member(n, tuple(n), 4, other, steel) for n in ("AO", "OB")]
+    off = [Member(n, tuple(n), 4, own, steel) for n in (("OC", "DO") if beyond else ("OC",))]
+    joints = tuple(Joint(name, (x, 0.0, z)) for name, (x, z) in ends.items())
+    return Frame("3d", "euler-bernoulli", joints, (*beam, *off))
+
+
+def test_a_branch_weighs_from_the_face_that_it_ends_at() -> None:
+    tube, small = (
+        Section.rectangular_tube(0.05, 0.08, 0.003),
+        Section.rectangular_tube(0.04, 0.04, 0.003),
+    )
+    deep, bar = Section.rectangular_tube(0.06, 0.04, 0.003), Section.solid_rectangle(0.04, 0.04)
+    pipe = Section.round_tube(0.06, 0.003)
+    for own, other, angle, beyond, expected in (
+        (small, tube, 90.0, False, 0.04),
+        (small, tube, 30.0, False, 0.08),
+        (small, pipe, 45.0, False, 0.03 * np.sqrt(2.0)),
+        (deep, tube, 90.0, False, 0.0),
+        (small, tube, 90.0, True, 0.0),  # which is cut?
+        (bar, bar, 90.0, True, 0.02),
+        (small, replace(tube, shape="", width=None, height=None), 90.0, False, 0.0),
+    ):
+        frame = branch(own, other, angle, beyond)
+        assert length_drawn_twice(frame, "OC@O") == pytest.approx(expected)
+        assert length_drawn_twice(frame, "AO@O") == 0.0
+        structure = Structure.build(frame)
+        groups = joint_groups(frame)
+        for group in groups:
+            structure = without_overlaps(structure, group)
+        lost = Model.of(Structure.build(frame)).total_mass - Model.of(structure).total_mass
+        assert lost == pytest.approx((1 + beyond) * 7850.0 * own.A * expected, abs=1e-9)
+        # What is out is not taken out again.
+        assert all(without_overlaps(structure, group) is structure for group in groups)
+
+
+@pytest.mark.parametrize("name", ["a-frame", "mast-lumps", "vierendeel"])
+def test_overlaps_are_those_of_the_solid(name: str) -> None:
+    found = budget_of(cases[f"suite/{name}"], ())
+    assert found is not None
+    (line,) = (line for line in found.lines if line.name == "overlap of members")
+    truth = read_lacks(LACKS / f"{name}.toml")
+    (true,) = (
+        100.0 * np.array(part.contribution)
+        for part in truth.features
+        if part.what == "mass of the overlap as it is" and part.place == f"type:{line.place}"
+    )
+    assert np.linalg.norm(line.percent - true) < 0.25 * np.linalg.norm(true)
+
+
+def test_drawn_springs_and_masses_are_open_and_go_into_the_frame() -> None:
+    case = cases["suite/trailer"]
+    structure, entries = case.model.frame_structure, list_entries(case.model)
+    of = {(e.place, e.kind): e for e in entries if e.kind.startswith(("springs", "rotary"))}
+    assert {key: e.names for key, e in of.items()} == {
+        ("wheel", "springs to ground"): ("x", "z", "y"),
+        ("hitch", "springs to ground"): ("y", "z"),
+        ("wheel", "rotary inertia of masses"): ("wheel",),
+    }
+    sizes = {"wheel": 0.7, "z": -1.0}  # of the inertia of a cube of steel; of a prior deviation
+    x = np.array([sizes.get(n, 0.0) * (e in of.values()) for e in entries for n in e.names])
+    frame = extend_frame(structure.frame, entries, x)
+    k = {(str(s.at), s.direction): s.stiffness for s in frame.springs}
+    softer = np.exp(-settings.budget_known[4])
+    assert k["SW", "z"] == pytest.approx(1.5e5 * softer) == k["NW", "z"]
+    assert (k["SW", "x"], k["H", "z"]) == (3e5, pytest.approx(4e5 * softer))
+    parts = [m for m in frame.masses if m.at.joint == "SW"]
+    mass, arms = np.array([m.mass for m in parts]), np.array([m.offset for m in parts])
+    side = np.cbrt(5.0 / 7850.0)
+    second = np.einsum("p,pi,pj->ij", mass, arms, arms)
+    np.testing.assert_allclose(mass @ arms, 0.0, atol=1e-15)
+    np.testing.assert_allclose(second, 0.7 * 5.0 * side**2 / 12.0 * np.eye(3), atol=1e-12)
+    (term,) = of["wheel", "rotary inertia of masses"].terms
+    grown = (Model.of(structure.rebuilt(frame)).mass - case.model.mass).toarray()
+    own = 0.7 * sparse_matrix(term.operator, case.model.size).toarray()
+    np.testing.assert_allclose(own, grown, atol=1e-9 * np.abs(grown).max())
+
+
+def test_a_spring_that_is_softer_than_drawn_is_found() -> None:
+    drawn = cases["suite/trailer"]
+    structure, entries = drawn.model.frame_structure, list_entries(drawn.model)
+    soft = [
+        1.5 * (e.place == "wheel" and n == "z" and e.kind.startswith("springs"))
+        for e in entries
+        for n in e.names
+    ]
+    frame = extend_frame(structure.frame, entries, -np.array(soft))
+    found = budget_of(measured_as(drawn, Model.of(structure.rebuilt(frame))), [])
+    assert found is not None
+    top = max(
+        (line for line in found.lines if line.source != "handbook"),
+        key=lambda line: abs(line.rms_percent),
+    )
+    assert (top.place, top.name, top.source) == ("wheel", "springs to ground", "data")
+    assert top.rms_percent < 0.0
+    assert "z" not in top.unseen
+
+
+def test_there_is_no_budget_of_matrices_without_groups(drawn: Case) -> None:
     bare = replace(drawn.model, structure=None)
     assert budget_of(replace(drawn, model=bare), []) is None
+
+
+def test_a_group_of_matrices_is_found_with_its_own_prior(drawn: Case) -> None:
+    (zone,) = (e for e in list_entries(drawn.model) if "branch ry" in e.names)
+    part = sum(sparse_matrix(term.operator, drawn.model.size) for term in zone.terms)
+    groups = {"zone": part, "rest": drawn.model.stiffness - part}
+    model = replace(drawn.model, structure=None, groups=groups, group_priors={"zone": 2.0})
+    factor = Property("zone", "E", ("group:zone",))
+    real = measured_as(drawn, Groups(model).with_factors([factor], [0.4]))
+    found = budget_of(replace(real, model=model), ())
+    assert found is not None
+    top = found.lines[0]
+    assert (top.place, top.name, top.source) == ("group:zone", "stiffness", "data")
+    assert 0.35 < abs(found.extended.groups["zone"]).sum() / abs(part).sum() < 0.5
+    solved = modes_of(found.extended, 20).elastic.natural_frequencies
+    fitted = np.sort(found.state.frequencies)
+    np.testing.assert_allclose(solved[:7], fitted[fitted > 1.0][:7], rtol=1e-6)
 
 
 @pytest.mark.slow(15)
@@ -183,6 +311,12 @@ def test_the_mode_that_says_most_of_what_is_open_is_advised_first(drawn: Case) -
     assert next(m for m in again.modes if m.mode == loosest).std_percent < 0.5 * stds[loosest]
 
 
+def test_a_mode_without_a_shape_that_no_fit_has_seen_is_in_no_budget() -> None:
+    found = budget_of(cases["hframe"], ())  # mode 7 has no shape
+    assert found is not None
+    assert [mode.mode for mode in found.modes] == [1, 2, 3, 4, 5, 6, 8]
+
+
 def test_the_drawing_of_a_budget_reaches_every_error(real: Budget) -> None:
     lines = [structs.asdict(line) for line in real.lines]
     rows = [{**line, "class": line.pop("name")} for line in lines]
@@ -203,17 +337,26 @@ def test_the_drawing_of_a_budget_reaches_every_error(real: Budget) -> None:
 
 
 def test_the_words_say_how_far_off_why_and_what_is_left() -> None:
-    line = {"class": "joint stiffness", "place": "tee", "rms_percent": -3.0, "rms_std": 0.5}
-    vague = {"class": "E", "place": "all", "rms_percent": 0.0, "rms_std": 1.0}
+    def line(kind: str, place: str, used: float, std: float, other: float) -> dict[str, Any]:
+        rms = {"rms_percent": used, "rms_std": std + other}  # over all modes
+        return {"class": kind, "place": place, "percent": [used, other], "std": [std, other], **rms}
+
+    # What the used modes say counts, however vague it is of others.
+    sure = line("joint stiffness", "tee", -3.0, 0.5, 9.0)
+    maybe = line("joint mass", "foot", -1.0, 0.8, 0.0)
+    vague = line("E", "all", 0.0, 1.0, 0.0)
     used = {"mode": 1, "used": True, "error_percent": -3.0, "left_percent": 0.5, "std_percent": 0.5}
     other = {**used, "mode": 2, "used": False, "error_percent": 6.0, "std_percent": 9.0}
-    data = {"budget": [line, vague], "budget_modes": [used, other], "hidden_percent": 3.0}
+    data = {"budget": [maybe, sure, vague], "budget_modes": [used, other], "hidden_percent": 3.0}
     assert budget(data) == (
         "The drawing is off by 3 % in the used modes and 6 % in the others (rms). It lacks joint "
-        "stiffness at tee (-3.00 ± 0.50 %). This leaves 0.5 % in the used modes and 0.5 % in the "
+        "stiffness at tee (-3.00 ± 0.50 %), and perhaps joint mass at foot (-1.00 ± 0.80 %). "
+        "This leaves 0.5 % in the used modes and 0.5 % in the "
         "others. Mode 2 is predicted to ± 9 % only. Next to that no defect shows that moves "
         "frequencies by less than 3 %."
     )
     (said,) = as_drawn(data["budget"], 0.1)
     assert said == "As drawn, for these modes do not say otherwise: E everywhere ± 1 %."
-    assert as_drawn([line], 0.1) == []
+    assert as_drawn([sure], 0.1) == []
+    said = budget({**data, "budget": [maybe, vague]})
+    assert "(rms). Perhaps it lacks joint mass at foot (-1.00 ± 0.80 %). This leaves" in said

@@ -461,6 +461,17 @@ def test_where_models_of_this_kind_are_as_wrong_the_sentence_says_by_how_much() 
     assert found.sentence.startswith(f"The model is {size:.2g} % off in the used modes (rms), and")
 
 
+def test_scatter_of_the_elements_is_no_noise_of_the_measurement() -> None:
+    """Frequencies to 0.01 % that are 0.05 % off: no cause, but not nothing either."""
+    test = measured(MODEL, FRAME, count=6, shapes=0, weighed=False)
+    off = 1.0 + 0.0005 * np.random.default_rng(4).standard_normal(6)
+    close = replace(test, frequencies=off * test.frequencies, frequency_std=1e-4 * test.frequencies)
+    found = diagnose(case_of(MODEL, close, 6), effects_named("density"))
+    assert (found.verdict, found.like_a_beam > 0.5) == ("none", True)
+    size = found.gain_rms.used_percent[0]
+    assert found.sentence.startswith(f"The model is {size:.2g} % off in the used modes (rms), and")
+
+
 @pytest.mark.parametrize("effect", ["added-mass", "joint-rotation"])
 def test_three_times_the_smallest_visible_size_is_found(clean: Diagnosis, effect: str) -> None:
     """For a spring a third of the stiffness; at the place where it would show best."""

@@ -29,9 +29,12 @@ from femubench.core.change.terms import ElementOperator, Term
 from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.textbook import textbook_values
 from femubench.core.fem.beam import BEND_XY, BEND_XZ, TWIST
-from femubench.core.fem.frame import ACTIVE, MADE, Factor, Frame, Place, PointMass
-from femubench.core.fem.joints import half_depth, joint_groups, whole_members
+from femubench.core.fem.frame import ACTIVE, MADE, Factor, Frame, GroundSpring, Place, PointMass
+from femubench.core.fem.group_factors import Groups
+from femubench.core.fem.joints import half_depth, joint_groups, whole_members, without_overlaps
 from femubench.core.fem.model import Model
+from femubench.core.fem.parameters import Property
+from femubench.core.fem.slopes import Matrix
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.mesh_error import mesh_bias
 from femubench.core.fit.modal_fit import Problem, State, fit, state_at
@@ -46,6 +49,7 @@ from femubench.core.fit.static_response import (
 )
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import zero_tolerance
+from femubench.core.modal.group_prior import GroupPriors
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import Advice, BudgetLine, BudgetMode
@@ -53,7 +57,7 @@ from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray, IntArray
 
 # Of every axis of a joint zone the displacements of an element, and what a factor multiplies.
-_JOINTS = "joint stiffness"
+_JOINTS, _SPRINGS, _LUMPS = "joint stiffness", "springs to ground", "rotary inertia of masses"
 _WHOLES = ("E", "GJ", "density")  # of everything
 _AXES = {"rx": (TWIST, "GJ"), "ry": (BEND_XZ, "bending ry"), "rz": (BEND_XY, "bending rz")}
 Source = Literal["handbook", "data", "drawing"]
@@ -133,7 +137,7 @@ class Budget:
 
 
 def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
-    """Return what the drawing of a case lacks; None for a model that came as matrices.
+    """Return what the drawing of a case lacks; None for matrices without groups.
 
     Arguments:
         case: only its used modes are fitted; the others are predicted.
@@ -144,26 +148,39 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
         ModelError: when the model has no modes.
     """
     model, every = case.model, case.measurement
-    if model.structure is None:
+    if model.structure is None and not model.groups:
         return None
     start = _as_it_is(model, every)
-    # What the drawing has as a rigid motion has no ratio of frequencies.
-    still = start.problem.space.still(start.eigenvalues[start.partner])
-    every = every.select([n for n, rigid in zip(every.numbers, still, strict=True) if not rigid])
+    # What the drawing has as a rigid motion has no ratio of frequencies, and which of its modes one
+    # without a shape is, that no fit has seen, nobody knows where others have theirs.
+    out = start.problem.space.still(start.eigenvalues[start.partner])
+    shaped = np.isfinite(every.shapes).any(axis=0)
+    if shaped.any():
+        out |= ~shaped & ~np.isin(every.numbers, case.used)
+    every = every.select([n for n, without in zip(every.numbers, out, strict=True) if not without])
     used = [number for number in case.used if number in every.numbers]
     if not used:
         return None
-    if still.any():
+    if out.any():
         start = _as_it_is(model, every)
     last, drawn = log_frequencies(start), np.log(np.abs(start.frequencies[start.partner]))
     lines = [_line("all", "mesh", last - drawn, np.zeros((len(every),) * 2), "handbook")]
+
+    def take(place: str, name: str, better: Model, share: float) -> None:
+        nonlocal model, last
+        now = log_frequencies(_as_it_is(better, every))
+        std = share * np.abs(now - last)
+        lines.append(_line(place, name, now - last, np.outer(std, std), "handbook"))
+        model, last = better, now
+
     for effect in effects:
         for place, values in textbook_values(effect, model).items():
-            model = cast(Model, effect.extend(model, place, values))
-            now = log_frequencies(_as_it_is(model, every))
-            std = settings.budget_handbook * np.abs(now - last)
-            lines.append(_line(place, effect.name, now - last, np.outer(std, std), "handbook"))
-            last = now
+            better = cast(Model, effect.extend(model, place, values))
+            take(place, effect.name, better, settings.budget_handbook)
+    for group in joint_groups(model.structure.frame) if model.structure else ():
+        cut = without_overlaps(model.frame_structure, group)
+        if cut is not model.frame_structure:
+            take(group.type, "overlap of members", Model.of(cut), settings.own_error_of_change)
     entries = list_entries(model)
     hypotheses = [entry.hypothesis for entry in entries]
     problem, parts = _pose(model, every.select(used), hypotheses, every)
@@ -182,30 +199,47 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
     figures = 100.0 * np.column_stack([measured - drawn, measured - found, deviation])
     numbers = zip(every.numbers, figures.tolist(), strict=True)
     modes = tuple(BudgetMode(number, number in case.used, *row) for number, row in numbers)
-    frame = extend_frame(model.frame_structure.frame, entries, x)
-    extended = Model.of(model.frame_structure.rebuilt(frame))
+    extended = extend_model(model, entries, x)
     lines.sort(key=lambda line: -abs(line.rms_percent))
     return Budget(tuple(lines), modes, extended, state, covariance)
 
 
+def extend_model(model: Model, entries: Sequence[Entry], x: FloatArray) -> Model:
+    """Return a model with some entries at coordinates, (k,)."""
+    if model.structure is not None:
+        return Model.of(model.structure.rebuilt(extend_frame(model.structure.frame, entries, x)))
+    factors = [Property(entry.kind, entry.quantities[0], (entry.place,)) for entry in entries]
+    grown = [
+        1.0 + entry.grow(x[None, own])[0, 0]
+        for entry, own in zip(entries, _split(entries), strict=True)
+    ]
+    return Groups(model).with_factors(factors, grown)
+
+
 def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame:
-    """Return a frame with some entries at coordinates, (k,), as factors and masses.
+    """Return a frame with some entries at coordinates, (k,), as factors, masses and springs.
 
     Changes of the matrices add up, as in the fit, where factors of a frame multiply.
     """
     everywhere: dict[str, float] = {}
     zones: dict[tuple[str, str], float] = {}
-    masses = []
+    added: list[PointMass] = []
+    held: dict[tuple[str, str], float] = {}
+    inertia: dict[str, float] = {}
     for entry, own in zip(entries, _split(entries), strict=True):
         values = entry.grow(x[None, own])[0].tolist()
-        for quantity, value in zip(entry.quantities, values, strict=False):
-            if entry.kind != _JOINTS:
-                everywhere[quantity] = value
-            else:
+        if entry.kind == _JOINTS:
+            for quantity, value in zip(entry.quantities, values, strict=True):
                 for label in entry.at:
                     zones[quantity, label] = zones.get((quantity, label), 0.0) + value
-        if not entry.quantities:
-            masses += [PointMass(Place(joint=name), values[0]) for name in entry.at if values[0]]
+        elif entry.kind == _SPRINGS:
+            held |= {(entry.place, k): 1.0 + v for k, v in zip(entry.names, values, strict=True)}
+        elif entry.kind == _LUMPS:
+            inertia[entry.place] = values[0]
+        elif entry.quantities:
+            everywhere[entry.quantities[0]] = values[0]
+        else:
+            added += [PointMass(Place(joint=name), values[0]) for name in entry.at if values[0]]
     stiffer, twist, heavier = (everywhere.get(quantity, 0.0) for quantity in _WHOLES)
     stiffer, twisted = 1.0 + stiffer, 1.0 + stiffer + twist
     values = (stiffer, twisted / stiffer, 1.0 + heavier)
@@ -220,12 +254,23 @@ def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame
         )
     factors += [Factor(name, tuple(labels), factor) for (name, factor), labels in alike.items()]
     wanted = tuple(factor for factor in factors if factor.factor != 1.0)
-    return replace(frame, factors=(*frame.factors, *wanted), masses=(*frame.masses, *masses))
+    bodies = [(mass, inertia.get(_family(frame, mass.at), 0.0)) for mass in frame.masses]
+    masses = [part for mass, share in bodies for part in _spread(mass, share)]
+    firm = [(spring, (_family(frame, spring.at), _along(spring))) for spring in frame.springs]
+    springs = [replace(one, stiffness=one.stiffness * held.get(key, 1.0)) for one, key in firm]
+    return replace(
+        frame,
+        factors=(*frame.factors, *wanted),
+        masses=(*masses, *added),
+        springs=tuple(springs),
+    )
 
 
 def list_entries(model: Model) -> list[Entry]:
-    """Return all that the drawing of a frame leaves open: joint zones, E, density, masses."""
-    structure = model.frame_structure
+    """Return all that a drawing leaves open: joint zones, E, masses, springs; or groups."""
+    if model.structure is None:
+        return _list_groups(model)
+    structure = model.structure
     frame = structure.frame
     p = structure.properties
     stiff, heavy = p.stiffness_matrices(), p.mass_matrices()
@@ -256,7 +301,7 @@ def list_entries(model: Model) -> list[Entry]:
     twist = np.zeros_like(stiff)
     index = slice(None), TWIST[:, None], TWIST
     twist[index] = stiff[index]
-    *wholes, mass = settings.budget_known
+    *wholes, mass = settings.budget_known[:4]
     for quantity, blocks, std in zip(_WHOLES, (stiff, twist, heavy), wholes, strict=True):
         if blocks.any():
             operator = ElementOperator(structure, every, blocks)
@@ -270,7 +315,66 @@ def list_entries(model: Model) -> list[Entry]:
         for name in alike_joints:
             term = ModelPlaces(model).mass_term([Place(joint=name)])
             found.append(_alone(place, "joint mass", term, std, (), (name,)))
+    return [*found, *_attached(structure)]
+
+
+def _list_groups(model: Model) -> list[Entry]:
+    """Return the groups of matrices, each with the prior of its own, or density for all masses."""
+    found = []
+    groups, priors = Groups(model), GroupPriors(model)
+    pairs: tuple[tuple[Matrix, str], ...] = ("stiffness", "E"), ("mass", "density")
+    for matrix, quantity in pairs:
+        for place in groups.places(matrix):
+            std = priors.std(place.removeprefix(groups.PREFIX))
+            term = Term.of(matrix, groups.matrix(matrix, place))
+            found.append(_alone(place, matrix, term, std, (quantity,), ()))
+    if not model.mass_groups:
+        term = Term.of("mass", model.mass)
+        found.append(_alone("all", "density", term, settings.budget_known[2], ("density",), ()))
     return found
+
+
+def _attached(structure: Structure) -> list[Entry]:
+    """Return what is open of drawn springs to ground, and of drawn masses, which have no extent."""
+    frame = structure.frame
+    springs: dict[str, dict[str, list[GroundSpring]]] = {}
+    for one in frame.springs:
+        alike_springs = springs.setdefault(_family(frame, one.at), {})
+        alike_springs.setdefault(_along(one), []).append(one)
+    found = []
+    for place, groups in springs.items():
+        held = [structure.assemble_attachments((), alike)[1] for alike in groups.values()]
+        terms = tuple(Term.of("stiffness", matrix) for matrix in held)
+        root, count = settings.budget_known[4] * np.eye(len(terms)), len(terms)
+        found.append(Entry(place, _SPRINGS, tuple(groups), terms, root, (_SPRINGS,) * count, ()))
+    lumps: dict[str, list[PointMass]] = {}
+    for mass in frame.masses:
+        lumps.setdefault(_family(frame, mass.at), []).append(mass)
+    for place, alike in lumps.items():
+        wide = [part for mass in alike for part in _spread(mass, 1.0)]
+        bodies, points = (structure.assemble_attachments(m, ())[0] for m in (wide, alike))
+        term = Term.of("mass", bodies - points)
+        found.append(_alone(place, _LUMPS, term, 1.0, (), (place,)))
+    return found
+
+
+def _family(frame: Frame, at: Place) -> str:
+    """Return the type of the joint where something is attached, or the member."""
+    return str(at.member) if at.joint is None else frame.joint(at.joint).family
+
+
+def _along(spring: GroundSpring) -> str:
+    return spring.direction.lstrip("+-")
+
+
+def _spread(mass: PointMass, share: float) -> tuple[PointMass, ...]:
+    """Return a mass as six of its sixths, with a share of the inertia of a cube of steel."""
+    if not share:
+        return (mass,)
+    # A cube has m a^2 / 6 about every axis, six sixths at a radius r have 2 m r^2 / 3.
+    radius = 0.5 * np.sqrt(share) * np.cbrt(mass.mass / settings.budget_known[5])
+    arms = radius * np.vstack([np.eye(3), -np.eye(3)]) + mass.offset
+    return tuple(PointMass(mass.at, mass.mass / 6.0, (x, y, z)) for x, y, z in arms.tolist())
 
 
 def _alone(
@@ -370,8 +474,8 @@ def advise_modes(budget: Budget, case: Case) -> tuple[Advice, ...]:
     those of what no class of a budget is.
     """
     state, count = budget.state, len(case.used)
-    numbers = np.array(case.measurement.numbers)
-    used = state.partner[np.isin(numbers, case.used)]
+    numbers = np.array([mode.mode for mode in budget.modes])
+    used = state.partner[[mode.used for mode in budget.modes]]
     moving = np.flatnonzero(~state.problem.space.still(state.eigenvalues))
     further = np.setdiff1d(moving, used)[:count]
     slopes = frequency_slopes(state, further)

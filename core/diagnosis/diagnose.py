@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import chdtrc
 
 from femubench.core.advise.advice import advise
 from femubench.core.case.case import Case
@@ -253,8 +254,11 @@ def _written(
         top = sum(p for key, p in posterior.names.items() if set(decision.shared) <= set(key))
     top *= posterior.known if decision.group else 1.0
     stated = decision, causes, options, top, proof.gain_rms
-    bare = posterior.best(()).fit.state.problem.noise
-    said = sentence_of(*stated, reference=case.reference is not None, beam=bare.beam)
+    # The scatter of elements is no noise of the measurement: by that the model is off.
+    hertz = examination.nominal.raw[: len(case.used)]
+    agrees = float(chdtrc(len(hertz), hertz @ hertz)) >= settings.noise_p
+    agrees &= posterior.best(()).fit.state.problem.noise.beam
+    said = sentence_of(*stated, reference=case.reference is not None, agrees=agrees)
     faults = (repaired, loose) if decision.verdict != "unknown" else ([], [])
     named = bool(decision.group)
     nothing = examination.nominal

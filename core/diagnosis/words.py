@@ -81,7 +81,7 @@ def sentence_of(
     gain: Gain,
     *,
     reference: bool = False,
-    beam: bool = True,
+    agrees: bool = True,
 ) -> str:
     """Return the verdict in one sentence.
 
@@ -92,14 +92,14 @@ def sentence_of(
         probability: of the first name.
         gain: before and after, as root mean squares.
         reference: whether it is what differs from a reference that was sought.
-        beam: whether a model without causes leaves ordinary scatter, not a model error.
+        agrees: whether the used frequencies are those of the model, but for noise.
     """
     names = join_names(name_cause(cause) for cause in causes)
     if decision.verdict == "none":
         nothing = "nothing that differs from the reference" if reference else _NOTHING
         # Where the measurements agree, no explanation of a difference has a probability.
         sure = f" (probability {percent(decision.nothing)})" if decision.nothing > 0.5 else ""
-        if not (reference or beam):
+        if not (reference or agrees):
             off = f"The model is {gain.used_percent[0]:.2g} % off in the used modes (rms)"
             return f"{off}, and no hidden defect shows beyond what drawings of its kind lack{sure}."
         return f"The data show {nothing}{sure}."

@@ -17,6 +17,7 @@ from femubench.core.typing import FloatArray
 _COLLINEAR = np.cos(np.radians(175.0))
 # An arm takes this much of the element behind it at most; a rigid length likewise.
 _LARGEST_SHARE = 0.9
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -170,6 +171,43 @@ def half_depth(frame: Frame, end: str) -> float:
     section = crossing.section
     depth = section.width if across[1] > across[2] else section.height
     return 0.5 * (depth or 0.0)
+
+
+def length_drawn_twice(frame: Frame, end: str) -> float:
+    """Return the length in m that a branch has between its joint and the face of what passes there.
+
+    That is along its own axis, so that it grows with the skew. It is 0 where nothing passes, for
+    what one member lacks beyond the joint another has; where a section was given as numbers; at a
+    branch that is deeper than what passes and has no face to end at; and where two tubes cross,
+    for no centre line tells which of them is cut.
+    """
+    name, _, joint = end.rpartition("@")
+    members, roles = {m.name: m for m in _members_at(frame, joint)}, _roles(frame, joint)
+    own, direction = members[name], _outward(frame, members[name], joint)
+    arms = {(spring.member, spring.joint) for spring in frame.joint_springs}
+    arms |= {(rigid.member, rigid.joint) for rigid in frame.rigid_ends}
+    if roles[name] != "branch" or (name, joint) in arms:
+        return 0.0
+    crosses = any(_outward(frame, m, joint) @ direction < _COLLINEAR for m in members.values())
+    found = []
+    for other in (members[name] for name, role in roles.items() if role == "through"):
+        shapes = {own.section.shape, other.section.shape}
+        across = np.cross(_outward(frame, other, joint), direction)
+        deeper = _size(frame, own, across) > _size(frame, other, across) * (1.0 + _ROUNDING)
+        if "" in shapes or deeper or (crosses and shapes != {"solid-rectangle"}):
+            return 0.0
+        parts = np.abs(member_axes(frame, other)[0][1:] @ direction) / _sizes(other)
+        round_ = other.section.shape == "round-tube"
+        found.append(0.5 / float(np.linalg.norm(parts) if round_ else parts.max()))
+    return float(np.mean(found))
+
+
+def _sizes(member: Member) -> FloatArray:
+    return np.array([member.section.width or 0.0, member.section.height or 0.0])
+
+
+def _size(frame: Frame, member: Member, across: FloatArray) -> float:
+    return float(np.abs(member_axes(frame, member)[0][1:] @ across) @ _sizes(member))
 
 
 @dataclass(frozen=True)
@@ -372,3 +410,15 @@ class Joints:
             rigid.append(RigidEnd(joint, member, a, a0))
         frame = self.structure.frame
         return self.structure.rebuilt(replace(frame, rigid_ends=frame.rigid_ends + tuple(rigid)))
+
+
+def without_overlaps(structure: Structure, group: JointGroup) -> Structure:
+    """Return the frame without the mass that branches have inside the member that passes them."""
+    joints = Joints(structure)
+    twice = {end: length_drawn_twice(structure.frame, end) for end in group.ends}
+    lengths = {
+        end: (0.0, min(length, joints.available_length(end)))
+        for end, length in twice.items()
+        if length
+    }
+    return joints.with_rigid_ends(lengths) if lengths else structure

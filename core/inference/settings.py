@@ -202,10 +202,11 @@ class Settings:
         "the first of these by `made`",
         "a solid corner has little but its arm, a glued one no weld; all others as not known",
     )
-    budget_known: tuple[float, float, float, float] = _prior(
-        (0.02, 0.05, 0.01, 0.01),
-        "of E, of GJ, of density, of the structure",
-        "masses at the joints of a type likewise: all of them are apt to take what is not theirs",
+    budget_known: tuple[float, ...] = _prior(
+        (0.02, 0.05, 0.01, 0.01, 0.3, 7850.0),
+        "of E, of GJ, of density, of the structure, of drawn springs; kg/m3",
+        "masses at the joints of a type likewise: all of them are apt to take what is not theirs; "
+        "pads and soil are known to a third; a drawn mass has the inertia of a cube of steel",
     )
     budget_rest: tuple[float, float] = _prior(
         (0.01, 0.03),
