@@ -22,11 +22,11 @@ from femubench.effect import (
     Site,
     Size,
     Term,
-    elastic_band,
+    once_for,
 )
 from femubench.fem import Brace, Frame
 
-_SHARE = 0.1  # of the squared lowest elastic frequency: the scale of a brace that shows
+_SHARE = 0.01  # of the mean EA / L of the members
 _MOST = 300
 _STRAIGHT = np.cos(np.radians(5.0))
 
@@ -67,8 +67,14 @@ class BraceSpring(FrameEffect):
         return [f"{first}-{last}" for first, last in _nearest(frame, pairs)]
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
-        """Return the stiffness along the line of the joints, by what shows in the lowest mode."""
-        scale = _SHARE * model.total_mass * (2.0 * np.pi * float(elastic_band(model)[0])) ** 2
+        """Return the stiffness along the line of the joints."""
+        frame = model.frame_structure.frame
+
+        def rigidity() -> float:  # of the members along themselves in the mean, N/m
+            each = [m.material.E * m.section.A / frame.member_length(m.name) for m in frame.members]
+            return _SHARE * float(np.mean(each))
+
+        scale = once_for(model, "stiffness of a brace", rigidity)
         return (Parameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
