@@ -9,6 +9,7 @@ import re
 import secrets
 import signal
 import socket
+import subprocess
 import sys
 import threading
 import time
@@ -316,6 +317,21 @@ def test_jobs_start_again_when_what_has_raised_their_walls_was_ended() -> None:
         assert missed is not None
         assert missed.how == "no-start"
         assert ended(bytes, limits, b"here", pool).answer == b"here"
+
+
+@needed
+def test_what_has_raised_walls_ends_with_who_asked_and_says_nothing() -> None:
+    code = """
+import os
+from femubench.core.child.limits import Limits
+from femubench.core.child.workers import Workers
+with Workers(1, Limits.__module__).open() as pool:
+    assert pool.start(1, bytes, b"", Limits(60.0, sandbox="require")) is None
+    os.kill(os.getpid(), 9)
+"""
+    # The output has ended when nobody has it open any more.
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, timeout=120.0)
+    assert (done.returncode, done.stderr) == (-signal.SIGKILL, b"")
 
 
 @needed

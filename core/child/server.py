@@ -235,7 +235,9 @@ def serve_forks(control: int, apart: Apart | None = None) -> NoReturn:
                 os.close(status)
             ended.clear()
         if control in ready:
-            message, given, *_ = socket.recv_fds(asked, _MESSAGE, _ENDS, _CLOSE_ON_EXEC)
+            message, given = b"", list[int]()
+            with suppress(ConnectionError):  # who asked has ended, and not read all
+                message, given, *_ = socket.recv_fds(asked, _MESSAGE, _ENDS, _CLOSE_ON_EXEC)
             if not message:
                 _end_all(children)
                 _exit(0)
