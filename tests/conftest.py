@@ -185,6 +185,14 @@ def pytest_runtest_teardown(item: pytest.Item) -> Generator[None]:
 
 
 @pytest.fixture(scope="session", autouse=True)
+def say_no_progress_by_the_clock() -> Iterator[None]:
+    """Where a machine is busy, lines of progress would stand among those that tests compare."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("femubench.core.cli.progress.EVERY", 1e6)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
 def one_thread() -> Iterator[None]:
     """Keep linear algebra to one thread: matrices are small, and threads only wait for another."""
     with threadpool_limits(1):

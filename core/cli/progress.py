@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 _WIDE, _BAR = 32, 14  # characters
+EVERY = 10.0  # s between two lines where nobody watches
 
 
 @contextmanager
@@ -47,14 +48,14 @@ def progress(what: str = "", *, quiet: bool = False) -> Iterator[OnAdvance | Non
 
 @contextmanager
 def say_progress(
-    what: str, write: Callable[[str], None], clock: Callable[[], float], every: float = 10.0
+    what: str, write: Callable[[str], None], clock: Callable[[], float], every: float | None = None
 ) -> Iterator[OnAdvance]:
     """Give the function that takes what a line says, of which one is written every ten seconds.
 
     Arguments:
         write: takes a line.
         clock: seconds from any time on.
-        every: so many seconds, in a thread: one piece may be long.
+        every: so many seconds, `EVERY` by default, in a thread: one piece may be long.
     """
     begin = last = clock()
     latest, ended = Advance(0, 0), Event()
@@ -64,7 +65,7 @@ def say_progress(
         latest, last = advance, clock()
 
     def say() -> None:
-        while not ended.wait(every):
+        while not ended.wait(EVERY if every is None else every):
             now, share = clock(), f"{latest.done}/{latest.total}, " if latest.total else ""
             gone = format_time_left(Advance(0, 0, left=now - begin), 0.0)
             stage = ": ".join(filter(None, [what, latest.what or "at work"]))
