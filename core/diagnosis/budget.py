@@ -330,7 +330,8 @@ def _list_groups(model: Model) -> list[Entry]:
             found.append(_alone(place, matrix, term, std, (quantity,), ()))
     if not model.mass_groups:
         term = Term.of("mass", model.mass)
-        found.append(_alone("all", "density", term, settings.budget_known[2], ("density",), ()))
+        quantity = _WHOLES[-1]
+        found.append(_alone("all", quantity, term, settings.budget_known[2], (quantity,), ()))
     return found
 
 
