@@ -79,7 +79,7 @@ def raise_walls(walls: Walls | None, at: str) -> Apart:
         os.close(own)
     if walls is not None:
         _build(walls, at)
-    os.chdir("/")  # whoever may look at a process goes where its folder leads
+    os.chdir("/")  # one that may look at a process gets to its folder
     return "alone" if walls is None else "walled"
 
 
@@ -88,7 +88,7 @@ def fork_apart(apart: Apart, go_on: Callable[[], NoReturn]) -> tuple[int, int, i
 
     The first one there, whose end ends all, is a program that reads until the end: it hears of no
     signal from within, so that a strategy in its place that ends itself would go on, and a copy of
-    this process would be as large. Whoever has made a namespace of processes forks into it ever
+    this process would be as large. What has made a namespace of processes forks into it ever
     after: a thread makes it, and ends.
 
     Arguments:
