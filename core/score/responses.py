@@ -13,7 +13,7 @@ from femubench.core.schema.results import ResponseBlock
 from femubench.core.typing import FloatArray
 from femubench.core.update.response_residuals import ResponseTargets
 
-_TINY = 1e-300
+_RANGE = 1e-6  # of the largest response: no test resolves less than 120 dB below it
 _DECIBEL = 20.0 / np.log(10.0)
 
 
@@ -37,7 +37,8 @@ def score_responses(case: Case, model: Model) -> ResponseBlock | None:
         predicted = np.abs(targets.predict(model, None, 0.0).receptances)
     except ModelError:
         return None
-    ratio = np.maximum(predicted[counted], _TINY) / size[counted]
+    least = _RANGE * float(size[counted].max())
+    ratio = np.hypot(predicted[counted], least) / np.hypot(size[counted], least)
     noise = lines.receptance_std[counted] / size[counted]
     # Of more noise than signal a magnitude is off by about as much as the signal.
     floor = _rms(_DECIBEL * np.minimum(noise, 1.0))
