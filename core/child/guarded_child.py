@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import errno
 import math
 import os
 import select
@@ -412,6 +414,10 @@ def _held_in_socket(task: int, number: int) -> int:
     try:
         with os.fdopen(os.pidfd_open(task), "rb", 0) as opened:
             copy = libc().syscall(_PIDFD_GETFD, opened.fileno(), number, 0)
+        if copy < 0:
+            if ctypes.get_errno() in (errno.EBADF, errno.ESRCH):  # closed, or ended, since
+                return 0
+            return _largest_socket()
         with socket.socket(fileno=copy) as known:
             figures = known.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, 4 * _FIGURES)
     except OSError:
