@@ -15,6 +15,7 @@ from test_bulk_data import KINDS, LARGE, TWO
 from test_fuzz import outcome_of
 
 from femubench import InputError
+from femubench.core.errors import FemubenchError
 from femubench.plugins.readers.bulk_data import BulkDataReader
 
 READER = BulkDataReader()
@@ -88,6 +89,13 @@ def test_a_few(tmp_path: Path) -> None:
 @pytest.mark.nightly
 def test_many(tmp_path: Path) -> None:
     check(tmp_path, MANY)
+
+
+def test_a_modulus_that_rounds_to_nothing_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "model.bdf"
+    file.write_text(_with(LARGE, [("field", 12, 3, "1e-320")]))
+    with pytest.raises(FemubenchError, match="'E1': its stiffness is nothing to rounding"):
+        READER.read_model(file)
 
 
 def test_cut_files_are_refused_or_whole(tmp_path: Path) -> None:

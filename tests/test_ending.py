@@ -229,7 +229,9 @@ def test_a_disk_that_is_full(kib: int, code: int, stated: str, tmp_path: Path) -
         check=False,
     )
     assert done.returncode == code
-    first, *rest = done.stderr.splitlines()
+    # Lines of progress come after 10 s, which a busy machine needs.
+    lines = [line for line in done.stderr.splitlines() if not line.endswith(" left")]
+    first, *rest = lines
     assert first.startswith("bench: disk/")
     assert stated in first
     assert "No space left on device" in first

@@ -85,6 +85,8 @@ def _constants(frame: Frame, member: Member) -> tuple[float, ...]:
         raise ModelError(
             f"member {member.name!r}: a Timoshenko beam needs the shear coefficient kappa", member
         )
+    if not m.G * s.A > 0.0:
+        raise ModelError(f"member {member.name!r}: its stiffness is nothing to rounding", member)
     ky, kz = s.kappa(m.nu) if s.kappa is not None else (1.0, 1.0)
     flex = shear / (m.G * s.A)
     inertia = frame.rotary_share * m.rho
