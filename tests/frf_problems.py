@@ -88,7 +88,7 @@ def write_universal(file: Path, measured: FrequencyResponses, **more: Any) -> Pa
     """Write a universal file with nodes and a dataset 58 for every channel."""
     import pyuff
 
-    nodes = [int(label.partition(":")[0]) for label in measured.responses.labels]
+    nodes, along = [int(label.partition(":")[0]) for label in measured.responses.labels], " xyz"
     zeros = [0] * len(nodes)
     x, y, z = measured.responses.xyz.T
     ordinate = {"receptance": 8, "mobility": 11, "accelerance": 12}[measured.quantity]
@@ -102,8 +102,10 @@ def write_universal(file: Path, measured: FrequencyResponses, **more: Any) -> Pa
         for i, label in enumerate(measured.references.labels):
             sets.append(
                 {
-                    "type": 58, "func_type": 4, "rsp_node": node, "rsp_dir": 3,
-                    "ref_node": int(label.partition(":")[0]), "ref_dir": 3,
+                    "type": 58, "func_type": 4, "rsp_node": node,
+                    "rsp_dir": along.index(measured.responses.directions[o]),
+                    "ref_node": int(label.partition(":")[0]),
+                    "ref_dir": along.index(measured.references.directions[i]),
                     "data": measured.values[:, o, i], "x": measured.frequencies,
                     "id1": "FRF", "rsp_ent_name": "NONE", "ref_ent_name": "NONE",
                     "abscissa_spacing": 1, "abscissa_spec_data_type": 18,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+from collections.abc import Sequence
 from itertools import pairwise, product
 from pathlib import Path
 
@@ -24,17 +25,30 @@ from femubench.core.cli.main import bench
 from femubench.modal import FrequencyResponses, receptance
 from femubench.plugins.readers.solid_elements import KINDS
 
-BOXES = {  # mm
+Boxes = dict[str, tuple[tuple[float, ...], tuple[float, ...]]]
+BOXES: Boxes = {  # mm
     "BASE": ((0, 0, 0), (240, 120, 8)),
     "WELD": ((0, 0, 8), (8, 120, 16)),
     "UPRIGHT": ((0, 0, 16), (8, 120, 176)),
 }
-FACES = [(x, y, 8.0) for x in (21, 83, 139, 232) for y in (11, 61, 108)]  # hit along z
+Point = tuple[float, float, float, str]
+FACES: list[Point] = [(x, y, 8.0, "z") for x in (21, 83, 139, 232) for y in (11, 61, 108)]
+FLATS: list[Point] = [
+    *((x, y, 1.5, "z") for x in (20, 110, 200, 290) for y in (15, 70, 130, 185)),
+    *((-1.5, y, z, "x") for y in (15, 100, 185) for z in (75, 145)),
+]
 
 
-def write_deck(file: Path, kind: str, cell: float, weld: float = 1.0) -> Path:
-    """Write the bracket in mm, N and tonnes, its weld as stiff as stated."""
-    cuts = [sorted({end[a] for box in BOXES.values() for end in box}) for a in range(3)]
+SHEETS: Boxes = {  # mm, sheets of 3 mm with their corners
+    "BASE": ((-1.5, 0, -1.5), (300, 200, 1.5)),
+    "UPRIGHT": ((-1.5, 0, 1.5), (1.5, 200, 150)),
+    "RIB": ((1.5, 98.5, 1.5), (100, 101.5, 50)),
+}
+
+
+def write_deck(file: Path, kind: str, cell: float, soft: float = 1.0, boxes: Boxes = BOXES) -> Path:
+    """Write boxes in mm, N and tonnes, the weld or the rib as stiff as stated."""
+    cuts = [sorted({end[a] for box in boxes.values() for end in box}) for a in range(3)]
     lines = [
         np.unique(np.concatenate([np.linspace(a, b, 1 + int(np.ceil((b - a) / cell)))
                                   for a, b in pairwise(axis)]))
@@ -43,7 +57,7 @@ def write_deck(file: Path, kind: str, cell: float, weld: float = 1.0) -> Path:
     nodes: dict[tuple[float, ...], int] = {}
     sets: list[str] = []
     number = 0
-    for name, (low, high) in BOXES.items():
+    for name, (low, high) in boxes.items():
         sets.append(f"*ELEMENT, TYPE={kind}, ELSET={name}")
         inside = [
             [(p, q) for p, q in pairwise(axis) if low[a] <= p and q <= high[a]]
@@ -56,8 +70,8 @@ def write_deck(file: Path, kind: str, cell: float, weld: float = 1.0) -> Path:
             cells = [number, *(nodes.setdefault(p, len(nodes) + 1) for p in ends)]
             rows = [cells[i : i + 11] for i in range(0, len(cells), 11)]
             sets.append(",\n".join(", ".join(map(str, row)) for row in rows))
-    for name in BOXES:
-        modulus = 210e3 * (weld if name == "WELD" else 1.0)
+    for name in boxes:
+        modulus = 210e3 * (soft if name in {"WELD", "RIB"} else 1.0)
         sets += [f"*MATERIAL, NAME={name}", "*ELASTIC", f"{modulus}, 0.3"]
         sets += ["*DENSITY", "7.85e-9", f"*SOLID SECTION, ELSET={name}, MATERIAL={name}"]
     places = [f"{n}, {x!r}, {y!r}, {z!r}" for (x, y, z), n in nodes.items()]
@@ -65,18 +79,47 @@ def write_deck(file: Path, kind: str, cell: float, weld: float = 1.0) -> Path:
     return file
 
 
-def write_responses(file: Path, deck: Path) -> None:
-    """Write accelerances of a deck at points of the base, with 1 % of noise."""
+def write_shells(file: Path) -> Path:
+    """Write the sheets as shells `S4` of 12.5 mm, in mm."""
+    nodes: dict[tuple[float, ...], int] = {}
+    lines, number = [], 0
+    for name, along, up, a, b in (
+        ("BASE", (1, 0, 0), (0, 1, 0), 300, 200),
+        ("UPRIGHT", (0, 1, 0), (0, 0, 1), 200, 150),
+        ("RIB", (1, 0, 0), (0, 0, 1), 100, 50),
+    ):
+        start = np.array([0.0, 100.0 if name == "RIB" else 0.0, 0.0])
+        lines.append(f"*ELEMENT, TYPE=S4, ELSET={name}")
+        for i, j in product(range(int(a / 12.5)), range(int(b / 12.5))):
+            corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
+            places = [
+                tuple((start + 12.5 * (x * np.array(along) + y * np.array(up))).tolist())
+                for x, y in corners
+            ]
+            number += 1
+            own = [number, *(nodes.setdefault(place, len(nodes) + 1) for place in places)]
+            lines.append(", ".join(map(str, own)))
+    lines += [f"*SHELL SECTION, ELSET={name}, MATERIAL=steel\n3.0" for name in SHEETS]
+    lines += ["*MATERIAL, NAME=steel", "*ELASTIC", "210e3, 0.3", "*DENSITY", "7.85e-9", ""]
+    rows = [f"{n}, {x!r}, {y!r}, {z!r}" for (x, y, z), n in nodes.items()]
+    file.write_text("\n".join(["*NODE", *rows, *lines]))
+    return file
+
+
+def write_responses(file: Path, deck: Path, points: Sequence[Point] = FACES) -> None:
+    """Write accelerances of a deck at points, x, y, z and direction, with 1 % of noise."""
     model = with_mesh(femubench.read_model(deck, unit="mm"))
     rng = np.random.default_rng(4)
     modes = femubench.solve_modes(model, 40)
-    xyz = 1e-3 * np.array(FACES)
-    sensors = Sensors(tuple(f"{k + 1}:z" for k in range(len(xyz))), xyz, ("z",) * len(xyz))
-    two = Sensors(sensors.labels[:2], xyz[:2], ("z", "z"))
+    xyz = 1e-3 * np.array([point[:3] for point in points])
+    along = tuple(point[3] for point in points)
+    sensors = Sensors(tuple(f"{k + 1}:{d}" for k, d in enumerate(along)), xyz, along)
+    hit = [0, 1] if points is FACES else [0, 17]
+    two = Sensors(tuple(sensors.labels[k] for k in hit), xyz[hit], tuple(along[k] for k in hit))
     hertz = modes.natural_frequencies
     lines = np.linspace(0.5 * hertz[6], 0.5 * (hertz[15] + hertz[16]), 3000)
     readings = model.observe(sensors)
-    values = receptance(modes, readings, readings[:2], lines, 0.004)
+    values = receptance(modes, readings, readings[hit], lines, 0.004)
     values = -np.square(2.0 * np.pi * lines)[:, None, None] * values
     size = 0.01 * np.sqrt(np.square(np.abs(values)).mean(axis=0) / 2.0)
     draws = rng.standard_normal((2, *values.shape))
@@ -119,3 +162,27 @@ def test_the_messages_lead_from_deck_and_responses_to_an_updated_deck(
         text = Path("updated/model.inp").read_text()
         modulus = float(re.findall(r"NAME=WELD\n\*ELASTIC\n([^,]+),", text)[0])
         assert modulus == pytest.approx(0.2 * 210e3, rel=0.2)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("rib", "verdict", "places"), [(1.0, "none", []), (0.5, "named", ["group:RIB"])]
+)
+def test_a_soft_rib_is_found_by_a_model_of_shells(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rib: float, verdict: str, places: list[str]
+) -> None:
+    """The truth is of bricks, with the corners that the middle planes of shells do not have."""
+    monkeypatch.chdir(tmp_path)
+    write_shells(Path("model.inp"))
+    truth = write_deck(Path("truth.inp"), "C3D20R", 12.0, rib, SHEETS)
+    write_responses(Path("test.uff"), truth, FLATS)
+    for words in (
+        ("identify", "test.uff", "--output", "identified"),
+        ("init", "case", "--model", "model.inp", "--modes", "identified"),
+        ("diagnose", "case", "--json", "found.json"),
+    ):
+        done = CliRunner().invoke(bench, list(words))
+        assert done.exit_code == 0, done.output
+    found = json.loads(Path("found.json").read_text())
+    assert found["verdict"] == verdict
+    assert [cause["place"] for cause in found["causes"]] == places

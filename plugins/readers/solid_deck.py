@@ -1,4 +1,4 @@
-"""A model of solids in groups from an input file of CalculiX or Abaqus alone."""
+"""A model of solids and shells in groups from an input file of CalculiX or Abaqus alone."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench import InputError, Model
-from femubench.fem import FloatArray, SparseArray, matrix_model
-from femubench.plugins.readers import nodes, solid_elements
+from femubench.fem import FloatArray, MatrixGeometry, SparseArray, matrix_model
+from femubench.plugins.readers import nodes, shells, solid_elements
 from femubench.plugins.readers.nodes import Point
 from femubench.plugins.readers.reading import DIRECTIONS, needs
 
-INSTEAD = "solid elements alone, or the matrices of *FREQUENCY, SOLVER=MATRIXSTORAGE next to it"
+INSTEAD = "solids and shells alone, or the matrices of *FREQUENCY, SOLVER=MATRIXSTORAGE next to it"
 REST = "rest"
 JOINT_SHARE = 0.02  # of the mass: a smaller set of elements is a weld, a bolt or glue
 # What changes neither stiffness nor mass, or is of a step, whose supports alone count.
@@ -26,14 +26,20 @@ _IGNORED = re.compile(
     "(END)?(ASSEMBLY|PART|STEP)|ENDINSTANCE|HEADING|INCLUDE|NODE|SURFACE|SYSTEM|PREPRINT|RESTART|"
     "DAMPING|EXPANSION|CONDUCTIVITY|SPECIFICHEAT|INITIALCONDITIONS|PHYSICALCONSTANTS|TIMEPOINTS"
 )
+KINDS: dict[str, solid_elements.Kind | shells.Shell] = {**solid_elements.KINDS, **shells.SHELLS}
+_BETTER = {**solid_elements.BETTER, **shells.BETTER}
 _SAME = 1e-9  # of the largest entry: what rounding leaves of a factor
 _SOLVED = 10_000  # degrees of freedom up to which better elements are tried: four times as many
-_HELD = {"ENCASTRE": (0, 1, 2), "PINNED": (0, 1, 2), "XSYMM": (0,), "YSYMM": (1,), "ZSYMM": (2,)}
+_SECTIONS = ("SOLIDSECTION", "SHELLSECTION")
+_HELD = {
+    "ENCASTRE": range(6), "PINNED": range(3),
+    "XSYMM": (0, 4, 5), "YSYMM": (1, 3, 5), "ZSYMM": (2, 3, 4),
+}  # fmt: skip
 
 
 @dataclass
 class SolidDeck:
-    """What an input file says of a linear model of solids.
+    """What an input file says of a linear model of solids and shells.
 
     Arguments:
         path: of the file.
@@ -41,7 +47,7 @@ class SolidDeck:
         sets, node_sets: numbers by name, in capitals.
         named: names as the file first writes them.
         materials: modulus, Poisson's ratio and density by name, nan where not given.
-        sections: material by set of elements; the last one counts.
+        sections: material and thickness, nan of solids, by set of elements; the last one counts.
         masses: mass of the elements of a set.
         held: node and direction of supports.
     """
@@ -52,13 +58,13 @@ class SolidDeck:
     node_sets: dict[str, dict[int, None]] = field(default_factory=dict)
     named: dict[str, str] = field(default_factory=dict)
     materials: dict[str, list[float]] = field(default_factory=dict)
-    sections: dict[str, str] = field(default_factory=dict)
+    sections: dict[str, tuple[str, float]] = field(default_factory=dict)
     masses: dict[str, float] = field(default_factory=dict)
     held: set[tuple[int, int]] = field(default_factory=set)
 
     def solids(self) -> list[int]:
         """Return the elements that are no point masses."""
-        return [n for n, (kind, _) in self.elements.items() if kind in solid_elements.KINDS]
+        return [n for n, (kind, _) in self.elements.items() if kind in KINDS]
 
     def groups(self) -> dict[str, list[int]]:
         """Return the solid elements by group: the smallest sets that share none, and the rest."""
@@ -97,20 +103,18 @@ class BetterElements:
         amid: dict[tuple[int, ...], int] = {}
         first = max(map(int, places)) + 1
         for number, (kind, own) in deck.elements.items():
-            found = solid_elements.BETTER.get(kind)
+            found = _BETTER.get(kind)
             if found is None:
                 better.elements[number] = kind, own
                 continue
-            pairs = (
-                pair for chain in solid_elements.KINDS[found].edges for pair in pairwise(chain)
-            )
+            pairs = (pair for chain in KINDS[found].edges for pair in pairwise(chain))
             edges = [tuple(sorted((own[a], own[b]))) for a, b in pairs]
             new = [amid.setdefault(edge, first + len(amid)) for edge in edges]
             better.elements[number] = found, (*own, *new)
         for (a, b), node in amid.items():
             x, y, z = 0.5 * (np.array(places[str(a)]) + np.array(places[str(b)]))
             places[str(node)] = float(x), float(y), float(z)
-            better.held.update((node, d) for d in range(3) if {(a, d), (b, d)} <= deck.held)
+            better.held.update((node, d) for d in range(6) if {(a, d), (b, d)} <= deck.held)
         return _model_of(better, _materials(deck), places, first)
 
 
@@ -134,7 +138,7 @@ def read_solids(path: Path) -> Model:
     """
     deck, places = read_deck(path), nodes.read_nodes(path)
     model = _model_of(deck, _materials(deck), places)
-    linear = any(kind in solid_elements.BETTER for kind, _ in deck.elements.values())
+    linear = any(kind in _BETTER for kind, _ in deck.elements.values())
     if not linear or model.size > _SOLVED:
         return model
     return replace(model, finer=BetterElements(deck, places, model))
@@ -159,34 +163,80 @@ def _model_of(
     )
     if lost := [n for n in used if str(n) not in places]:
         raise InputError(f"node {lost[0]} of an element has no place", file=path, expected="*NODE")
-    row, xyz = {n: i for i, n in enumerate(used)}, np.array([places[str(n)] for n in used])
+    own = {n: places[str(n)] for n in used}
+    solid = _thicken(deck, material, own)
+    ends = dict.fromkeys(
+        n for kind, nodes in solid.elements.values() if kind != "MASS" for n in nodes
+    )
+    row, xyz = {n: i for i, n in enumerate(ends)}, np.array([solid.places[n] for n in ends])
+    motions = shells.Motions(row, deck.held)
+    for n in used:
+        if n in solid.lines:
+            solid.add_motions(n, motions)
+        elif n in row:
+            motions.add_node(n, np.array(own[n]), {n})
+    found, moved = motions.matrix()
     groups, heavy = deck.groups(), {}
-    kept = np.array([(n, d) not in deck.held for n in used for d in range(3)])
     parts: dict[str, SparseArray] = {}
-    mass = _point_masses(deck, row)
+    mass = sp.csc_array(_point_masses(deck, found))
     for name, numbers in (groups or {REST: list(material)}).items():
-        own, inertia = _assemble(deck, numbers, row, xyz, material)
-        parts[name] = sp.csc_array(own[kept][:, kept])
-        mass += inertia
+        stiffness, inertia = _assemble(
+            replace(deck, elements=solid.elements), numbers, row, xyz, material
+        )
+        parts[name] = sp.csc_array(moved.T @ stiffness @ moved)
+        mass += moved.T @ inertia @ moved
         heavy[name] = float(inertia.sum())
     model = matrix_model(
-        sp.csc_array(mass[kept][:, kept]),
+        sp.csc_array(mass),
         sp.csc_array(sum(parts.values())),
-        np.repeat([str(n) for n in used], 3)[kept].tolist(),
-        np.tile(DIRECTIONS[:3], len(used))[kept].tolist(),
-        np.repeat(xyz, 3, axis=0)[kept],
+        [str(motion.node) for motion in found],
+        [DIRECTIONS[motion.direction] for motion in found],
+        np.array([motion.xyz for motion in found]),
         parts if groups else {},
     )
+    dofs = replace(model.dofs, axes=np.array([motion.axes for motion in found]))
+    names = tuple(dict.fromkeys(str(motion.node) for motion in found))
+    if solid.lines:
+        model = replace(model, dofs=dofs, geometry=MatrixGeometry(names, dofs))
     small = [name for name in model.groups if heavy[name] < JOINT_SHARE * sum(heavy.values())]
     return replace(model, group_kinds=dict.fromkeys(small, "joint"))
 
 
-def _point_masses(deck: SolidDeck, row: Mapping[int, int]) -> SparseArray:
+def _thicken(
+    deck: SolidDeck, material: Mapping[int, str], places: Mapping[int, Point]
+) -> shells.Thickened:
+    """Return solids in place of the shells of a deck.
+
+    Arguments:
+        places: of the nodes of all elements.
+    """
+    thickness: dict[int, float] = {}
+    for name, (_, value) in deck.sections.items():
+        thickness |= dict.fromkeys(deck.sets[name], value)
+    for number in material:
+        if deck.elements[number][0] in shells.SHELLS and not thickness[number] > 0.0:
+            what = f"shell element {number} has no thickness"
+            raise InputError(what, file=deck.path, expected="*SHELL SECTION with a thickness")
+    try:
+        return shells.thicken(deck.elements, places, thickness)
+    except ValueError as error:
+        what = f"element {error.args[0]} has no area"
+        raise InputError(what, file=deck.path, expected="corners that no line joins") from None
+
+
+def _point_masses(deck: SolidDeck, found: Sequence[shells.Motion]) -> SparseArray:
     """Return the mass matrix of the masses at nodes."""
-    pairs = [(n, value) for name, value in deck.masses.items() for n in deck.sets.get(name, ())]
-    at = [3 * row[deck.elements[n][1][0]] + d for n, _ in pairs for d in range(3)]
-    values = np.repeat([float(value) for _, value in pairs], 3)
-    return sp.csc_array((values, (at, at)), shape=(3 * len(row), 3 * len(row)))
+    own = {(m.node, m.direction): i for i, m in enumerate(found) if m.axes.any()}
+    pairs = [
+        (own[end], value)
+        for name, value in deck.masses.items()
+        for n in deck.sets.get(name, ())
+        for d in range(3)
+        if (end := (deck.elements[n][1][0], d)) in own
+    ]
+    rows, values = np.array(pairs).reshape(-1, 2).T
+    at = rows.astype(int)
+    return sp.csc_array((values, (at, at)), shape=(len(found), len(found)))
 
 
 def _assemble(
@@ -242,32 +292,38 @@ def write_factors(model: Model, path: Path, original: Path) -> bool:
     for own, other in ((made, model.stiffness), (heavier * before.mass, model.mass)):
         if abs(own - other).max() > _SAME * abs(other).max():
             return False
+    section = {
+        n: pair for name, pair in deck.sections.items() for n in deck.sets[name] if n in material
+    }
     sections: list[str] = []
     for name, numbers in groups.items():
-        for old in dict.fromkeys(material[n] for n in numbers):
-            part = [n for n in numbers if material[n] == old]
-            label = name if len(part) == len(numbers) else f"{name}_{old}"
+        for i, (old, thickness) in enumerate(dict.fromkeys(section[n] for n in numbers)):
+            part = [n for n in numbers if section[n] == (old, thickness)]
+            label = name if len(part) == len(numbers) else f"{name}_{i + 1}"
             if set(deck.sets.get(label.upper(), ())) != set(part):
                 rows = (part[i : i + 12] for i in range(0, len(part), 12))
                 sections += [f"*ELSET, ELSET={label}", *(", ".join(map(str, r)) for r in rows)]
             modulus, poisson, density = deck.materials[old]
             sections += [f"*MATERIAL, NAME={label}", "*ELASTIC"]
             sections += [f"{modulus * factors[name]!r}, {poisson!r}", "*DENSITY"]
+            of_shells = np.isfinite(thickness)
+            kind = "SHELL" if of_shells else "SOLID"
             sections += [
                 repr(density * heavier),
-                f"*SOLID SECTION, ELSET={label}, MATERIAL={label}",
+                f"*{kind} SECTION, ELSET={label}, MATERIAL={label}",
             ]
+            sections += [repr(thickness)] if of_shells else []
     path.write_text("\n".join([*_other_lines(original, sections), ""]), encoding="latin-1")
     return True
 
 
 def _other_lines(path: Path, sections: Sequence[str]) -> Iterator[str]:
     """Return the lines of a deck and of what it includes with other materials and sections."""
-    left_out, inside, last = ("MATERIAL", "ELASTIC", "DENSITY", "SOLIDSECTION"), False, ""
+    left_out, inside, last = ("MATERIAL", "ELASTIC", "DENSITY", *_SECTIONS), False, ""
     for _, _, line in nodes.read_lines(path):
         if line.startswith("*"):
             keyword = line[1:].upper().replace(" ", "").partition(",")[0]
-            if last == "SOLIDSECTION" != keyword:
+            if last in _SECTIONS and keyword not in _SECTIONS:
                 yield from sections
                 sections = ()
             inside, last = keyword in (*left_out, "INCLUDE"), keyword
@@ -347,7 +403,7 @@ def _instance(deck: SolidDeck, block: _Block) -> None:
 
 
 def _element(deck: SolidDeck, block: _Block) -> None:
-    kind, known = block.option("TYPE"), solid_elements.KINDS
+    kind, known = block.option("TYPE"), KINDS
     if kind not in known and kind != "MASS":
         expected = f"{', '.join(known)}, MASS; of others {INSTEAD.partition(', or ')[2]}"
         raise block.refuse(f"elements of type {kind}", expected)
@@ -422,9 +478,13 @@ def _last_material(deck: SolidDeck, block: _Block) -> list[float]:
 
 
 def _section(deck: SolidDeck, block: _Block) -> None:
-    name = block.option("ELSET")
+    name, of_shells = block.option("ELSET"), block.keyword == "SHELLSECTION"
+    if unread := {"COMPOSITE", "OFFSET", "NODALTHICKNESS"} & block.options.keys():
+        what = f"*SHELL SECTION with {min(unread)}"
+        raise block.refuse(what, "one material and thickness, nodes in the middle")
     deck.sections.pop(name, None)
-    deck.sections[name] = block.option("MATERIAL")
+    thickness = block.first_numbers(1)[0] if of_shells else np.nan
+    deck.sections[name] = block.option("MATERIAL"), thickness
 
 
 def _mass(deck: SolidDeck, block: _Block) -> None:
@@ -442,24 +502,24 @@ def _boundary(deck: SolidDeck, block: _Block) -> None:
                 what = f"{','.join(cells)[:40]!r} below *BOUNDARY"
                 raise block.refuse(what, "node or set, first and last direction", number)
             along = range(int(ends[0]) - 1, int(ends[-1]))
-        deck.held.update((node, d) for node in found for d in along if d < 3)
+        deck.held.update((node, d) for node in found for d in along if d < 6)
 
 
 _READ = {
     "ELEMENT": _element, "ELSET": _set, "NSET": _set, "MATERIAL": _material, "ELASTIC": _elastic,
-    "DENSITY": _density, "SOLIDSECTION": _section, "MASS": _mass, "BOUNDARY": _boundary,
-    "INSTANCE": _instance,
+    "DENSITY": _density, "SOLIDSECTION": _section, "SHELLSECTION": _section, "MASS": _mass,
+    "BOUNDARY": _boundary, "INSTANCE": _instance,
 }  # fmt: skip
 
 
 def _materials(deck: SolidDeck) -> dict[int, str]:
     """Return the material of every solid element by number."""
     found: dict[int, str] = {}
-    for name, material in deck.sections.items():
+    for name, (material, _) in deck.sections.items():
         values = deck.materials.get(material)
         if values is None or name not in deck.sets:
             what = f"no {'material ' + material if values is None else 'set ' + name}"
-            raise InputError(what, file=deck.path, expected="what *SOLID SECTION names")
+            raise InputError(what, file=deck.path, expected="what the section names")
         for key, value in zip(("modulus", "Poisson's ratio", "density"), values, strict=True):
             if not np.isfinite(value):
                 what, expected = f"material {material} has no {key}", "*ELASTIC and *DENSITY"
@@ -468,5 +528,5 @@ def _materials(deck: SolidDeck) -> dict[int, str]:
     solid = set(deck.solids())
     if not solid or (lost := solid - found.keys()):
         what = f"element {min(lost)} has no section" if solid else "no elements"
-        raise InputError(what, file=deck.path, expected="*ELEMENT and *SOLID SECTION")
+        raise InputError(what, file=deck.path, expected="*ELEMENT and a section of it")
     return {number: found[number] for number in solid}

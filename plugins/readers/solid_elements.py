@@ -26,15 +26,17 @@ _BRICK = ("000", "100", "110", "010", "001", "101", "111", "011")
 _TETRAHEDRON = ("000", "100", "010", "001")
 _BRICK_EDGES = ((0, 1, 2, 3, 0), (4, 5, 6, 7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 _TETRAHEDRON_EDGES = ((0, 1, 2, 0), (0, 3), (1, 3), (2, 3))
+_WEDGE = ("000", "100", "010", "001", "101", "011")
+_WEDGE_EDGES = ((0, 1, 2, 0), (3, 4, 5, 3), (0, 3), (1, 4), (2, 5))
 
 
 class Kind(NamedTuple):
     """A kind of element.
 
     Arguments:
-        functions: its class in scikit-fem.
+        functions: its class in scikit-fem; that of its triangles for a wedge.
         corners, edges: in the order of the input file; an edge has a node amid two corners.
-        order: of the quadrature of both matrices.
+        order: of the quadrature of both matrices, in the triangles of a wedge.
         incompatible: whether each direction of the reference element may bend by itself.
     """
 
@@ -54,16 +56,18 @@ class Kind(NamedTuple):
 
 KINDS = {
     "C3D4": Kind("ElementTetP1", _TETRAHEDRON, (), 1),
+    "C3D6": Kind("ElementTriP1", _WEDGE, (), 1),
     "C3D8": Kind("ElementHex1", _BRICK, (), 3),
     "C3D8I": Kind("ElementHex1", _BRICK, (), 3, incompatible=True),
     "C3D10": Kind("ElementTetP2", _TETRAHEDRON, _TETRAHEDRON_EDGES, 2),
+    "C3D15": Kind("ElementTriP2", _WEDGE, _WEDGE_EDGES, 2),
     "C3D20": Kind("ElementHexS2", _BRICK, _BRICK_EDGES, 5),
     "C3D20R": Kind("ElementHexS2", _BRICK, _BRICK_EDGES, 3),
 }
 
 
 # Elements with the same corners that bend along their edges.
-BETTER = {"C3D4": "C3D10", "C3D8": "C3D20", "C3D8I": "C3D20"}
+BETTER = {"C3D4": "C3D10", "C3D6": "C3D15", "C3D8": "C3D20", "C3D8I": "C3D20"}
 
 
 @cache
@@ -74,15 +78,55 @@ def _tabulate(kind: str) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray
 
     element, places = getattr(skfem, KINDS[kind].functions)(), KINDS[kind].places
     points, weights = get_quadrature(element.refdom, KINDS[kind].order)
+    if KINDS[kind].corners is _WEDGE:
+        return _tabulate_wedge(places, points, weights)
     far = np.linalg.norm(element.doflocs[None] - places[:, None], axis=-1)
     values, slopes = zip(*(element.lbasis(points, i) for i in far.argmin(axis=1)), strict=True)
     return np.array(values), np.array(slopes), points, weights
 
 
+def _tabulate_wedge(
+    places: FloatArray, flat: FloatArray, areas: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return what `_tabulate` does, from the points (2, t) and weights (t,) of a triangle.
+
+    The functions are the polynomials of the triangle times 1 and z; with nodes amid the edges
+    also z^2 times those of first order.
+    """
+    amid = len(places) > len(_WEDGE)
+    if not amid:  # one point, where scikit-fem has three at least
+        flat, areas = np.full((2, 1), 1.0 / 3.0), np.array([0.5])
+    height, lengths = np.polynomial.legendre.leggauss(3 if amid else 2)
+    points = np.vstack(
+        [np.repeat(flat, len(height), axis=1), np.tile(0.5 * (1.0 + height), len(areas))]
+    )
+    weights = np.asarray(np.kron(areas, 0.5 * lengths), dtype=float)
+    first = [(0, 0), (1, 0), (0, 1)]
+    plane = [*first, *([(1, 1), (2, 0), (0, 2)] if amid else [])]
+    powers = [(*p, k) for k in (0, 1) for p in plane] + [(*p, 2) for p in first if amid]
+
+    def monomials(at: FloatArray, along: int | None = None) -> FloatArray:
+        factors = np.array(powers)[:, :, None]
+        lower = np.zeros_like(factors)
+        if along is not None:
+            lower[:, along] = 1
+        scale = np.where(lower == 1, factors, 1)
+        return np.asarray((scale * at ** np.maximum(factors - lower, 0)).prod(axis=1))
+
+    functions = np.linalg.inv(monomials(places.T))  # each a row of coefficients
+    values = functions @ monomials(points)
+    slopes = np.stack([functions @ monomials(points, along) for along in range(3)], axis=1)
+    return values, slopes, points, weights
+
+
 def integrate(
     kind: str, xyz: FloatArray, modulus: FloatArray, poisson: FloatArray, density: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return stiffness (e, 3 n, 3 n) and mass of one direction (e, n, n) of elements of a kind.
+    """Return stiffness (e, 3 n, 3 n) and mass of elements of a kind, of one direction (e, n, n).
+
+    Modes inside an element follow its nodes without inertia forces (Guyan, 1965): CalculiX keeps
+    those of C3D8I, whose inertia moves frequencies of bending by percents where a mesh is coarse.
+    They couple the directions: the mass of such elements is (e, 3 n, 3 n).
 
     Arguments:
         kind: of `KINDS`, with n nodes.
@@ -113,14 +157,16 @@ def integrate(
     stiffness += products.swapaxes(2, 4)
     for a in range(3):
         stiffness[:, :, a, :, a] += np.einsum("eicjc->eij", products)
-    size = 3 * gradient.shape[2]
+    size, own = 3 * gradient.shape[2], 3 * len(values)
     stiffness = stiffness.reshape(-1, size, size)
     if KINDS[kind].incompatible:
-        own = 3 * len(values)
-        coupling, bending = stiffness[:, own:, :own], stiffness[:, own:, own:]
-        condensed = coupling.swapaxes(1, 2) @ np.linalg.solve(bending, coupling)
-        stiffness = stiffness[:, :own, :own] - condensed
+        values = np.concatenate([values, points * (1.0 - points)])
     mass = np.einsum("iq,jq,eq,e->eij", values, values, volume, density, optimize=True)
+    if KINDS[kind].incompatible:
+        mass = np.einsum("eij,ab->eiajb", mass, np.eye(3)).reshape(stiffness.shape)
+        follow = -np.linalg.solve(stiffness[:, own:, own:], stiffness[:, own:, :own])
+        motion = np.concatenate([np.tile(np.eye(own), (len(follow), 1, 1)), follow], axis=1)
+        stiffness, mass = (motion.swapaxes(1, 2) @ part @ motion for part in (stiffness, mass))
     return stiffness, mass
 
 
@@ -148,8 +194,8 @@ def assemble(
             raise ValueError(start + error.args[0]) from None
         rows = (3 * part[:, :, None] + np.arange(3)).reshape(len(part), -1)
         stiffness += _scatter(own, rows, size)
-        for d in range(3):
-            mass += _scatter(inertia, rows[:, d::3], size)
+        for at in [rows] if KINDS[kind].incompatible else [rows[:, d::3] for d in range(3)]:
+            mass += _scatter(inertia, at, size)
     return stiffness, mass
 
 

@@ -1,0 +1,303 @@
+"""Shell elements as the solids that CalculiX makes of them.
+
+A node becomes a line of two or three nodes along the normal. Where elements meet at more than 20
+degrees it becomes a line for each normal, and these move as a rigid body that can swell: a knot.
+
+Source: Dhondt (2004), The Finite Element Method for Three-Dimensional Thermomechanical
+Applications, section 2.12, and his manual of CalculiX, "Eight-node shell element", "Knots",
+"Expansion of the one-dimensional and two-dimensional elements".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, field
+from functools import cache
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench.fem import FloatArray, SparseArray
+from femubench.plugins.readers.nodes import Point
+
+Element = tuple[str, tuple[int, ...]]
+
+
+class Shell(NamedTuple):
+    """A kind of shell element.
+
+    Arguments:
+        solid: what it becomes.
+        functions: its class in scikit-fem.
+        corners: how many; the nodes amid edges follow them.
+    """
+
+    solid: str
+    functions: str
+    corners: int
+
+    @property
+    def edges(self) -> tuple[tuple[int, ...], ...]:
+        """Return the pairs of corners with a node between them, as a chain."""
+        whole = (*range(self.corners), 0)
+        return (whole,) if self.functions.endswith("2") else ()
+
+    @property
+    def places(self) -> FloatArray:
+        """Return where the nodes lie in the reference element, (n, 2)."""
+        corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+        corners = corners if self.corners == 4 else corners[[0, 1, 3]]
+        pairs = [pair for chain in self.edges for pair in pairwise(chain)]
+        return np.vstack([corners, *(corners[list(pair)].mean(axis=0) for pair in pairs)])
+
+
+SHELLS = {
+    "S3": Shell("C3D6", "ElementTriP1", 3),
+    "S4": Shell("C3D8I", "ElementQuad1", 4),
+    "S6": Shell("C3D15", "ElementTriP2", 3),
+    "S8": Shell("C3D20", "ElementQuadS2", 4),
+    "S8R": Shell("C3D20R", "ElementQuadS2", 4),
+}
+BETTER = {"S3": "S6", "S4": "S8R"}
+_ALIKE = np.cos(np.deg2rad(20.0))  # of normals: elements that share a line of nodes
+_STRAIGHT = 1e-9  # of a unit vector: what rounding leaves of it
+
+
+class NodeLine(NamedTuple):
+    """The nodes that a node of shells becomes along one normal: below, in the middle, above."""
+
+    nodes: tuple[int, int, int]
+    normal: FloatArray
+    thickness: float
+
+    @property
+    def arms(self) -> Iterator[tuple[int, FloatArray]]:
+        """Return the nodes and where they lie, seen from the middle."""
+        for node, share in zip(self.nodes, (-0.5, 0.0, 0.5), strict=True):
+            yield node, share * self.thickness * self.normal
+
+
+class Motion(NamedTuple):
+    """A degree of freedom.
+
+    Arguments:
+        node, direction: its label, which counts from 0.
+        xyz: its place.
+        axes: its unit motion in (x, y, z, rx, ry, rz); zero where no motion of the body moves it.
+    """
+
+    node: int
+    direction: int
+    xyz: FloatArray
+    axes: FloatArray
+
+
+@dataclass
+class Motions:
+    """How degrees of freedom move the nodes of solids.
+
+    Arguments:
+        row: of every node of solids; direction d of it has row 3 row + d.
+        held: node and direction of supports.
+        inner: whether a degree of freedom is inside a line of nodes; these come last.
+    """
+
+    row: Mapping[int, int]
+    held: Set[tuple[int, int]]
+    found: list[Motion] = field(default_factory=list)
+    inner: list[bool] = field(default_factory=list)
+    entries: list[tuple[int, int, float]] = field(default_factory=list)
+
+    def add(self, motion: Motion, moved: Mapping[int, FloatArray], inner: bool = False) -> None:
+        """Add a degree of freedom that moves some nodes along vectors."""
+        for node, vector in moved.items():
+            if node in self.row:
+                start, column = 3 * self.row[node], len(self.found)
+                self.entries += [
+                    (start + d, column, float(vector[d])) for d in range(3) if vector[d]
+                ]
+        self.found.append(motion)
+        self.inner.append(inner)
+
+    def add_node(self, node: int, xyz: FloatArray, moved: Set[int]) -> None:
+        """Add the translations of a node, which some nodes follow."""
+        for d, axes in enumerate(np.eye(6)[:3]):
+            if (node, d) not in self.held:
+                self.add(Motion(node, d, xyz, axes), dict.fromkeys(moved, axes[:3]))
+
+    def matrix(self) -> tuple[list[Motion], SparseArray]:
+        """Return the degrees of freedom and what they do to all rows of solids, (3 N, n)."""
+        order = np.argsort(self.inner, kind="stable")
+        rows, columns, values = zip(*self.entries, strict=True)
+        shape = (3 * len(self.row), len(order))
+        whole = sp.csc_array((values, (rows, columns)), shape=shape)
+        return [self.found[i] for i in order], sp.csc_array(whole[:, order])
+
+
+@cache
+def _slopes(kind: str) -> FloatArray:
+    """Return the slopes of the functions (n) at the nodes (q), (n, 2, q)."""
+    import skfem
+
+    element, places = getattr(skfem, SHELLS[kind].functions)(), SHELLS[kind].places
+    far = np.linalg.norm(element.doflocs[None] - places[:, None], axis=-1)
+    return np.array([element.lbasis(places.T, i)[1] for i in far.argmin(axis=1)])
+
+
+def find_normals(kind: str, xyz: FloatArray) -> FloatArray:
+    """Return the unit normals of an element at its nodes, (n, 3), from their places (n, 3).
+
+    Raises:
+        ValueError: for an element without an area.
+    """
+    along = np.einsum("na,nkq->kqa", xyz, _slopes(kind))
+    across = np.cross(*along)
+    length = np.linalg.norm(across, axis=1)
+    if not (length > _STRAIGHT * np.ptp(xyz) ** 2).all():
+        raise ValueError("an element has no area")
+    return np.asarray(across / length[:, None])
+
+
+@dataclass(frozen=True)
+class Thickened:
+    """The solids that shells become.
+
+    Arguments:
+        elements: all of a deck, solids in place of shells.
+        places: of their nodes.
+        lines: of nodes, by the node of shells that they come from.
+    """
+
+    elements: dict[int, Element]
+    places: dict[int, Point]
+    lines: dict[int, list[NodeLine]]
+
+    def add_motions(self, node: int, motions: Motions) -> None:
+        """Add what a node of shells does, the mean of the lines through it."""
+        lines, held, xyz = self.lines[node], motions.held, np.array(self.places[node])
+        arms = {own: arm for line in lines for own, arm in line.arms}
+        first = lines[0]
+        if all(abs(line.normal @ first.normal) > 1.0 - _STRAIGHT for line in lines):
+            self._add_line(node, xyz, arms, motions)
+        else:
+            motions.add_node(node, xyz, {node, *arms})
+            for axis, axes in enumerate(np.eye(6)[3:], start=3):
+                if (node, axis) not in held:
+                    turned = {own: np.cross(axes[3:], arm) for own, arm in arms.items()}
+                    motions.add(Motion(node, axis, xyz, axes), turned)
+            motions.add(Motion(first.nodes[0], 0, xyz, np.zeros(6)), arms)
+        for d in range(3):
+            middle = {line.nodes[1]: np.eye(3)[d] for line in lines if line.nodes[1] in motions.row}
+            if middle and (node, d) not in held and len(lines) == 1:
+                motions.add(Motion(first.nodes[1], d, xyz, np.zeros(6)), middle, inner=True)
+
+    def _add_line(
+        self, node: int, xyz: FloatArray, arms: Mapping[int, FloatArray], motions: Motions
+    ) -> None:
+        """Add the mean of a straight line of nodes, and of its lowest node what is free.
+
+        With w of the mean, u of the lowest node at the arm a, and n along the line, another node
+        moves by w + (b . n / a . n) (u - w). A rotation about e that is held leaves
+        (e x n) . (u - w) at zero, so that u = w - B B^T w + B z.
+        """
+        lowest, normal, _ = self.lines[node][0]
+        least = arms[lowest[0]] @ normal
+        share = {own: float(arm @ normal / least) for own, arm in arms.items()}
+        axes = [np.cross(np.eye(3)[d], normal) for d in range(3) if (node, 3 + d) in motions.held]
+        free = _free_of(np.array(axes).reshape(-1, 3))
+        kept = np.eye(3) - free @ free.T
+        for d in range(3):
+            if (node, d) not in motions.held:
+                along = np.eye(3)[d]
+                moved = {own: along + s * (kept[d] - along) for own, s in share.items()}
+                unit = np.eye(6)[d]
+                motions.add(Motion(node, d, xyz, unit), {node: along, **moved})
+        below, left = xyz + arms[lowest[0]], [0, 1, 2]
+        for column in free.T:
+            d = max(left, key=lambda d: abs(column[d]))
+            left.remove(d)
+            moved = {own: s * column for own, s in share.items()}
+            motions.add(Motion(lowest[0], d, below, np.r_[column, np.zeros(3)]), moved)
+
+
+def _free_of(held: FloatArray) -> FloatArray:
+    """Return a basis of the motions that move along none of some vectors (k, 3), (3, 3 - rank)."""
+    if not len(held):
+        return np.eye(3)
+    _, sizes, turn = np.linalg.svd(held)
+    return np.asarray(turn[int((sizes > _STRAIGHT).sum()) :].T)
+
+
+def thicken(
+    elements: Mapping[int, Element],
+    places: Mapping[int, Point],
+    thickness: Mapping[int, float],
+) -> Thickened:
+    """Return what CalculiX makes of the shells among some elements.
+
+    Arguments:
+        elements: kind and nodes by number.
+        places: of the nodes.
+        thickness: of every shell.
+
+    Raises:
+        ValueError: with the number of an element without an area.
+    """
+    ends: dict[int, list[tuple[int, int, FloatArray]]] = {}
+    shells = sorted(number for number, (kind, _) in elements.items() if kind in SHELLS)
+    for number in shells:
+        kind, own = elements[number]
+        try:
+            normals = find_normals(kind, np.array([places[node] for node in own]))
+        except ValueError:
+            raise ValueError(number) from None
+        for i, node in enumerate(own):
+            ends.setdefault(node, []).append((number, i, normals[i]))
+    found, next_node = dict(places), max(places) + 1
+    lines: dict[int, list[NodeLine]] = {}
+    line_of: dict[tuple[int, int], NodeLine] = {}
+    for node, meeting in ends.items():
+        for part in _parts(meeting, elements, thickness):
+            mean = sum(normal for _, _, normal in part)
+            normal = np.asarray(mean / np.linalg.norm(mean))
+            three = next_node, next_node + 1, next_node + 2
+            line = NodeLine(three, normal, thickness[part[0][0]])
+            next_node += 3
+            for own_node, arm in line.arms:
+                x, y, z = places[node] + arm
+                found[own_node] = float(x), float(y), float(z)
+            lines.setdefault(node, []).append(line)
+            line_of |= {(number, i): line for number, i, _ in part}
+    solids = dict(elements)
+    for number in shells:
+        kind, own = elements[number]
+        own_lines = [line_of[number, i].nodes for i in range(len(own))]
+        below, middle, above = (list(side) for side in zip(*own_lines, strict=True))
+        n = SHELLS[kind].corners
+        amid = middle[:n] if SHELLS[kind].edges else []
+        solids[number] = (
+            SHELLS[kind].solid,
+            (*below[:n], *above[:n], *below[n:], *above[n:], *amid),
+        )
+    return Thickened(solids, found, lines)
+
+
+def _parts(
+    meeting: Sequence[tuple[int, int, FloatArray]],
+    elements: Mapping[int, Element],
+    thickness: Mapping[int, float],
+) -> Iterator[list[tuple[int, int, FloatArray]]]:
+    """Return the elements that meet at a node by normal, kind and thickness, the first first."""
+    left = list(meeting)
+    while left:
+        number, _, normal = left[0]
+        alike = [
+            own @ normal > _ALIKE
+            and thickness[other] == thickness[number]
+            and elements[other][0] == elements[number][0]
+            for other, _, own in left
+        ]
+        yield [item for item, same in zip(left, alike, strict=True) if same]
+        left = [item for item, same in zip(left, alike, strict=True) if not same]
