@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import log
 
 import numpy as np
@@ -24,7 +24,7 @@ from femubench.core.inference.effort import Effort
 from femubench.core.inference.examine import Examination
 from femubench.core.inference.posterior import Explanation, Posterior
 from femubench.core.inference.settings import settings
-from femubench.core.modal.eigen import enough_modes, modes_of, once_for
+from femubench.core.modal.eigen import enough_modes, keep_last, modes_of
 from femubench.core.modal.measurement import Measurement
 from femubench.core.schema.diagnosis import Gain, States
 from femubench.core.schema.results import Block
@@ -366,10 +366,8 @@ def extend_by(model: Model, explanation: Explanation, x: FloatArray | None = Non
     if x is not None:
         return _extended(model, explanation, np.clip(x, *bounds_of(explanation.parts)))
     # The last one alone: an explanation holds all that it was fitted with.
-    kept: dict[str, tuple[Explanation, Model]] = once_for(model, "extended by", dict)
-    if "last" not in kept or kept["last"][0] is not explanation:
-        kept["last"] = explanation, _extended(model, explanation, explanation.fit.state.x)
-    return kept["last"][1]
+    make = partial(_extended, model, explanation, explanation.fit.state.x)
+    return keep_last(model, "extended by", explanation, make)
 
 
 def _extended(model: Model, explanation: Explanation, x: FloatArray) -> Model:
