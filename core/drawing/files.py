@@ -20,14 +20,13 @@ from femubench.core.errors import InputError, OutputError
 from femubench.core.files import read_bytes, write_atomically
 from femubench.core.schema.bounds import Real
 from femubench.core.schema.records import parse_json, to_plain
-from femubench.core.schema.sealing import TAIL, is_whole, seal, sum_of
+from femubench.core.schema.sealing import TAIL, is_whole, seal
 from femubench.core.schema.validation import read_plain
 
 FOLDER = "exhibits"
 MOST_BYTES = 4 * 2**20
 _CASE = "structure-"
-_SCHEMA = 2  # of 1 there were no checksums
-_HEAD = b'{"schema":2,'
+_SCHEMA = 2
 _KEY = re.compile(r"[0-9a-f]{8,64}")
 _MOST = 20_000
 _STALE = 60.0  # s; a file is written in a fraction of one
@@ -184,12 +183,12 @@ class Exhibits:
 
 
 def _whole(path: Path) -> bytes:
-    """Return the content of a file; one of an earlier version has no checksum.
+    """Return the content of a file.
 
     Raises:
         InputError: when it is not as it was written.
     """
     content = read_bytes(path, MOST_BYTES)
-    if not is_whole(content) and (content.startswith(_HEAD) or sum_of(content)):
+    if not is_whole(content):
         raise InputError("damaged", file=path, expected="the picture that was written")
     return content

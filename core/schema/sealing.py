@@ -31,13 +31,5 @@ def is_whole(line: bytes) -> bool:
     return line.endswith(b"".join((_BEFORE, _sum(line[:-TAIL]), _AFTER)))
 
 
-def sum_of(line: bytes) -> bytes:
-    """Return the checksum that a line says it has; nothing where it says none."""
-    tail = line[-TAIL:]
-    if not (tail.startswith(_BEFORE) and tail.endswith(_AFTER)):
-        return b""
-    return tail[len(_BEFORE) : -len(_AFTER)]
-
-
 def _sum(body: bytes) -> bytes:
     return b"%08x" % zlib.crc32(body)
