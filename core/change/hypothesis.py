@@ -33,7 +33,7 @@ _SIZES, _FREQUENCIES = (0.3, 1.5), 15
 _ALWAYS = 1e-6  # of a factor, from which on what is there at x = 0 counts
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Hypothesis:
     """An effect at a place.
 
@@ -46,6 +46,9 @@ class Hypothesis:
     effect: Effect
     change: Change
     places: int
+
+    def __repr__(self) -> str:
+        return f"{self.effect.name} at {self.place}"
 
     @property
     def place(self) -> str:

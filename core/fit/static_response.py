@@ -12,7 +12,7 @@ Source: MacNeal (1971), residual flexibility; Fox & Kapoor (1968) for the forces
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from weakref import WeakValueDictionary
 
@@ -405,8 +405,8 @@ class LargeProblem(Problem):
     The coordinates hold a short list of the hypotheses; `hypotheses` are all of them.
     """
 
-    basis: Basis | None = None
-    hypotheses: tuple[Hypothesis, ...] = ()
+    basis: Basis | None = field(default=None, repr=False)
+    hypotheses: tuple[Hypothesis, ...] = field(default=(), repr=False)
 
     @property
     def common(self) -> Basis:
