@@ -18,13 +18,9 @@ from femubench.core.errors import FemubenchError, PluginError
 if TYPE_CHECKING:
     import numpy as np
 
-    from femubench.core.typing import FloatArray, SparseArray
+    from femubench.core.typing import FloatArray, SparseArray, Wording
 
 Scaling = Literal["linear", "exponential", "compliance", "factor", "log"]
-# Of a size: in its unit; a relative change, also in percent with a sign; a part of a whole.
-Wording = Literal["value", "change", "share"]
-# Where something is wrong: in the structure's model, in what was measured, in what was typed in.
-Side = Literal["model", "data", "input"]
 CAPABILITIES = ("shapes", "parts", "elements", "geometry", "joints", "responses")
 
 

@@ -20,7 +20,7 @@ FACADE = sorted((ROOT / "femubench").glob("*.py"))
 # Names that two classes of the package have; no more come, and some will go. Measurement, Model and
 # Strategy are a protocol in `core/roles.py` and what comes along; `femubench.Run` is a
 # `femubench.results.Run` with tables.
-REPEATED = {2: "Measurement Model Run Seen Strategy"}
+REPEATED = {2: "Measurement Model Run Strategy"}
 
 # The rooms of `core/`: each may import those before it, and nothing after it.
 ROOMS = (
@@ -33,8 +33,8 @@ ROOMS = (
         "files",
         "display",
         "pace",
-        "roles",
         "schema",
+        "roles",
         "source_files",
         "child",
     ),
