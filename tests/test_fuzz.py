@@ -13,16 +13,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
 from hypothesis import HealthCheck, given, settings, strategies as st
 from mutations import changed_json, edits, json_edits, mutated
 from seeds import CASES, matrix_case, run_text, universal_case
 from watch import watched
 
 from femubench import FemubenchError, read_case
-from femubench.core.cli.main import bench
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.schema.records import read_run
+from tests.command import call_bench
 
 FEW, MANY = 0.006, 1.0  # share of the inputs in the tests of every day
 INPUTS = {
@@ -94,7 +93,7 @@ def fuzz(
 
 
 def refused_by_command(words: list[str]) -> None:
-    result = CliRunner().invoke(bench, words)
+    result = call_bench(*words, code=None)
     assert "Traceback" not in result.output
     assert result.exit_code == 2, result.output
     assert len(result.output.splitlines()) == 1

@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 
 from femubench.core.errors import InputError
-from femubench.core.run.frames import modes_frame, run_from_json, run_to_json
+from femubench.core.run.frames import modes_frame
 from femubench.core.run.store import Store
 from femubench.core.schema.paired_modes import PairedMode
+from femubench.core.schema.records import run_from_json, run_to_json
 from femubench.core.schema.results import Block, JobResult, Run, Status
 from femubench.core.score.ranking import rank_results
 

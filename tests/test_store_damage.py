@@ -15,15 +15,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from store_edits import change_data, edit
 
-from femubench.core.cli.main import bench
 from femubench.core.errors import InputError
 from femubench.core.run import record_file
 from femubench.core.run.store import Store
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block, JobResult, Run
+from tests.command import call_bench
 
 FLIPS = 100
 RUN = "20260101T000000Z-000000"
@@ -63,7 +63,7 @@ def plain(run: Run) -> list[JobResult]:
 
 
 def call(*words: object) -> Result:
-    return CliRunner().invoke(bench, ["store", *map(str, words)])
+    return call_bench("store", *words, code=None)
 
 
 def test_every_flipped_bit_is_noticed_and_changes_nothing(tmp_path: Path) -> None:
