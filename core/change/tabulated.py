@@ -9,7 +9,6 @@ from itertools import product
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.core import roles
 from femubench.core.change.change import Change
 from femubench.core.change.interpolation import ChebyshevPoints
 from femubench.core.change.terms import Term
@@ -110,7 +109,7 @@ def _within(parameter: EffectParameter) -> tuple[float, float]:
     return (max(low, 1e-6), high) if parameter.scaling == "compliance" else (low, high)
 
 
-def _difference(model: Model, extended: roles.Model) -> tuple[SparseArray, SparseArray]:
+def _difference(model: Model, extended: Model) -> tuple[SparseArray, SparseArray]:
     """Return what the extended model adds to mass and stiffness on the nominal dofs."""
     mass, stiffness = extended.mass, extended.stiffness
     old, new = model.structure, extended.structure
