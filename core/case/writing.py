@@ -93,18 +93,8 @@ _SAME_MATRIX = 1e-9  # of the diagonal: far above rounding, far below any change
 
 
 _SETTINGS = (
-    *(
-        "name",
-        "title",
-        "source",
-        "structure",
-        "used",
-        "held_out",
-        "band",
-        "reference_used",
-        "split",
-    ),
-    *("tolerance", "model_error", "beam_share"),
+    *("name", "title", "source", "structure", "used", "held_out", "band", "reference_used"),
+    *("split", "tolerance", "model_error", "beam_share"),
 )
 
 

@@ -250,16 +250,13 @@ def _without_members(frame: Frame, gone: set[str]) -> Frame:
         raise ModelError("no member is left")
     pairs = [m.ends for m in members] + [b.ends for b in found.braces]
     pairs += [(link.leads, name) for link in found.links for name in link.follows]
-    bodies = sp.csgraph.connected_components(_graph(found, pairs), directed=False)[0]
+    ends = np.array([[found.joint_index[joint] for joint in pair] for pair in pairs])
+    shape = (len(found.joints), len(found.joints))
+    graph = sp.csr_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=shape)
+    bodies = sp.csgraph.connected_components(graph, directed=False)[0]
     if bodies > 1:
         raise ModelError("without it the structure falls apart")
     return found
-
-
-def _graph(frame: Frame, pairs: Sequence[tuple[str, str]]) -> SparseArray:
-    index, count = frame.joint_index, len(frame.joints)
-    ends = np.array([[index[one], index[other]] for one, other in pairs])
-    return sp.csr_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
 
 
 def _hold(model: Model, supports: Sequence[Support]) -> Model:

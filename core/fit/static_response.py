@@ -11,6 +11,8 @@ Source: MacNeal (1971), residual flexibility; Fox & Kapoor (1968) for the forces
 
 from __future__ import annotations
 
+import ctypes
+import sys
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -22,7 +24,6 @@ import scipy.linalg as la
 from femubench.core.change.hypothesis import Hypothesis, magnitudes
 from femubench.core.change.terms import ElementOperator, RowOperator, Term
 from femubench.core.fem.model import Model
-from femubench.core.fit.free_memory import give_back
 from femubench.core.fit.modal_basis import Space, nominal_space, rigid_first
 from femubench.core.fit.modal_fit import Problem
 from femubench.core.fit.noise import Noise
@@ -33,6 +34,7 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.sparse_eigen import ShiftedModel
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
+_IS_LINUX = sys.platform == "linux"
 _A_MODE, _SPARE = 4, 20  # modes that are solved for every measured one, and as well
 _RIGID, _MISSED = 6, 6
 _SHIFT = 0.5  # of the first elastic eigenvalue, below zero
@@ -140,7 +142,10 @@ class Basis:
         if not self.complete:
             for name in ("bare", "projector", "momentum"):
                 vars(self).pop(name, None)
-            give_back()
+            # glibc keeps what large arrays leave behind; see malloc_trim(3). musl has no such call.
+            trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if _IS_LINUX else None
+            if trim is not None:
+                trim(0)
 
     def response(
         self, forces: FloatArray, most: int, known: FloatArray | None = None
