@@ -109,11 +109,7 @@ def alter_model(model: Model, alteration: Alteration) -> Model:
             raise NotApplicable(what)
         return _hold(model, alteration.supports)
     old, members = model.structure, [p for p in alteration.removed if isinstance(p, Member)]
-    if (members or alteration.exchanged) and (
-        model.mass_change is not None
-        or model.stiffness_change is not None
-        or not model.has_matrices(*old.matrices())
-    ):
+    if (members or alteration.exchanged) and not model.has_matrices(*old.matrices()):
         what = "the matrices were updated as a whole, in which no member can be taken or exchanged"
         raise NotApplicable(what)
     gone, frame = {member.name for member in members}, alter_frame(old.frame, alteration)

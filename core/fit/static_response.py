@@ -195,20 +195,21 @@ class Basis:
             whole = np.ones(moved.shape[1])
         return blocks
 
-    def enrich(self, space: Space, parts: Sequence[Projection], rounds: int = 2) -> Coordinates:
+    def enrich(self, space: Space, parts: Sequence[Projection]) -> Coordinates:
         """Return coordinates of their own for some hypotheses.
+
+        They hold the response to what these exert on the modes, and that to what they exert on
+        this response as well, and to its inertia.
 
         Arguments:
             space: the coordinates of the basis.
             parts: the hypotheses, in any coordinates of the model.
-            rounds: 1 for the response to what they exert on the modes, 2 for that to what they
-                exert on this response as well, and to its inertia.
         """
         near = self.modes.take(np.arange(self.tracked))
         forces = [find_forces(part.hypothesis, near) for part in parts]
         nothing = np.zeros((self.model.size, 0))
         added = self.response(np.hstack([nothing, *forces]), _FROM_HYPOTHESIS * len(parts))
-        if rounds > 1 and added.shape[1]:
+        if added.shape[1]:
             there = Modes(np.full(added.shape[1], near.eigenvalues[-1]), added, near.rigid[:0])
             forces = [find_forces(part.hypothesis, there) for part in parts]
             forces.append(self.model.mass_times(added))
@@ -421,7 +422,7 @@ class LargeProblem(Problem):
 
 
 def enrich_problem(
-    problem: Problem, parts: Sequence[Projection], rounds: int = 2
+    problem: Problem, parts: Sequence[Projection]
 ) -> tuple[Problem, tuple[Projection, ...]]:
     """Return the data in coordinates that hold the response to some hypotheses, and these there.
 
@@ -430,11 +431,10 @@ def enrich_problem(
     Arguments:
         problem: of the model.
         parts: the hypotheses, in any coordinates of the model.
-        rounds: as in `Basis.enriched`.
     """
     if not isinstance(problem, LargeProblem) or not parts:
         return problem, tuple(parts)
-    space = problem.common.enrich(problem.space, parts, rounds).space
+    space = problem.common.enrich(problem.space, parts).space
     return replace(problem, space=space), space.projections
 
 

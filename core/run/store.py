@@ -205,9 +205,9 @@ class Store:
                         found[record.key] = record
         return found
 
-    def read_start(self, run_id: str | None = None) -> dict[str, Any]:
-        """Return the meta data with which a run began; arguments and errors as for `load`."""
-        wanted = self._find(run_id)
+    def read_start(self) -> dict[str, Any]:
+        """Return the meta data with which the latest run began; errors as for `load`."""
+        wanted = self._find(None)
         return {**(self._starts()[wanted] or {}), "run": wanted}
 
     def latest_of_plan(self, plan: str) -> dict[str, Any] | None:

@@ -107,9 +107,9 @@ class Card:
         x, y, z = (self.real(number + i, f"{key}{i + 1}", 0.0) for i in range(3))
         return x, y, z
 
-    def components(self, number: int, key: str, default: str = "") -> str:
+    def components(self, number: int, key: str) -> str:
         """Return directions such as ``123``, each once; raises InputError."""
-        text = self.text(number) or default
+        text = self.text(number)
         if text == "0":
             return ""
         if not set(text) <= set("123456") or len(set(text)) < len(text):
