@@ -262,12 +262,7 @@ _WEIGHED = 0.5  # share of cases with a known mass, where there are shapes
 
 @dataclass(frozen=True)
 class BlindCase:
-    """A case and what it hides.
-
-    Arguments:
-        case: what may be shown.
-        truth: what may not.
-    """
+    """A case and what it hides."""
 
     case: Case
     truth: Truth

@@ -245,10 +245,6 @@ def predict_left_out(posterior: Posterior, leader: Explanation) -> Unseen:
     In closed form: every explanation is linear in its causes nearby, and is weighed anew without
     the frequency and the shape of the mode, so that these have no part in what predicts it.
 
-    Arguments:
-        posterior: all explanations of all used modes.
-        leader: one with the name.
-
     Source: Sundararajan & Keerthi (2001), Neural Computation 13, 1103-1118, for leaving out in
     closed form.
     """
@@ -354,10 +350,6 @@ def gain_of(before: Blocks, after: Blocks, crossed: Unseen | None) -> Gain:
 def extend_by(model: Model, explanation: Explanation) -> Model:
     """Return the model with textbook effects and causes in it.
 
-    Arguments:
-        model: the nominal model.
-        explanation: base and causes.
-
     Examples:
         >>> diagnosis.extend_by(model, examination.best).size == model.size
         True
@@ -425,15 +417,7 @@ def holds(
     model: Model,
     unseen: Sequence[Unseen],
 ) -> bool:
-    """Tell whether unseen data get no worse by an explanation.
-
-    Arguments:
-        case: what holds them.
-        examination: what the explanation was weighed in.
-        explanation: base and causes.
-        model: with the explanation in it.
-        unseen: its errors.
-    """
+    """Tell whether unseen data get no worse by an explanation."""
     if all(part.holds for part in unseen):
         return True
     if not explanation.parts or not case.modifications:

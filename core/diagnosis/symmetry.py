@@ -30,13 +30,7 @@ def symmetries(model: Model) -> tuple[FloatArray, ...]:
 
 
 def mirror_places(model: Model, place: str, others: Iterable[str]) -> tuple[str, ...]:
-    """Return those of some places that are images of one place.
-
-    Arguments:
-        model: whose symmetry counts.
-        place: word of a place.
-        others: words of places.
-    """
+    """Return those of some places that are images of one place."""
     words = tuple(others)
     wireframe = find_wireframe(model, (place, *words))
     extents = {word: _extent(wireframe, word) for word in (place, *words)}

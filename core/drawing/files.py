@@ -108,11 +108,7 @@ class _CaseDrawing(Wireframe):
 
 
 class Exhibits:
-    """What is drawn of the cases and jobs of a store.
-
-    Arguments:
-        folder: of the store.
-    """
+    """What is drawn of the cases and jobs of a store."""
 
     def __init__(self, folder: Path) -> None:
         self.store, self._folder = folder, folder / FOLDER

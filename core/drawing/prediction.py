@@ -62,11 +62,6 @@ def exhibit_of(
 ) -> dict[str, Any] | None:
     """Return what a model predicts, in plain data.
 
-    Arguments:
-        case: what it is compared with.
-        model: an updated model of the case.
-        parameters: of the update, as a result has them.
-
     Returns None for a model that is too large to draw.
 
     Raises:
@@ -375,12 +370,7 @@ def _unit(shape: FloatArray) -> FloatArray:
 
 
 def keep_drawings(exhibits: Exhibits, cases: Iterable[Case]) -> None:
-    """Keep what is drawn of cases and their nominal models; no picture is worth a run.
-
-    Arguments:
-        exhibits: of the store.
-        cases: those of a run.
-    """
+    """Keep what is drawn of cases and their nominal models; no picture is worth a run."""
     exhibits.tidy()
     for case in cases:
         if exhibits.has_case(case.digest):

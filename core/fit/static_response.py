@@ -222,10 +222,6 @@ class Basis:
 
         They hold the exact modes and the response to what it exerts on these; many are solved at
         once. Forces at the sensors, which serve those that have none of their own, are left out.
-
-        Arguments:
-            space: the coordinates of the basis.
-            parts: the hypotheses in them.
         """
         near, known = self.modes.take(np.arange(self.tracked)), len(self.modes)
         self.forget()

@@ -291,11 +291,7 @@ def _loaded(handle: Handle) -> Any:  # noqa: ANN401 - as the kind has it
 
 @dataclass(frozen=True)
 class ForeignReporter(_Offered):
-    """A reporter of a third party, whose text is written in a process of its own.
-
-    Arguments:
-        suffix: of its files.
-    """
+    """A reporter of a third party, whose text is written in a process of its own."""
 
     suffix: str
 

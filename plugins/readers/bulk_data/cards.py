@@ -150,9 +150,6 @@ class Deck:
     `chosen` is the set that case control chooses, for ``SPC`` and ``MPC``; `controlled` tells
     whether there is a case control.
 
-    Arguments:
-        file: the main one.
-
     Raises:
         InputError: for what cannot be read, a line that is no card, a continuation of another
             card, or an included file outside of the folder.
