@@ -24,7 +24,6 @@ import numpy as np
 
 from femubench.core.run.recording import Results, begin_run
 from femubench.core.run.store import Store
-from femubench.core.run.upkeep import find_store_faults
 from femubench.core.schema.results import Block
 from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.ranking import list_models
@@ -147,7 +146,7 @@ def resume(store: Store) -> int:
 
 def check(store: Store) -> int:
     """Read every record to the end; return the number of faults."""
-    return len(find_store_faults(store))
+    return len(store.faults())
 
 
 def append(store: Store) -> int:

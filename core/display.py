@@ -27,28 +27,17 @@ class Shown:
 
     def _repr_html_(self) -> str:
         (word, title), *rows = self.rows()
-        return html_table(rows, caption=f"{type(self).__name__} {word}: {title}")
+        body = "".join(
+            f"<tr><th>{escape(first)}</th><td>{escape(text)}</td></tr>" for first, text in rows
+        )
+        caption = escape(f"{type(self).__name__} {word}: {title}")
+        return f"<table><caption>{caption}</caption><tbody>{body}</tbody></table>"
 
 
-def clip_text(text: str, width: int = WIDTH) -> str:
-    """Return text on one line that is not longer than the width."""
+def clip_text(text: str) -> str:
+    """Return text on one line that is not longer than `WIDTH`."""
     line = " ".join(text.split(" ")).replace("\n", " ").rstrip()
-    return line if len(line) <= width else f"{line[: width - 3]}..."
-
-
-def html_table(
-    rows: Iterable[Sequence[object]], header: Sequence[str] = (), caption: str = ""
-) -> str:
-    """Return an HTML table of escaped cells, the first of each row as its heading."""
-    head = "".join(f"<th>{escape(word)}</th>" for word in header)
-    body = "".join(
-        f"<tr><th>{escape(str(first))}</th>"
-        + "".join(f"<td>{escape(str(cell))}</td>" for cell in rest)
-        + "</tr>"
-        for first, *rest in rows
-    )
-    top = f"<thead><tr>{head}</tr></thead>" if head else ""
-    return f"<table><caption>{escape(caption)}</caption>{top}<tbody>{body}</tbody></table>"
+    return line if len(line) <= WIDTH else f"{line[: WIDTH - 3]}..."
 
 
 def count_noun(number: int, noun: str) -> str:

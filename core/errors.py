@@ -61,12 +61,7 @@ class InputError(FemubenchError):
 
 
 class OutputError(FemubenchError):
-    """Tell in one line which file could not be written, and why.
-
-    Arguments:
-        file: the file.
-        error: of the system.
-    """
+    """Tell in one line which file could not be written, and why."""
 
     def __init__(self, file: Path | str, error: OSError) -> None:
         self.file, self.error = file, error

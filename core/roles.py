@@ -1,9 +1,7 @@
 """The roles that are played here, as protocols: anyone who has the members plays the role.
 
-Nothing has to be inherited. Parameters of methods are contravariant: a method that wants the data
-class `femubench.Model` would not do where one is asked for that takes any object with a model's
-members. What is handed to a strategy, an effect or a reporter is therefore `Any` here (it is always
-the data class); what they hand back is typed by its protocol.
+Nothing has to be inherited. Models, measurements and runs are always the data classes of
+`femubench`, of which nothing is known here: they are `Any`.
 """
 
 from __future__ import annotations
@@ -18,105 +16,10 @@ from femubench.core.errors import FemubenchError, PluginError
 if TYPE_CHECKING:
     import numpy as np
 
-    from femubench.core.typing import FloatArray, SparseArray
+    from femubench.core.typing import SparseArray, Wording
 
 Scaling = Literal["linear", "exponential", "compliance", "factor", "log"]
-# Of a size: in its unit; a relative change, also in percent with a sign; a part of a whole.
-Wording = Literal["value", "change", "share"]
-# Where something is wrong: in the structure's model, in what was measured, in what was typed in.
-Side = Literal["model", "data", "input"]
 CAPABILITIES = ("shapes", "parts", "elements", "geometry", "joints", "responses")
-
-
-@runtime_checkable
-class Model(Protocol):
-    """A structural model: sparse mass and stiffness in labelled degrees of freedom."""
-
-    @property
-    def mass(self) -> SparseArray:
-        """Return the sparse symmetric mass matrix, (n, n), in kg, kg m, kg m2."""
-        ...
-
-    @property
-    def stiffness(self) -> SparseArray:
-        """Return the sparse symmetric stiffness matrix, (n, n), in N/m, N, N m."""
-        ...
-
-    @property
-    def dofs(self) -> Any:  # noqa: ANN401 - labels of the rows: node, direction, xyz
-        """Return what the rows are."""
-        ...
-
-    @property
-    def structure(self) -> Any:  # noqa: ANN401 - the meshed frame
-        """Return the meshed frame, None where the model came as matrices."""
-        ...
-
-    @property
-    def size(self) -> int:
-        """Return the number of degrees of freedom n."""
-        ...
-
-    def observe(self, sensors: Any) -> SparseArray:  # noqa: ANN401 - see the module
-        """Return sensor readings from dofs, sparse (n_sensors, n)."""
-        ...
-
-    def attach(self, masses: Sequence[Any], springs: Sequence[Any]) -> Model:
-        """Return the model with further masses and springs to ground."""
-        ...
-
-    def mass_times(self, vectors: FloatArray) -> FloatArray:
-        """Return M @ vectors, (n, m), with changes of low rank that `mass` does not hold."""
-        ...
-
-    def stiffness_times(self, vectors: FloatArray) -> FloatArray:
-        """Return K @ vectors, (n, m), with changes of low rank that `stiffness` does not hold."""
-        ...
-
-
-@runtime_checkable
-class Measurement(Protocol):
-    """Measured modes of one structure."""
-
-    @property
-    def sensors(self) -> Any:  # noqa: ANN401 - labels, positions, directions
-        """Return where the shapes were measured."""
-        ...
-
-    @property
-    def numbers(self) -> tuple[int, ...]:
-        """Return the label of every mode, (m,)."""
-        ...
-
-    @property
-    def frequencies(self) -> FloatArray:
-        """Return natural frequencies in Hz, (m,)."""
-        ...
-
-    @property
-    def frequency_std(self) -> FloatArray:
-        """Return their standard deviations in Hz, (m,)."""
-        ...
-
-    @property
-    def damping(self) -> FloatArray:
-        """Return damping ratios, (m,); nan where none was measured."""
-        ...
-
-    @property
-    def shapes(self) -> FloatArray:
-        """Return real mode shapes, (n_sensors, m); nan where missing."""
-        ...
-
-    @property
-    def shape_std(self) -> FloatArray:
-        """Return standard deviations of the shapes, (n_sensors, m)."""
-        ...
-
-    @property
-    def total_mass(self) -> tuple[float, float] | None:
-        """Return the weighed mass and its standard deviation in kg; None where not weighed."""
-        ...
 
 
 @runtime_checkable
@@ -128,8 +31,8 @@ class Result(Protocol):
     """
 
     @property
-    def model(self) -> Model:
-        """Return the updated model."""
+    def model(self) -> Any:  # noqa: ANN401 - see the module
+        """Return the updated `femubench.Model`."""
         ...
 
     @property
@@ -267,8 +170,8 @@ class Reader(Protocol):
         """Return a square sparse matrix; raises InputError where the file holds none."""
         ...
 
-    def read_modes(self, path: Path) -> Measurement:
-        """Return sensors and modes, nan for deviations and places that the file does not state.
+    def read_modes(self, path: Path) -> Any:  # noqa: ANN401 - see the module
+        """Return a `femubench.Measurement`, nan where the file states no deviations or places.
 
         Raises:
             InputError: where the file holds none.
@@ -421,7 +324,7 @@ class Effect(Protocol):
         """Return its parameters there, with unit, prior and bounds."""
         ...
 
-    def extend(self, model: Any, place: str, values: Sequence[float]) -> Model:  # noqa: ANN401
+    def extend(self, model: Any, place: str, values: Sequence[float]) -> Any:  # noqa: ANN401
         """Return the model with the effect in it."""
         ...
 

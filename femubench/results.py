@@ -4,9 +4,9 @@ from femubench.core.drawing.element_change import (
     element_norms as element_norms,
     stiffness_difference as stiffness_difference,
 )
-from femubench.core.run.frames import run_from_json as run_from_json, run_to_json as run_to_json
 from femubench.core.run.store import Store as Store
 from femubench.core.schema.paired_modes import PairedMode as PairedMode
+from femubench.core.schema.records import run_from_json as run_from_json, run_to_json as run_to_json
 from femubench.core.schema.results import JobResult as JobResult, Run as Run
 from femubench.core.score.bounded_gain import Rule as Rule
 from femubench.core.score.leaderboard import Standings as Standings

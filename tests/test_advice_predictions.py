@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.linalg as la
-from advice_problems import STD, every_option, fitted, one_outlook, part_of, posed
+from advice_problems import STD, every_option, fitted, one_outlook, posed
+from diagnosis_problems import part_at
 from numpy.testing import assert_allclose
 from scipy.special import logsumexp
 
@@ -60,7 +61,7 @@ class TestPredictions:
         place = frame.joints[0].name
         extended = effect.extend(model, place, size)
         problem = posed(model, extended, [effect])
-        part = part_of(problem, effect, place)
+        part = part_at(problem, effect.name, place)
         x = np.array(
             [p.coordinate(v) for p, v in zip(part.hypothesis.parameters, size, strict=True)]
         )

@@ -15,15 +15,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from frf_problems import write_universal
 
 import femubench
 from femubench import Sensors
 from femubench.core.case.nodes import with_mesh
-from femubench.core.cli.main import bench
 from femubench.modal import FrequencyResponses, receptance
 from femubench.plugins.readers.solid_elements import KINDS
+from tests.command import call_bench
 
 Boxes = dict[str, tuple[tuple[float, ...], tuple[float, ...]]]
 BOXES: Boxes = {  # mm
@@ -145,9 +144,7 @@ def test_the_messages_lead_from_deck_and_responses_to_an_updated_deck(
     write_responses(Path("test.uff"), write_deck(Path("truth.inp"), "C3D20R", 12.0, weld))
 
     def run(*words: str) -> str:
-        done = CliRunner().invoke(bench, list(words))
-        assert done.exit_code == 0, done.output
-        return done.output
+        return call_bench(*words).output
 
     said = run("identify", "test.uff", "--output", "identified")
     said = run(*follow(said, CASE="case", MODEL="model.inp"))

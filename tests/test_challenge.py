@@ -13,7 +13,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from femubench import InputError, Model, read_case
 from femubench.core.challenge.answer import Answer, AnswerCause, read_answer
@@ -26,7 +25,6 @@ from femubench.core.challenge.structures import STRUCTURES, structure_named
 from femubench.core.challenge.truth import KINDS, DataKind, HiddenCause, Truth, finer
 from femubench.core.challenge.truth_file import KnownCase, TrueCause
 from femubench.core.challenge.visibility import delta_chi2
-from femubench.core.cli.main import bench
 from femubench.core.errors import FemubenchError, ModelError
 from femubench.core.fem.frame import Place
 from femubench.core.library.cases import read_cases
@@ -36,6 +34,7 @@ from femubench.core.plugin.loader import load_plugins
 from femubench.effect import FrameEffect, Parameter, Site, Size
 from femubench.fem import Frame, PointMass
 from femubench.plugins.effects.local_stiffness_loss import LocalStiffnessLoss
+from tests.command import call_bench
 from truths.truth_text import truth_text
 
 LADDER = structure_named("ladder")
@@ -491,24 +490,17 @@ def test_no_folder_with_files_is_written_into(blind: Path) -> None:
 
 def test_the_command_writes_and_scores(tmp_path: Path) -> None:
     case, sealed, said = tmp_path / "case", tmp_path / "secret", tmp_path / "answer.json"
-    run = CliRunner().invoke
-    options = ["--seed", "3", "--kind", "C", "--hidden", "none", "--truth", str(sealed)]
-    done = run(bench, ["challenge", "new", *options, str(case)])
-    assert done.exit_code == 0, done.output
+    options = ["--seed", "3", "--kind", "C", "--hidden", "none", "--truth", sealed]
+    done = call_bench("challenge", "new", *options, case)
     commitment = json.loads(sealed.read_text())["commitment"]
     assert commitment in done.output
     assert not (case / SEALED_FILE).exists()
     said.write_text('{"verdict": "none"}', encoding="utf-8")
     out = tmp_path / "judged.json"
-    done = run(
-        bench,
-        ["challenge", "score", str(case), str(said), "--truth", str(sealed), "--json", str(out)],
-    )
-    assert done.exit_code == 0, done.output
+    done = call_bench("challenge", "score", case, said, "--truth", sealed, "--json", out)
     assert "right: nothing is hidden" in done.output
     assert json.loads(out.read_text())["judgement"]["right"] is True
-    done = run(bench, ["challenge", "score", str(case), str(said)])
-    assert done.exit_code == 2
+    done = call_bench("challenge", "score", case, said, code=2)
     assert "truth.sealed: cannot be read" in done.output
 
 
@@ -563,18 +555,15 @@ def test_every_truth_of_a_folder_is_drawn_by_some_seed(outside: Path, tmp_path: 
 
 def test_the_command_poses_truths_from_outside(outside: Path, tmp_path: Path) -> None:
     case, said = tmp_path / "case", tmp_path / "answer.json"
-    run = CliRunner().invoke
-    new = ["challenge", "new", "--seed", "1", "--truths", str(outside)]
-    done = run(bench, [*new, "--reference", str(case)])
-    assert done.exit_code == 0, done.output
+    new = ["challenge", "new", "--seed", "1", "--truths", outside]
+    call_bench(*new, "--reference", case)
     said.write_text('{"verdict": "none"}', encoding="utf-8")
-    done = run(bench, ["challenge", "score", str(case), str(said)])
+    done = call_bench("challenge", "score", case, said, code=None)
     assert "hidden: a loose joint: joint-rotation at J1" in done.output
     assert "wrong: none; hidden is a loose joint" in done.output
     for words, expected in (
         ([*new, "--kind", "A"], "--kind has no effect with --truths"),
         (["challenge", "new", "--seed", "1", "--reference"], "--reference goes with --truths"),
-        ([*new[:-1], str(tmp_path / "none")], "no folder with truth.toml"),
+        ([*new[:-1], tmp_path / "none"], "no folder with truth.toml"),
     ):
-        done = run(bench, [*words, str(tmp_path / "other")])
-        assert (done.exit_code, expected in done.output) == (2, True), done.output
+        assert expected in call_bench(*words, tmp_path / "other", code=2).output

@@ -15,13 +15,15 @@ from pathlib import Path
 
 import click
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
+from distributions import install_module
 
 from femubench.core.cli.main import VERBS, bench
 from femubench.core.errors import OutputError
 from femubench.core.files import write_atomically
 from femubench.core.run.store import Store
 from femubench.core.schema.quantities import parse_size, parse_timeouts, say_duration
+from tests.command import call_bench
 from tests.toys.store_edits import edit, records
 
 MODULE = "femubench.core.cli.{}"  # of a verb
@@ -63,15 +65,6 @@ def femubench_strategies():
 Invoke = Callable[..., Result]
 
 
-def put_distribution(folder: Path, name: str, source: str) -> None:
-    (folder / f"{name}.py").write_text(source, encoding="utf-8")
-    info = folder / f"{name}-1.0.dist-info"
-    info.mkdir()
-    metadata = f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n"
-    (info / "METADATA").write_text(metadata, encoding="utf-8")
-    (info / "entry_points.txt").write_text(f"[femubench]\n{name} = {name}\n", encoding="utf-8")
-
-
 def put_case(folder: Path, *, name: str = "rod") -> Path:
     shutil.copytree(CASE, folder)
     change(folder / "case.toml", 'name = "portal"', f'name = "{name}"')
@@ -88,7 +81,7 @@ def change(file: Path, old: str, new: str) -> None:
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Install a plugin with well-known strategies for this file."""
     folder = tmp_path_factory.mktemp("site")
-    put_distribution(folder, "femubench_cli_tests", PLUGIN)
+    install_module(folder, "femubench_cli_tests", PLUGIN)
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
         yield folder
@@ -100,7 +93,7 @@ def invoke(site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Calla
     """Call `bench` in this process, in an empty folder."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("FEMUBENCH_STORE", raising=False)
-    return lambda *words: CliRunner().invoke(bench, [str(word) for word in words])
+    return lambda *words: call_bench(*words, code=None)
 
 
 def python(code: str, *, path: Path | None = None) -> str:
@@ -326,7 +319,7 @@ def done(site: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Re
     words += ["--csv", folder / "r.csv", "-j", 2, "--timeout", "1m", "--nominal", "drawn"]
     for strategy in ("test-nothing", "test-fails", "test-picky"):
         words += ["-s", strategy]
-    return folder, CliRunner().invoke(bench, [str(word) for word in words])
+    return folder, call_bench(*words, code=None)
 
 
 class TestRun:
@@ -443,9 +436,9 @@ class TestPluginsAndScenarios:
         self, invoke: Invoke, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.syspath_prepend(tmp_path)
-        put_distribution(tmp_path, "cli_broken", "import a_module_that_nobody_has\n")
-        put_distribution(tmp_path, "cli_typo", PLUGIN.replace("_strategies()", "_strategis()"))
-        put_distribution(tmp_path, "zz_cli_twin", PLUGIN)
+        install_module(tmp_path, "cli_broken", "import a_module_that_nobody_has\n")
+        install_module(tmp_path, "cli_typo", PLUGIN.replace("_strategies()", "_strategis()"))
+        install_module(tmp_path, "zz_cli_twin", PLUGIN)
         case = put_case(tmp_path / "case")
         result = invoke("run", case, "-s", "test-nothing", "-q")
         assert result.exit_code == 0

@@ -10,13 +10,12 @@ from typing import NamedTuple
 
 import msgspec
 import pytest
-from click.testing import CliRunner
 from cryptography.fernet import Fernet
 
 import femubench
 from femubench import read_case
 from femubench.core.challenge.closed_set import CLOSED, KEY
-from femubench.core.cli.main import bench
+from tests.command import call_bench
 
 pytestmark = pytest.mark.slow(60)
 
@@ -38,9 +37,7 @@ def closed(tmp_path_factory: pytest.TempPathFactory) -> Set:
     key = Fernet.generate_key().decode()
 
     def run(*words: object, code: int = 0, key: str | None = key) -> str:
-        found = CliRunner().invoke(bench, [str(word) for word in words], env={KEY: key})
-        assert found.exit_code == code, found.output
-        return found.output
+        return call_bench(*words, code=code, env={KEY: key}).output
 
     run("challenge", "close", folder / "set", SUITE / "portal", SUITE / "arch")
     halves = sorted((folder / "set").iterdir())

@@ -10,10 +10,9 @@ from typing import Any
 import harness_toys as toys
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from run_edits import called, failed, moved, renamed, scaled
 
-from femubench.core.cli.main import bench
 from femubench.core.errors import InputError
 from femubench.core.run.runner import run_jobs
 from femubench.core.schema.records import run_from_json, run_to_json
@@ -21,6 +20,7 @@ from femubench.core.score.comparison import METRICS, Against, Threshold, compare
 from femubench.core.score.ranking import rank_results
 from femubench.core.score.statistics import weigh_evidence
 from femubench.reports.compare_page import comparison_html, comparison_markdown, comparison_text
+from tests.command import call_bench
 
 Data = dict[str, Any]
 HOSTILE = "<script>alert(1)</script>\x1b[2J|`x`"
@@ -51,7 +51,7 @@ def called_with(tmp_path: Path, a: Data, b: Data, *options: str) -> Result:
     for name, run in (("a.json", a), ("b.json", b)):
         (tmp_path / name).write_text(json.dumps(run))
     files = [str(tmp_path / "a.json"), str(tmp_path / "b.json")]
-    return CliRunner().invoke(bench, ["compare", *files, *options])
+    return call_bench("compare", *files, *options, code=None)
 
 
 def test_a_run_is_no_worse_than_itself(data: Data, tmp_path: Path) -> None:
@@ -181,7 +181,7 @@ def test_two_strategies_of_one_run(data: Data, tmp_path: Path) -> None:
     path.write_text(json.dumps(data))
 
     def called_by(*words: str) -> Result:
-        return CliRunner().invoke(bench, ["compare", str(path), *words])
+        return call_bench("compare", path, *words, code=None)
 
     run = run_from_json(data)
     found = compare_runs(run, run, against=Against("unchanged", "softer"))
@@ -301,8 +301,7 @@ def test_wrong_files(data: Data, tmp_path: Path) -> None:
     answer = called_with(tmp_path, data, worse)
     assert answer.exit_code == 2
     assert "b.json: results[1].seconds" in answer.stderr
-    missing = CliRunner().invoke(bench, ["compare", "a", "b", "--store", str(tmp_path / "no")])
-    assert missing.exit_code == 2
+    call_bench("compare", "a", "b", "--store", tmp_path / "no", code=2)
     strange = json.loads(json.dumps(data))
     strange["meta"] |= {"versions": [1], "machine": "mine"}
     assert called_with(tmp_path, data, strange).exit_code == 0

@@ -16,13 +16,11 @@ from typing import Any
 import conformance_toys as toys
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from femubench import Scenario, Strategy
 from femubench.core.child import sandbox
 from femubench.core.child.guarded_child import Ending
 from femubench.core.child.limits import MIB
-from femubench.core.cli.main import bench
 from femubench.core.conformance import kit
 from femubench.core.conformance.checking import Subject, checks_of, findings, subjects
 from femubench.core.conformance.kit import Bench, Role
@@ -30,6 +28,7 @@ from femubench.core.conformance.place_words import has_place
 from femubench.core.conformance.problems import problem
 from femubench.core.errors import InputError
 from femubench.core.plugin.loader import load_plugins
+from tests.command import call_bench
 
 ROOT = Path(__file__).parents[1]
 # Strategies that end or block their process, and what is said of them.
@@ -267,8 +266,7 @@ def test_a_name_is_looked_up_kindly() -> None:
 def test_command_line(tmp_path: Path) -> None:
     file = tmp_path / "found.json"
     words = ["plugins", "check", "unchanged", "--case", "frame", "--json", str(file)]
-    outcome = CliRunner().invoke(bench, words)
-    assert outcome.exit_code == 0, outcome.output
+    outcome = call_bench(*words)
     lines = outcome.output.splitlines()
     assert lines[0] == f"strategy unchanged: {len(checks_of('strategy'))} checks"
     assert lines[-1].endswith("0 failed, 0 warnings, 1 not applicable")
@@ -283,12 +281,11 @@ def test_exit_codes(monkeypatch: pytest.MonkeyPatch) -> None:
     strategies = {**BUILT_IN.strategies, "asymmetric": toys.Asymmetric()}
     known = replace(BUILT_IN, strategies=strategies)
     monkeypatch.setattr("femubench.core.cli.plugins.plugins_for", lambda ctx: known)
-    outcome = CliRunner().invoke(bench, ["plugins", "check", "asymmetric"])
-    assert outcome.exit_code == 1
+    outcome = call_bench("plugins", "check", "asymmetric", code=1)
     assert re.search(r"^FAIL +symmetric +grounded .* allowed 1e-08", outcome.output, re.MULTILINE)
-    assert CliRunner().invoke(bench, ["plugins", "check", "nothing"]).exit_code == 2
+    call_bench("plugins", "check", "nothing", code=2)
     gone = ["plugins", "check", "unchanged", "--json", "/no/such/folder/x.json"]
-    assert CliRunner().invoke(bench, gone).exit_code == 2
+    call_bench(*gone, code=2)
 
 
 PLUGIN = """

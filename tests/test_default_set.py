@@ -7,17 +7,17 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from printed_boards import assert_same_errors, stored
 
 import femubench
 import femubench.scenarios
 from femubench import InputError, PluginError, Scenario, hookimpl
-from femubench.core.cli.main import bench
 from femubench.core.library.cases import case_folders, read_cases
 from femubench.core.library.rank import plan_run
 from femubench.core.plugin.loader import Plugins, load_plugins
 from femubench.core.plugin.validation import check_scenario
+from tests.command import call_bench
 
 ROOT = Path(__file__).parents[1]
 QUICK = (
@@ -58,7 +58,7 @@ def suite(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def call() -> Callable[..., Result]:
-    return lambda *words: CliRunner().invoke(bench, list(words))
+    return lambda *words: call_bench(*words, code=None)
 
 
 def names(words: list[str], plugins: Plugins | None = None) -> list[str]:

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import femubench
 from femubench import InputError
 from femubench.core.case.example import write_example
-from femubench.core.cli.main import bench
+from tests.command import call_bench
 
 LABELS = (
     *("left_mid", "left_top", "beam_quarter", "beam_mid"),
@@ -70,13 +69,9 @@ def test_negative_deviation_is_refused(tmp_path: Path) -> None:
 def test_note_is_shown_by_run_and_diagnose(tmp_path: Path) -> None:
     folder = with_deviations(tmp_path / "portal", "0")
     store = ["--store", str(tmp_path / "results"), "--report", str(tmp_path / "page.md")]
-    run = CliRunner().invoke(bench, ["run", str(folder), "-s", "unchanged", *store])
-    assert run.exit_code == 0, run.output
+    run = call_bench("run", folder, "-s", "unchanged", *store)
     assert "next to no deviation" in " ".join(run.output.split())
     page = (tmp_path / "page.md").read_text()
     assert "next to no deviation" in " ".join(page.split())
-    stated = CliRunner().invoke(
-        bench, ["diagnose", str(folder), "--effects", "density", "--no-pairs", "--no-faults"]
-    )
-    assert stated.exit_code == 0, stated.output
+    stated = call_bench("diagnose", folder, "--effects", "density", "--no-pairs", "--no-faults")
     assert "next to no deviation" in " ".join(stated.output.split())

@@ -11,13 +11,12 @@ from typing import Any
 
 import diagnosis_toys as toys
 import pytest
-from click.testing import CliRunner, Result
-from distributions import install_metadata
+from click.testing import Result
+from distributions import install_module
 
 from femubench.core.case.case import TOLERANCE, Case
 from femubench.core.case.example import write_example
 from femubench.core.case.reader import read_case
-from femubench.core.cli.main import bench
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_from_json
 from femubench.core.errors import InputError, NotApplicable
@@ -28,6 +27,7 @@ from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.score.scoring import score_model
 from femubench.reports.diagnosis import diagnosis_text
+from tests.command import call_bench
 
 Invoke = Callable[..., Result]
 OnAdvance = tuple[Result, dict[str, Any], Path]
@@ -89,8 +89,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Install a plugin with two effects."""
     folder = tmp_path_factory.mktemp("site")
     name = "femubench_diagnose_tests"
-    (folder / f"{name}.py").write_text(EFFECTS, encoding="utf-8")
-    install_metadata(folder, name, {name: name})
+    install_module(folder, name, EFFECTS)
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
         yield folder
@@ -111,7 +110,7 @@ def invoke(site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Invok
     """Call `bench diagnose` in this process, in a folder with one case."""
     monkeypatch.chdir(tmp_path)
     write_example(tmp_path / "case")
-    return lambda *words: CliRunner().invoke(bench, ["diagnose", *map(str, words)])
+    return lambda *words: call_bench("diagnose", *words, code=None)
 
 
 def screen(found: Diagnosis, written: Path | None = None) -> str:
@@ -269,8 +268,7 @@ class TestExtending:
 def stated(tmp_path_factory: pytest.TempPathFactory) -> OnAdvance:
     folder = tmp_path_factory.mktemp("frame")
     words = ["frame", "--json", folder / "found.json", "--output", folder / "out"]
-    result = CliRunner().invoke(bench, ["diagnose", *map(str, words)])
-    assert result.exit_code == 0, result.output
+    result = call_bench("diagnose", *words)
     data = json.loads((folder / "found.json").read_text(), parse_constant=pytest.fail)
     return result, data, folder / "out"
 

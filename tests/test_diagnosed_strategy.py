@@ -31,6 +31,7 @@ from femubench.plugins.strategies.diagnosed import Diagnosed
 from femubench.results import Run
 from femubench.scenarios import HERE
 from femubench.update import with_measured_frequencies
+from tests.simulated import modes_at
 
 FrameBuilder = Callable[..., Frame]
 USED, ALL = (1, 2, 3), (1, 2, 3, 4, 5, 6, 7, 8)
@@ -43,12 +44,8 @@ def measured(truth: Frame, numbers: tuple[int, ...] = USED, deviation: float = 2
     direction = "x" if truth.plane == "in-plane" else "z"
     xyz = np.array([joint.xyz for joint in truth.joints])
     sensors = Sensors(tuple(j.name for j in truth.joints), xyz, (direction,) * len(xyz))
-    modes = solve_modes(model).elastic.take(np.arange(len(numbers)))
-    shapes = np.asarray(model.observe(sensors) @ modes.shapes)
-    std = 0.015 * np.abs(shapes).max(axis=0) * np.ones_like(shapes)
-    hertz = modes.natural_frequencies
-    nothing = np.full(len(hertz), np.nan)
-    return Measurement(sensors, numbers, hertz, deviation * hertz, nothing, shapes, std)
+    found = modes_at(model, sensors, len(numbers), hertz_std=deviation)
+    return replace(found, numbers=numbers)
 
 
 def update(model: Model, measurement: Measurement, seed: int = 0, **options: Any) -> UpdateResult:

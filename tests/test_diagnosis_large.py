@@ -40,6 +40,7 @@ from femubench.plugins.effects.local_stiffness_loss import LocalStiffnessLoss
 from femubench.plugins.effects.material import MemberMass, MemberStiffness, YoungsModulus
 from femubench.plugins.effects.shear_deformation import ShearDeformation
 from femubench.plugins.effects.temperature import Temperature
+from tests.simulated import modes_at
 
 FrameBuilder = Callable[..., Frame]
 KNOWN: tuple[Effect, ...] = (AddedMass(), JointRotation(), MemberStiffness(), YoungsModulus())
@@ -58,17 +59,12 @@ def measured(
     truth: Model, sensors: Sensors, count: int, rng: np.random.Generator | None = None
 ) -> Measurement:
     """Return a test of a model, exact without a generator, with the deviations of a good test."""
-    modes = solve_modes(truth, count + 10).elastic
-    frequencies = modes.natural_frequencies[:count]
-    shapes = np.asarray(truth.observe(sensors) @ modes.shapes[:, :count])
-    shapes = shapes / np.abs(shapes).max(axis=0)
-    std = 0.002 * frequencies
-    if rng is not None:
-        frequencies = frequencies + std * rng.standard_normal(count)
-        shapes = shapes + 0.015 * rng.standard_normal(shapes.shape)
-    numbers, unknown = tuple(range(1, count + 1)), np.full(count, np.nan)
-    spread = np.full(shapes.shape, 0.015)
-    return Measurement(sensors, numbers, frequencies, std, unknown, shapes, spread)
+    found = modes_at(truth, sensors, count, hertz_std=0.002)
+    if rng is None:
+        return found
+    frequencies = found.frequencies + found.frequency_std * rng.standard_normal(count)
+    shapes = found.shapes + 0.015 * rng.standard_normal(found.shapes.shape)
+    return replace(found, frequencies=frequencies, shapes=shapes)
 
 
 def posed_on(model: Model, hypotheses: tuple[Hypothesis, ...]) -> Problem:

@@ -10,10 +10,8 @@ from typing import Any
 import diagnosis_toys as toys
 import harness_toys
 import pytest
-from click.testing import CliRunner
 from diagnosis_toys import STRUCTURE, data_of
 
-from femubench.core.cli.main import bench
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
 from femubench.core.drawing.places import find_wireframe
 from femubench.core.errors import InputError
@@ -26,6 +24,7 @@ from femubench.core.schema.diagnosis import (
     States,
 )
 from femubench.reports.diagnosis import diagnosis_html, diagnosis_markdown, diagnosis_text
+from tests.command import call_bench
 
 VERDICTS = ("named", "none", "unknown", "ambiguous", "not-confirmed")
 
@@ -167,14 +166,13 @@ class TestCommand:
             file = tmp_path / name
             words = ["diagnose", "frame", "--no-pairs", "--no-faults", "-q", "--report", str(file)]
             words += ["--effects", "density"]
-            done = CliRunner().invoke(bench, words)
+            done = call_bench(*words, code=None)
             assert (done.exit_code, done.stdout) == (0, "")
             assert file.read_text(encoding="utf-8").startswith(start)
 
     def test_a_suffix_that_says_nothing(self, tmp_path: Path) -> None:
         words = ["diagnose", "frame", "--report", str(tmp_path / "a.pdf")]
-        done = CliRunner().invoke(bench, words)
-        assert done.exit_code == 2
+        done = call_bench(*words, code=2)
         assert ".html or .md" in done.stderr
 
 

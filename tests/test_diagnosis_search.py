@@ -77,6 +77,9 @@ def test_a_noise_that_is_trusted_by_half_halves_what_the_data_say_and_leaves_the
     assert odds[0] == pytest.approx(priors[0] - priors[1])
     assert odds[1] == pytest.approx(0.5 * (odds[0] + odds[2]))
     assert odds[2] > odds[0] + 4.0
+    # What an assert prints where it fails.
+    assert "member-mass at rung-left" in repr(cause)
+    assert len(repr(cause)) < 500
 
 
 @pytest.mark.parametrize(("overlooked", "count"), [(3, 1), (6, 0)])

@@ -14,17 +14,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
 from femubench.core.cli import outputs
 from femubench.core.cli.ending import INTERRUPTED, UNFINISHED, resuming
-from femubench.core.cli.main import bench
 from femubench.core.errors import FemubenchError, OutputError
 from femubench.core.run import runner
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.stopping import stopping
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult
+from tests.command import call_bench
 
 RUN = ("run", "frame", "-s", "unchanged", "-s", "baruch", "-j", "1")
 JOBS = 4  # two nominal models
@@ -34,7 +34,7 @@ JOBS = 4  # two nominal models
 def whole(tmp_path_factory: pytest.TempPathFactory) -> list[JobResult]:
     """The results of the run when nothing happens to it."""
     folder = tmp_path_factory.mktemp("whole")
-    assert CliRunner().invoke(bench, [*RUN, "--store", str(folder)]).exit_code == 0
+    call_bench(*RUN, "--store", folder)
     return list(Store(folder).load().results)
 
 
@@ -56,7 +56,7 @@ def run_until(
                 happens()
 
     monkeypatch.setattr(LocalProcesses, "compute", compute)
-    result = CliRunner().invoke(bench, [*(words or RUN)])
+    result = call_bench(*words or RUN, code=None)
     monkeypatch.undo()
     return result
 
@@ -100,8 +100,7 @@ def test_the_board_so_far_and_the_command_that_goes_on(
     done, _, command = last.partition("; to go on: ")
     assert done == f"bench: 2 of {JOBS} jobs are done"
     assert ("Traceback" in result.stderr) is (cause == "broken")
-    again = CliRunner().invoke(bench, command.split()[1:])
-    assert again.exit_code == 0
+    call_bench(*command.split()[1:])
     store = Store("femubench-results")
     assert len(store.runs()) == 1
     kept = ("case", "strategy", "nominal", "status", "blocks", "gain", "rank")
@@ -111,7 +110,7 @@ def test_the_board_so_far_and_the_command_that_goes_on(
 
 def test_what_ends_before_the_run_begins_is_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "begin_run", lambda *_: lost())
-    result = CliRunner().invoke(bench, list(RUN))
+    result = call_bench(*RUN, code=None)
     assert (result.exit_code, result.stderr) == (1, "bench: the scheduler was lost\n")
 
 
@@ -193,8 +192,7 @@ def test_a_report_that_cannot_be_written_keeps_nobody_from_the_ranking(
         plain(path, content)
 
     monkeypatch.setattr(outputs, "write_atomically", write)
-    result = CliRunner().invoke(bench, [*RUN, "--json", "r.json", "--csv", "r.csv"])
-    assert result.exit_code == 1
+    result = call_bench(*RUN, "--json", "r.json", "--csv", "r.csv", code=1)
     assert "strategy" in result.stdout
     assert Path("r.csv").read_text(encoding="utf-8").count("\n") == JOBS + 1
     first, second = result.stderr.splitlines()
@@ -242,7 +240,6 @@ def test_a_disk_that_is_full(kib: int, code: int, stated: str, tmp_path: Path) -
 
 def test_links_that_lead_back_to_themselves_are_said(tmp_path: Path) -> None:
     (tmp_path / "loop").symlink_to("loop")
-    result = CliRunner().invoke(bench, ["publish", "loop", "x"])
-    assert result.exit_code == 2
+    result = call_bench("publish", "loop", "x", code=2)
     what = "loop: is a link that leads back to itself (expected a file or a folder)"
     assert result.stderr == f"bench: {what}\n"

@@ -11,7 +11,6 @@ from scipy.stats import ortho_group
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
-from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.correlation import mac
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.expansion import (
@@ -22,21 +21,15 @@ from femubench.core.modal.expansion import (
     procrustes_rotation,
     same_length,
 )
-from femubench.core.typing import FloatArray
+from femubench.core.typing import FloatArray, SparseArray
+from tests.simulated import sensors_along
 
 FrameBuilder = Callable[..., Frame]
 
 
-def thirteen_points(model: Model) -> Sensors:
-    """Return z at the corners, the tees and the midpoints of all segments."""
-    frame = model.frame_structure.frame
-    points = [joint.xyz for joint in frame.joints]
-    for member in frame.members:
-        a, b = (np.array(frame.joint(name).xyz) for name in member.ends)
-        x, y, z = (0.5 * (a + b)).tolist()
-        points.append((x, y, z))
-    labels = tuple(f"s{i}" for i in range(len(points)))
-    return Sensors(labels, np.array(points), ("z",) * len(points))
+def rows_of(model: Model) -> SparseArray:
+    """Return the readings of sensors at the corners, the tees and the middles of all segments."""
+    return model.observe(sensors_along(model.frame_structure.frame))
 
 
 @pytest.fixture
@@ -52,7 +45,7 @@ def truth(asymmetric_ladder: FrameBuilder) -> Model:
 def at_sensors(model: Model, count: int = 3) -> tuple[FloatArray, FloatArray]:
     """Return elastic modes at the thirteen points and at all dofs."""
     shapes = solve_modes(model).elastic.shapes[:, :count]
-    return np.asarray(model.observe(thirteen_points(model)) @ shapes), shapes
+    return np.asarray(rows_of(model) @ shapes), shapes
 
 
 def mixed(seed: int, analytical: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -90,9 +83,7 @@ def test_expansion_by_rotation_returns_the_full_shapes_of_an_exact_mix(nominal: 
     measured, rotation = mixed(1, basis)
     shapes, found = expand_by_rotation(measured * [2.0, 0.1, 5.0], basis, whole)
     aligned = same_length(measured, basis)
-    np.testing.assert_allclose(
-        nominal.observe(thirteen_points(nominal)) @ shapes, aligned, atol=1e-9
-    )
+    np.testing.assert_allclose(rows_of(nominal) @ shapes, aligned, atol=1e-9)
     assert np.abs(np.abs(found) - np.abs(rotation)).max() < 1e-9
 
 
@@ -106,7 +97,7 @@ def test_serep_is_exact_in_the_span(nominal: Model) -> None:
 def test_serep_is_the_least_squares_fit_outside_it(nominal: Model, truth: Model) -> None:
     sensors, full = at_sensors(nominal, 3)
     measured, _ = at_sensors(truth)
-    expanded = nominal.observe(thirteen_points(nominal)) @ expand_by_serep(measured, sensors, full)
+    expanded = rows_of(nominal) @ expand_by_serep(measured, sensors, full)
     residual = measured - expanded
     assert np.linalg.norm(residual) > 1e-3 * np.linalg.norm(measured)
     np.testing.assert_allclose(sensors.T @ residual, 0.0, atol=1e-10)
@@ -114,7 +105,7 @@ def test_serep_is_the_least_squares_fit_outside_it(nominal: Model, truth: Model)
 
 def test_dynamic_expansion_is_exact_for_the_models_own_modes(truth: Model) -> None:
     modes = solve_modes(truth).elastic
-    rows = truth.observe(thirteen_points(truth))
+    rows = rows_of(truth)
     expanded = expand_by_dynamics(
         truth, rows, np.asarray(rows @ modes.shapes[:, :5]), modes.eigenvalues[:5]
     )
@@ -128,7 +119,7 @@ def test_dynamic_expansion_meets_the_readings_with_the_least_force(
 ) -> None:
     measured, _ = at_sensors(truth)
     eigenvalues = solve_modes(truth).elastic.eigenvalues[:3]
-    rows = nominal.observe(thirteen_points(nominal))
+    rows = rows_of(nominal)
     expanded = expand_by_dynamics(nominal, rows, measured, eigenvalues)
     np.testing.assert_allclose(rows @ expanded, measured, atol=1e-10)
     mass, stiffness = nominal.mass.toarray(), nominal.stiffness.toarray()
@@ -156,7 +147,7 @@ def test_expanded_shapes_come_nearer_to_the_truth_than_the_nominal_ones(
     sensors, full = at_sensors(nominal)
     measured, _ = at_sensors(truth)
     shapes, _ = expand_by_rotation(measured, sensors, full)
-    expanded = np.asarray(nominal.observe(thirteen_points(nominal)) @ shapes)
+    expanded = np.asarray(rows_of(nominal) @ shapes)
     before, after = (np.diag(mac(measured, s)) for s in (sensors, expanded))
     assert (after > before).sum() >= 2
     assert after.mean() > before.mean()

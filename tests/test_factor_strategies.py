@@ -47,6 +47,7 @@ from femubench.plugins.strategies.sparse import Sparse, lasso
 from femubench.plugins.strategies.strain_energy import StrainEnergy, energy_change_index
 from femubench.scenarios import HERE
 from femubench.update import Changes, ModalSpace, QuasiModes
+from tests.simulated import modes_at
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
 BAR = Section(4e-4, 1.2e-8, 1.2e-8, 2e-8, 2.4e-8)
@@ -94,18 +95,6 @@ def everywhere(model: Model) -> Sensors:
     return Sensors(labels, model.dofs.xyz, model.dofs.direction)
 
 
-def exact(truth: Model, sensors: Sensors, count: int) -> Measurement:
-    """Return the lowest elastic modes of a model without error."""
-    modes = solve_modes(truth).elastic.take(np.arange(count))
-    shapes = truth.observe(sensors) @ modes.shapes
-    shapes = shapes / np.abs(shapes).max(axis=0)
-    hertz = modes.natural_frequencies
-    return Measurement(
-        sensors, tuple(range(1, count + 1)), hertz, 1e-3 * hertz, np.full(count, np.nan),
-        shapes, np.full(shapes.shape, 0.01),
-    )  # fmt: skip
-
-
 def planted(
     frame: Frame, member: str, count: int, factor: float = FACTOR
 ) -> tuple[Model, Measurement]:
@@ -113,7 +102,7 @@ def planted(
     model = Model.of(frame)
     parts = Changes(model).parameterise("members")
     factors = np.where(np.array(parts.names) == f"E {member}", factor, 1.0)
-    return model, exact(parts.at(np.log(factors)), everywhere(model), count)
+    return model, modes_at(parts.at(np.log(factors)), everywhere(model), count, shape_std=0.01)
 
 
 def factors_of(strategy: Strategy, model: Model, measurement: Measurement) -> dict[str, float]:
@@ -258,7 +247,7 @@ def test_slopes_are_those_of_differences_and_few_shapes_give_the_same_frequencie
 def test_a_model_that_loses_a_mode_fits_no_better_than_before() -> None:
     """All members softer and softer: the frequency falls as the root, until nothing pairs."""
     model = Model.of(cantilever())
-    first = exact(model, everywhere(model), 1)
+    first = modes_at(model, everywhere(model), 1, shape_std=0.01)
     bare = replace(first, shapes=np.full_like(first.shapes, np.nan))
     parts = Changes(model).parameterise("members")
     space = ModalSpace.of(parts, bare, shape_weight=0.0)
@@ -275,7 +264,9 @@ def test_modes_of_one_frequency_turn_by_no_rounding() -> None:
     hertz = solve_modes(model).natural_frequencies
     assert hertz[[1, 3]] == pytest.approx(hertz[[0, 2]], rel=1e-9)
     parts = Changes(model).parameterise("members")
-    space = ModalSpace.of(parts, exact(model, everywhere(model), 4), shape_weight=1.0)
+    space = ModalSpace.of(
+        parts, modes_at(model, everywhere(model), 4, shape_std=0.01), shape_weight=1.0
+    )
     slope = space.fit(np.zeros(len(parts))).slope
     assert slope[:4].sum(axis=1) == pytest.approx([-0.5] * 4)
     assert slope[4:].sum(axis=1) == pytest.approx(np.zeros(len(slope) - 4), abs=1e-9)

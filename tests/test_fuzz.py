@@ -13,23 +13,20 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
 from hypothesis import HealthCheck, given, settings, strategies as st
 from mutations import changed_json, edits, json_edits, mutated
-from seeds import CASES, matrix_case, run_text, store_text, universal_case
+from seeds import CASES, matrix_case, run_text, universal_case
 from watch import watched
 
-from femubench import FemubenchError, InputError, read_case
-from femubench.core.cli.main import bench
+from femubench import FemubenchError, read_case
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.run.upkeep import read_old_records
-from femubench.core.schema.records import read_run, result_to_json, run_from_json
-from femubench.results import Run
+from femubench.core.schema.records import read_run
+from tests.command import call_bench
 
 FEW, MANY = 0.006, 1.0  # share of the inputs in the tests of every day
 INPUTS = {
     **{"toml": 24_000, "csv": 20_000, "mtx": 16_000, "universal": 14_000},
-    **{"run": 8_000, "store": 6_000},
+    "run": 8_000,
 }
 MOST_CHARACTERS = 2500
 _CLI_SAMPLE = 12
@@ -95,12 +92,9 @@ def fuzz(
     return tally
 
 
-def refused_by_command(words: list[str], *, lenient: bool = False) -> None:
-    """Call the command; a lenient one may also show what is whole."""
-    result = CliRunner().invoke(bench, words)
+def refused_by_command(words: list[str]) -> None:
+    result = call_bench(*words, code=None)
     assert "Traceback" not in result.output
-    if lenient and result.exit_code == 0:
-        return
     assert result.exit_code == 2, result.output
     assert len(result.output.splitlines()) == 1
 
@@ -153,26 +147,14 @@ def case_format(folder: Path, share: float, format: str) -> None:
     case_files(folder, share, files, format, commands=True)
 
 
-def run_of_lines(file: Path) -> Run:
-    """Return the run that a store of version 0.1 holds."""
-    faults: list[InputError] = []
-    found = [record for _, record in read_old_records(file, faults)]
-    if faults:
-        raise faults[0]
-    results = [result_to_json(record.result()) for record in found if record.kind == "result"]
-    meta = {k: v for record in found if record.kind != "result" for k, v in record.meta().items()}
-    return run_from_json({"meta": meta, "results": results}, file=file)
-
-
 def results_format(folder: Path, share: float, format: str) -> None:
-    text = run_text() if format == "run" else store_text()
-    file = folder / ("run.json" if format == "run" else "results.jsonl")
-
+    text = run_text()
+    file = folder / "run.json"
     count = 0
 
     def report() -> None:
         nonlocal count
-        run = read_run(file) if format == "run" else run_of_lines(file)
+        run = read_run(file)
         count += 1
         for reporter in REPORTERS:
             if reporter.name == "html" and count % _PAGE_SHARE != 1:
@@ -190,33 +172,27 @@ def results_format(folder: Path, share: float, format: str) -> None:
         return outcome_of(report, file, folder)
 
     def rewritten(changes: Any) -> bytes:
-        if format == "run":
-            return json.dumps(changed_json(json.loads(text), changes)).encode()
-        lines = changed_json([json.loads(line) for line in text.splitlines()], changes)
-        return "".join(json.dumps(line) + "\n" for line in lines).encode()
+        return json.dumps(changed_json(json.loads(text), changes)).encode()
 
     make = json_edits().map(rewritten) | edits(2).map(lambda e: mutated(text, e))
     tally = fuzz(format, share, make, read)
     for content in tally.refused:
         file.write_bytes(content)
-        words = ["report", file] if format == "run" else ["store", "repair", "--store", folder]
-        refused_by_command([*map(str, words)], lenient=format == "store")
+        refused_by_command(["report", str(file)])
 
 
-FORMATS = ["toml", "csv", "mtx", "universal", "run", "store"]
+FORMATS = ["toml", "csv", "mtx", "universal", "run"]
 
 
 def check(folder: Path, share: float, format: str) -> None:
-    (results_format if format in ("run", "store") else case_format)(folder, share, format)
+    (results_format if format == "run" else case_format)(folder, share, format)
 
 
 @pytest.mark.slow(20)
 @pytest.mark.parametrize(
     "format",
-    ["toml", "store"]
-    + [
-        pytest.param(name, marks=pytest.mark.nightly) for name in ("csv", "mtx", "universal", "run")
-    ],
+    ["toml", "run"]
+    + [pytest.param(name, marks=pytest.mark.nightly) for name in ("csv", "mtx", "universal")],
 )
 def test_a_few(tmp_path: Path, format: str) -> None:
     check(tmp_path, FEW, format)

@@ -25,7 +25,6 @@ import psutil
 import pytest
 import scanner
 import zoo
-from click.testing import CliRunner
 
 import femubench
 from femubench.core.child import guarded_child, sandbox, server, syscall_filter
@@ -33,13 +32,13 @@ from femubench.core.child.guarded_child import Ending
 from femubench.core.child.limits import MIB, Limits
 from femubench.core.child.sandbox import Enclosure, enclosure, walls_around
 from femubench.core.child.workers import Workers, run_apart
-from femubench.core.cli.main import bench
 from femubench.core.errors import InputError
 from femubench.core.run import cluster_worker
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.runner import run_jobs
 from femubench.core.schema.results import JobResult
 from femubench.core.schema.run_options import Sandbox
+from tests.command import call_bench
 
 needed = pytest.mark.skipif(sandbox.missing() is not None, reason=f"{sandbox.missing()}")
 
@@ -124,8 +123,7 @@ def test_where_there_is_none_a_run_says_so_once(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     words = ["run", "frame", "-s", "unchanged", "-j1", "--json", "run.json"]
-    done = CliRunner().invoke(bench, words)
-    assert done.exit_code == 0, done.output
+    done = call_bench(*words)
     assert done.stderr == "strategies run without a sandbox: this machine has none\n"
     kept = json.loads(Path("run.json").read_text())
     assert kept["meta"]["sandbox"] == "none"
@@ -139,7 +137,7 @@ def test_where_there_is_none_a_run_says_so_once(
 
 def test_a_quiet_run_says_what_its_ranks_lack(nowhere: None, tmp_path: Path) -> None:
     words = ["run", "frame", "-s", "unchanged", "-q", "-j1", "--store", str(tmp_path / "s")]
-    done = CliRunner().invoke(bench, words)
+    done = call_bench(*words, code=None)
     assert done.stdout == ""
     assert done.stderr.splitlines() == [
         "bench: no twins ran, so that memory of the cases is not excluded",
@@ -153,7 +151,7 @@ def test_one_that_is_required_and_missing_is_wrong_input(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     words = ["run", "frame", "-s", "unchanged", "--sandbox", "require"]
-    done = CliRunner().invoke(bench, words)
+    done = call_bench(*words, code=None)
     assert (done.exit_code, done.stdout) == (2, "")
     assert done.stderr.count("\n") == 1
     assert "no sandbox: this machine has none" in done.stderr

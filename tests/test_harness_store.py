@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -16,11 +15,10 @@ import numpy as np
 import pytest
 
 from femubench.core.errors import InputError
-from femubench.core.run.frames import modes_frame, run_from_json, run_to_json
+from femubench.core.run.frames import modes_frame
 from femubench.core.run.store import Store
-from femubench.core.run.upkeep import convert_old_files, find_store_faults
 from femubench.core.schema.paired_modes import PairedMode
-from femubench.core.schema.records import result_to_json
+from femubench.core.schema.records import run_from_json, run_to_json
 from femubench.core.schema.results import Block, JobResult, Run, Status
 from femubench.core.score.ranking import rank_results
 
@@ -131,7 +129,7 @@ def test_a_file_that_was_cut_short_is_read_as_far_as_it_goes(tmp_path: Path) -> 
     whole = file.read_bytes()
     for size in range(0, len(whole), 700):
         file.write_bytes(whole[:size])
-        assert find_store_faults(store) != []
+        assert store.faults() != []
         run = store.load()
         assert {item.seed for item in run.results} <= {*range(9)}
         assert len(run.results) >= size // 2048 - 3
@@ -142,7 +140,7 @@ def test_a_file_that_was_cut_short_is_read_as_far_as_it_goes(tmp_path: Path) -> 
     store.repair(META["run"])
     store.append(META["run"], replace(BAD, seed=77))
     assert len(store.load().results) >= 7
-    assert find_store_faults(store) == []
+    assert store.faults() == []
 
 
 FULL = """
@@ -183,7 +181,7 @@ def test_a_record_that_does_not_fit_on_the_disk_leaves_no_trace(tmp_path: Path) 
     assert 0 <= int(count) < 99
     seeds = [item.seed for item in store.load(META["run"]).results]
     assert seeds == [0, *range(1, int(count) + 1), 1000]
-    assert find_store_faults(store) == []
+    assert store.faults() == []
 
 
 def test_a_full_disk_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -211,68 +209,8 @@ def test_a_store_that_cannot_be_made_is_an_error(tmp_path: Path) -> None:
         pass
 
 
-def earlier(folder: Path, results: Sequence[JobResult] = (GOOD, BAD)) -> list[str]:
-    """Return the lines of a store as version 0.1 wrote them."""
-    records = [{"record": "run", "meta": META}]
-    records += [{"record": "result", "result": result_to_json(item)} for item in results]
-    records += [{"record": "end", "meta": {"finished": "2026-01-01T00:00:09+00:00"}}]
-    return [json.dumps({"schema": 1, **item, "run": META["run"]}) for item in records]
-
-
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        ("{not json}", r"results\.jsonl:2: not JSON"),
-        ('{"record": "song"}', r"results\.jsonl:2: damaged \(expected a record"),
-        ('{"record": "run", "schema": 99, "run": "a"}', r":2: damaged"),
-        ('{"record": "run", "schema": 1}', ":2: not a record: 'run'"),
-        ('{"schema": 1, "run": "r", "record": "result", "result": {"case": 3}}', r":2: result\.c"),
-    ],
-)
-def test_runs_of_version_0_1_are_converted(tmp_path: Path, line: str, message: str) -> None:
-    lines = earlier(tmp_path)
-    (tmp_path / "results.jsonl").write_text("\n".join([lines[0], line, *lines[1:]]) + "\n")
-    store = Store(tmp_path)
-    with pytest.raises(InputError, match=r"no results; .*`bench store repair` converts them"):
-        store.load()
-    stored(tmp_path, "20260102T000000Z-bbbbbb")
-    (note,) = store.load().meta["notes"]
-    assert note.endswith("runs of an earlier version; `bench store repair` converts them "
-        "(results.jsonl)")  # fmt: skip
-    ((file, (count, faults)),) = convert_old_files(store).items()
-    assert (file.name, count, len(faults)) == ("results.jsonl", 4, 1)
-    assert re.search(message, str(faults[0]))
-    run = store.load(META["run"])
-    assert run.results == rank_results([GOOD, BAD], {})  # it has no models to be measured by
-    assert (run.meta["finished"], run.meta["notes"]) == ("2026-01-01T00:00:09+00:00", [])
-    assert store.runs() == (META["run"], "20260102T000000Z-bbbbbb")
-    assert find_store_faults(store) == []
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        f"{META['run']}.sqlite",
-        "20260102T000000Z-bbbbbb.sqlite",
-        "results.jsonl.converted",
-    ]
-
-
-LINES = Path(__file__).parent / "toys" / "schema-2.jsonl"
-
-
-def test_runs_of_json_lines_with_checksums_are_converted(tmp_path: Path) -> None:
-    lines = LINES.read_bytes().splitlines(keepends=True)
-    lines.insert(3, lines[2].replace(b"103.0", b"104.0"))
-    old = tmp_path / f"{META['run']}.jsonl"
-    old.write_bytes(b"".join(lines))
-    store = Store(tmp_path)
-    ((file, (count, faults)),) = convert_old_files(store).items()
-    assert (file, count, len(faults)) == (old, 5, 1)
-    assert str(faults[0]).startswith(f"{old}:4: damaged")
-    run = store.load()
-    assert run.results == rank_results([GOOD, BAD], {})
-    assert run.meta["finished"] == "2026-01-01T00:00:09+00:00"
-
-
 def test_a_run_id_that_is_no_file_name_is_refused(tmp_path: Path) -> None:
-    for name in ("../evil", "", ".hidden", "a/b", "results"):
+    for name in ("../evil", "", ".hidden", "a/b"):
         with pytest.raises(InputError, match="run id"):
             Store(tmp_path / "store").begin({"run": name})
     assert list(tmp_path.iterdir()) == []

@@ -8,7 +8,6 @@ import re
 import socket
 import subprocess
 import sys
-import textwrap
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any
 
 import psutil
 import pytest
+from distributions import install_module
 
 from femubench import InputError, PluginError, strategies
 from femubench.core.case.reader import read_case
@@ -118,11 +118,7 @@ HOSTILE: Mapping[str, tuple[str, str | None]] = {
 def install(folder: Path, name: str, source: str) -> str:
     """Put an installed distribution with one plugin module there, as pip would; return its name."""
     module = f"{name.replace('-', '_')}_hostile"
-    (folder / f"{module}.py").write_text(textwrap.dedent(source), encoding="utf-8")
-    info = folder / f"{module}-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[femubench]\n{name} = {module}\n")
+    install_module(folder, name, source, module)
     return module
 
 

@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import femubench
 from femubench import Identification, InputError, identify
-from femubench.core.cli.main import bench
 from femubench.core.identify.complexity import mean_phase_deviation, phase_collinearity
 from femubench.modal import FrequencyResponses, TimeSignals
 from femubench.plot import stabilisation, synthesis
 from femubench.reports.identification import identification_html
+from tests.command import call_bench
 from tests.frf_problems import frf_set, sensors, write_universal
 from tests.identify_score import NAMES, covered, score
 
@@ -193,8 +192,7 @@ def test_files_hold_the_same(
 @pytest.mark.slow(5)
 def test_the_command_writes_tables_that_a_case_reads(tmp_path: Path, small: Any) -> None:
     file = write_universal(tmp_path / "test.uff", small.measured)
-    done = CliRunner().invoke(bench, ["identify", str(file), "--output", str(tmp_path / "out")])
-    assert done.exit_code == 0, done.output
+    done = call_bench("identify", file, "--output", tmp_path / "out")
     assert "6 modes from 20 to 200 Hz" in done.output
     assert (tmp_path / "out" / "sensors.csv").read_text(encoding="utf-8").count("\n") == 14
     table = (tmp_path / "out" / "modes.csv").read_text(encoding="utf-8").splitlines()
@@ -204,8 +202,7 @@ def test_the_command_writes_tables_that_a_case_reads(tmp_path: Path, small: Any)
     page = (tmp_path / "out" / "identification.html").read_text(encoding="utf-8")
     assert "test.uff" in page
     assert "<script" not in page
-    again = CliRunner().invoke(bench, ["identify", str(file), "--output", str(tmp_path / "out")])
-    assert again.exit_code == 2
+    again = call_bench("identify", file, "--output", tmp_path / "out", code=2)
     assert "is not empty" in again.output
 
 
@@ -218,8 +215,7 @@ def test_drawings_refuse_what_they_cannot_draw(found: Identification) -> None:
 
 def refusal(file: Path) -> str:
     """Return the one line that `bench identify` ends with."""
-    done = CliRunner().invoke(bench, ["identify", str(file)])
-    assert done.exit_code == 2, done.output
+    done = call_bench("identify", file, code=2)
     assert done.output.count("\n") == 1
     return done.output
 

@@ -13,13 +13,13 @@ import pytest
 import pyuff
 import scipy.io
 import scipy.sparse as sp
-from click.testing import CliRunner, Result
+from click.testing import Result
 
 import femubench
 import femubench.plot
 from femubench.core.case.records import mean_record
-from femubench.core.cli.main import bench
 from femubench.modal import FrequencyResponses
+from tests.command import call_bench
 from tests.frf_problems import write_universal
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -71,7 +71,7 @@ def init(folder: Path, *more: str) -> Result:
     files = {"--model": "K.mtx", "--mass": "M.mtx", "--dofs": "dofs.csv", "--modes": "test.uff"}
     files = {key: name for key, name in files.items() if key not in more}
     words = [word for key, name in files.items() for word in (key, str(folder / name))]
-    return CliRunner().invoke(bench, ["init", str(folder / "case"), *words, *more])
+    return call_bench("init", folder / "case", *words, *more, code=None)
 
 
 def test_folder_runs_and_says_what_was_done(tmp_path: Path) -> None:
@@ -98,8 +98,7 @@ def test_folder_runs_and_says_what_was_done(tmp_path: Path) -> None:
     assert drawn.elements == tuple((i, i + 1) for i in range(SPANS - 1))  # the test's trace line
     for words in (["run", str(folder), "-s", "unchanged", "--store", str(tmp_path / "r")],
                   ["diagnose", str(folder), "--no-pairs", "--effects", "added-mass"]):  # fmt: skip
-        found = CliRunner().invoke(bench, words)
-        assert found.exit_code == 0, found.output
+        found = call_bench(*words)
         assert "coordinates were taken in mm" in " ".join(found.output.split())
 
 
@@ -193,8 +192,7 @@ def test_a_mistake_names_its_remedy_and_leaves_nothing(tmp_path: Path, mistake: 
     ):
         command = re.search("`(bench init .*?)`", done.output)
         assert command is not None
-        again = CliRunner().invoke(bench, shlex.split(command[1])[1:])
-        assert again.exit_code == 0, again.output
+        call_bench(*shlex.split(command[1])[1:])
 
 
 @pytest.mark.parametrize(
@@ -219,8 +217,7 @@ def test_other_mistakes_name_their_remedy(
     signal = np.random.default_rng(0).standard_normal(2100)
     rows = "".join(f"{0.01 * i:.2f};{v}\n".replace(".", ",") for i, v in enumerate(signal))
     Path("one.csv").write_text(f"time;1:z\n{rows}")
-    done = CliRunner().invoke(bench, words.split())
-    assert done.exit_code == 2, done.output
+    done = call_bench(*words.split(), code=2)
     assert advice in done.output
     assert_on_page(mistake, done.output, tmp_path)
 
@@ -316,7 +313,7 @@ def test_table_of_modes_and_of_sensors(tmp_path: Path) -> None:
 
 
 def test_one_file_alone_is_not_enough(tmp_path: Path) -> None:
-    done = CliRunner().invoke(bench, ["init", str(tmp_path / "a"), "--model", "K.mtx"])
+    done = call_bench("init", tmp_path / "a", "--model", "K.mtx", code=None)
     assert (done.exit_code, "--modes: is missing" in done.output) == (2, True)
     with pytest.raises(femubench.InputError, match="model: is missing"):
         femubench.init_case(tmp_path / "a", modes="test.uff")

@@ -14,7 +14,7 @@ import pytest
 
 from femubench import Measurement, Model, Sensors, diagnose, read_case
 from femubench.core.challenge.draw import draw_case
-from femubench.core.challenge.measuring import Seen, record
+from femubench.core.challenge.measuring import Ideal, record
 from femubench.core.challenge.structures import structure_named
 from femubench.core.fit.residuals import Data
 from femubench.core.modal.correlation import find_seen_modes
@@ -128,7 +128,7 @@ def test_a_drawn_shape_has_one_sign() -> None:
     for more in (1e-13, -1e-13):
         raw = shape.copy()
         raw[count // 2 - 1] *= 1.0 + more
-        seen = Seen(np.array([50.0]), raw, 1.0)
+        seen = Ideal(np.array([50.0]), raw, 1.0)
         found.append(record(seen, specimen, "A", 1, np.random.default_rng(1)).shapes)
     np.testing.assert_allclose(*found, atol=1e-9)
 

@@ -16,15 +16,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner, Result
 from numpy.testing import assert_allclose
 
 import femubench
 import femubench.papers
-from femubench.core.cli.main import bench
 from femubench.core.display import LINES, WIDTH
 from femubench.core.schema.run_options import split_keywords
 from femubench.core.score.repeatability import result_differences
+from tests.command import call_bench
 from tests.frf_problems import frf_set, write_universal
 from tests.test_cli import put_case
 from tests.toys import reproduction_toys
@@ -45,13 +44,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def call(*words: object) -> Result:
-    """Call `bench`, which must find nothing wrong."""
-    done = CliRunner().invoke(bench, [str(word) for word in words])
-    assert done.exit_code == 0, done.output
-    return done
-
-
 def data(file: str) -> Any:
     return json.loads(Path(file).read_text(encoding="utf-8"))
 
@@ -66,7 +58,7 @@ class TestEveryCommandOfTheReadme:
     def test_run(self) -> None:
         words = ["baruch", "generic-ls:plain=full"]
         given = [part for word in words for part in ("-s", word)]
-        call("run", "frame", *given, "-q", "-j", 2, "--json", "results.json")
+        call_bench("run", "frame", *given, "-q", "-j", 2, "--json", "results.json")
         run = femubench.rank("frame", words, jobs=2)
         assert result_differences(femubench.read_run("results.json"), run) == []
         assert femubench.report(run, "ours.json") == Path("ours.json")
@@ -76,7 +68,7 @@ class TestEveryCommandOfTheReadme:
         assert ours["meta"]["request"] == theirs["meta"]["request"]
 
     def test_run_with_noise_and_run_resume(self) -> None:
-        call("run", "rod", "-s", "unchanged", "--seeds", 3, "-q", "-j", 2, "--store", "a")
+        call_bench("run", "rod", "-s", "unchanged", "--seeds", 3, "-q", "-j", 2, "--store", "a")
         run = femubench.rank("rod", "unchanged", seeds=3, jobs=2, store="b")
         assert run.table["seed"].tolist() == [1, 2, 3, 1, 2, 3]
         assert run.table["nominal"].tolist() == 3 * ["textbook"] + 3 * ["drawn"]
@@ -90,7 +82,7 @@ class TestEveryCommandOfTheReadme:
     def test_study(self) -> None:
         lines = ['axes = {cases = ["rod"], seeds = 1, noise = [1, 2]}', "[[strategies]]"]
         Path("study.toml").write_text("\n".join([*lines, 'name = "unchanged"']), encoding="utf-8")
-        call("study", "study.toml", "-q", "-j", 2, "--json", "theirs.json", "--store", "s")
+        call_bench("study", "study.toml", "-q", "-j", 2, "--json", "theirs.json", "--store", "s")
         run = femubench.study("study.toml", jobs=2)
         femubench.report(run, "ours.json")
         assert data("ours.json")["cells"][0].keys() == data("theirs.json")["cells"][0].keys()
@@ -101,17 +93,17 @@ class TestEveryCommandOfTheReadme:
 
     def test_report(self) -> None:
         femubench.rank("rod", TWO, jobs=2, store="s")
-        call("report", "--store", "s", "-f", "html,md,csv", "-o", "out")
+        call_bench("report", "--store", "s", "-f", "html,md,csv", "-o", "out")
         for theirs in Path("out").iterdir():
             ours = femubench.report(None, f"ours{theirs.suffix}", store="s")
             assert Path(ours).read_bytes() == theirs.read_bytes()
-        assert str(femubench.report(store="s")) in call("report", "--store", "s").output
+        assert str(femubench.report(store="s")) in call_bench("report", "--store", "s").output
 
     def test_compare(self) -> None:
         a = femubench.rank("rod", TWO, jobs=2, store="s")
         b = femubench.rank("rod", TWO, jobs=2, store="s")
         words = ("compare", a.meta["run"], b.meta["run"], "--store", "s", "--fail", "loss>0.2")
-        call(*words, "-f", "json", "-o", "theirs.json")
+        call_bench(*words, "-f", "json", "-o", "theirs.json")
         found = femubench.compare(a, b.meta["run"], fail="loss>0.2", store="s")
         assert not found.worse
         femubench.report(found, "ours.json")
@@ -121,8 +113,8 @@ class TestEveryCommandOfTheReadme:
 
     def test_store(self) -> None:
         run = femubench.rank("rod", "unchanged", jobs=2, store="s")
-        assert "1 run, 0 faults" in call("store", "check", "--store", "s").output
-        lines = call("report", "-f", "jsonl", "--store", "s").stdout.splitlines()
+        assert "1 run, 0 faults" in call_bench("store", "check", "--store", "s").output
+        lines = call_bench("report", "-f", "jsonl", "--store", "s").stdout.splitlines()
         text = femubench.report(style="jsonl", store="s")
         assert str(text).splitlines() == lines
         kept = [item["result"] for item in map(json.loads, lines) if "result" in item]
@@ -134,25 +126,25 @@ class TestEveryCommandOfTheReadme:
         assert missing.startswith(
             "1 of 2 jobs are missing and count as the model that was given: rod unchanged"
         )
-        call("store", "repair", "--store", "s")
+        call_bench("store", "repair", "--store", "s")
         assert femubench.read_run(store="s").meta["notes"] == [missing]
 
     def test_publish(self) -> None:
         run = femubench.rank("rod", TWO, jobs=2)
         file = femubench.report(run, "results.json")
-        call("publish", "theirs", file, "--unverified", "-q")
+        call_bench("publish", "theirs", file, "--unverified", "-q")
         femubench.publish("ours", run, unverified=True)
         femubench.publish("files", ["results.json"], unverified=True)
         pages = [sorted(p.name for p in Path(f).rglob("*")) for f in ("theirs", "ours", "files")]
         assert pages[0] == pages[1] == pages[2]
 
     def test_init_and_diagnose(self) -> None:
-        call("init", "theirs")
+        call_bench("init", "theirs")
         ours = femubench.init_case("ours")
         assert sorted(path.name for path in ours) == sorted(os.listdir("theirs"))
         effects = ["torsion-constant", "shear-deformation"]
         found = femubench.diagnose("frame", effects, pairs=False, output="ours-extended")
-        call(
+        call_bench(
             *("diagnose", "frame", "--effects", ",".join(effects), "--no-pairs", "-q"),
             *("--json", "theirs.json", "-o", "theirs-extended"),
         )
@@ -167,7 +159,7 @@ class TestEveryCommandOfTheReadme:
     def test_identify(self) -> None:
         measured = frf_set(4, modes=4, pairs=0, references=1, step=0.5, band=(20.0, 200.0)).measured
         write_universal(Path("test.uff"), measured)
-        call("identify", "test.uff", "--output", "theirs")
+        call_bench("identify", "test.uff", "--output", "theirs")
         found = femubench.identify("test.uff")
         theirs = pd.read_csv("theirs/modes.csv")
         assert theirs["frequency"].tolist() == found.frequencies.tolist()
@@ -182,12 +174,12 @@ class TestEveryCommandOfTheReadme:
         values, shapes = np.linalg.eigh(stiffness / 2.0)
         frequencies = 1.05 * np.sqrt(values[:3]) / (2.0 * np.pi)
         np.savez("test.npz", frequencies=frequencies, shapes=shapes[:, :3], **labels)
-        call("init", "theirs", "--model", "chain.npz", "--modes", "test.npz")
+        call_bench("init", "theirs", "--model", "chain.npz", "--modes", "test.npz")
         femubench.init_case("ours", "chain.npz", "test.npz")
         assert Path("ours/case.toml").read_text() == Path("theirs/case.toml").read_text().replace(
             "theirs", "ours"
         )
-        printed = call("update", "theirs", "-s", "global", "-o", "updated")
+        printed = call_bench("update", "theirs", "-s", "global", "-o", "updated")
         assert ": 1 → 1.103" in printed.output
         case = femubench.read_case("ours")
         result = femubench.strategies["global"].update(
@@ -203,7 +195,7 @@ class TestEveryCommandOfTheReadme:
             femubench.papers, "study", lambda paper, _: reproduction_toys.study(paper)
         )
         monkeypatch.setattr("femubench.core.plot.figure.render_figure", reproduction_toys.drawn)
-        call("reproduce", "hframe", "-q", "-o", "theirs")
+        call_bench("reproduce", "hframe", "-q", "-o", "theirs")
         studies = femubench.reproduce("hframe", output="ours")
         names = [p.relative_to("theirs") for p in Path("theirs").rglob("*") if p.is_file()]
         assert len(names) > 3
@@ -213,31 +205,31 @@ class TestEveryCommandOfTheReadme:
         assert data("studies.json") == data("ours/reproduce.json")
 
     def test_scenarios(self) -> None:
-        shown = call("scenarios", "show", "frame-solid").output
+        shown = call_bench("scenarios", "show", "frame-solid").output
         case = femubench.cases["frame-solid"]
         assert case.title.split()[0] in shown
         assert {"source", "sensors", "used"} <= {key for key, _ in case.rows()}
 
     def test_plugins(self) -> None:
-        listed = call("plugins", "list").output.replace("\n", " ")
+        listed = call_bench("plugins", "list").output.replace("\n", " ")
         for catalogue in (femubench.strategies, femubench.effects):
             assert len(catalogue) > 5
             assert all(name in listed for name in catalogue)
         Path("a").mkdir()
         Path("b").mkdir()
-        call("plugins", "new", "my-method", "-o", "a")
+        call_bench("plugins", "new", "my-method", "-o", "a")
         ours = femubench.new_plugin("my-method", output="b")
         theirs = [path.relative_to("a") for path in Path("a").rglob("*") if path.is_file()]
         assert sorted(path.relative_to("b") for path in ours) == sorted(theirs)
         assert all(Path("a", p.relative_to("b")).read_bytes() == p.read_bytes() for p in ours)
 
     def test_challenge(self) -> None:
-        call("challenge", "new", "theirs", "--seed", 3, "--hidden", "none")
+        call_bench("challenge", "new", "theirs", "--seed", 3, "--hidden", "none")
         blind = femubench.challenge("ours", 3, hidden="none")
         assert (blind.folder / "case.toml").read_bytes() == Path("theirs/case.toml").read_bytes()
         answer = {"verdict": "none", "causes": []}
         Path("answer.json").write_text(json.dumps(answer))
-        call("challenge", "score", "theirs", "answer.json", "--json", "scored.json")
+        call_bench("challenge", "score", "theirs", "answer.json", "--json", "scored.json")
         assert (
             blind.score("answer.json").judgement.right is data("scored.json")["judgement"]["right"]
         )

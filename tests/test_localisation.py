@@ -19,36 +19,19 @@ from femubench.core.look.shape_expansion import ModalCorrelation, expand
 from femubench.core.modal.eigen import dense_matrices, solve_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.schema.diagnosis import LocationRow
+from tests.simulated import modes_at, sensors_along
 
 FrameBuilder = Callable[..., Frame]
 ELEMENTS = 4
 Rows = tuple[LocationRow, ...]
 
 
-def midpoints(frame: Frame, parts: int = 2) -> Sensors:
-    """Return z at all joints and between them on all members."""
-    points = [joint.xyz for joint in frame.joints]
-    for member in frame.members:
-        a, b = (np.array(frame.joint(name).xyz) for name in member.ends)
-        for s in np.arange(1, parts) / parts:
-            x, y, z = ((1.0 - s) * a + s * b).tolist()
-            points.append((x, y, z))
-    labels = tuple(f"s{k}" for k in range(len(points)))
-    return Sensors(labels, np.array(points), ("z",) * len(points))
-
-
 def measured(
     truth: Frame, seed: int | None, *, f_std: float, std: float, count: int = 6, parts: int = 2
 ) -> Measurement:
     """Return elastic modes of a truth, with noise at the deviations where there is a seed."""
-    model, sensors = Model.of(truth), midpoints(truth, parts)
-    modes = solve_modes(model).elastic
-    shapes = np.asarray(model.observe(sensors) @ modes.shapes[:, :count])
-    shapes = shapes / np.abs(shapes).max(axis=0)
-    frequencies = modes.natural_frequencies[:count]
-    damping, numbers = np.full(count, np.nan), tuple(range(1, count + 1))
-    noise = np.full(shapes.shape, std)
-    data = Measurement(sensors, numbers, frequencies, f_std * frequencies, damping, shapes, noise)
+    model, sensors = Model.of(truth), sensors_along(truth, parts)
+    data = modes_at(model, sensors, count, hertz_std=f_std, shape_std=std)
     return data if seed is None else data.with_noise(np.random.default_rng([seed, 7]))
 
 

@@ -36,6 +36,7 @@ from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.typing import FloatArray
 from femubench.diagnosis import list_effects
 from femubench.plugins.effects.torsion_constant import estimate_torsion_constant, is_round
+from tests.simulated import modes_at, sensors_along
 
 FrameBuilder = Callable[..., Frame]
 
@@ -281,28 +282,10 @@ def look(
     return core_look.look(model, measurement, band, list_effects())
 
 
-def midpoints(frame: Frame) -> Sensors:
-    """Return z at all joints and at the middle of all members."""
-    points = [joint.xyz for joint in frame.joints]
-    for member in frame.members:
-        a, b = (np.array(frame.joint(name).xyz) for name in member.ends)
-        x, y, z = (0.5 * (a + b)).tolist()
-        points.append((x, y, z))
-    labels = tuple(f"s{k}" for k in range(len(points)))
-    return Sensors(labels, np.array(points), ("z",) * len(points))
-
-
 def measured(model: Model, count: int = 5, sensors: Sensors | None = None) -> Measurement:
     """Return elastic modes of a model as if measured, 0.2 % and 1.5 %."""
-    sensors = midpoints(model.frame_structure.frame) if sensors is None else sensors
-    modes = elastic_modes(model, count)
-    shapes = np.asarray(model.observe(sensors) @ modes.shapes[:, :count])
-    shapes = shapes / np.abs(shapes).max(axis=0, initial=1e-300)
-    frequencies = modes.natural_frequencies[:count]
-    std, damping = 0.002 * frequencies, np.full(count, np.nan)
-    numbers = tuple(range(1, count + 1))
-    noise = np.full(shapes.shape, 0.015)
-    return Measurement(sensors, numbers, frequencies, std, damping, shapes, noise)
+    sensors = sensors_along(model.frame_structure.frame) if sensors is None else sensors
+    return modes_at(model, sensors, count, hertz_std=0.002)
 
 
 def texts(warnings: tuple[LookWarning, ...], word: str) -> list[LookWarning]:
@@ -363,7 +346,7 @@ def test_absurd_deviations_are_found(clean: Frame, relative: float) -> None:
 
 def test_two_sensors_at_one_place(clean: Frame) -> None:
     model = Model.of(clean)
-    s = midpoints(clean)
+    s = sensors_along(clean)
     twice = Sensors(
         (*s.labels, "again"), np.vstack([s.xyz, s.xyz[3]]), (*s.directions[:-1], "z", "-z")
     )

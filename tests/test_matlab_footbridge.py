@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.linalg as la
-from click.testing import CliRunner
 
 import femubench
 from femubench import Case, InputError, solve_modes
-from femubench.core.cli.main import bench
 from femubench.core.score.scoring import reference_of
 from femubench.scenarios.matlab_footbridge import GROUPS, MODEL, TEST, VARIABLE
+from tests.command import call_bench
 
 INCH, KIP = 0.0254, 4448.2216152605  # m, N
 FLOORS = 12
@@ -142,15 +141,14 @@ def test_a_matrix_method_meets_the_used_modes(case: Case) -> None:
 
 def test_it_runs_by_name_and_leaves_no_copy(data: Path, tmp_path: Path) -> None:
     words = ("run", "footbridge", "-s", "unchanged", "--store", str(tmp_path / "store"))
-    result = CliRunner().invoke(bench, words)
-    assert result.exit_code == 0, result.stderr
+    call_bench(*words)
     assert sorted(path.name for path in data.iterdir()) == sorted((MODEL, TEST))
-    shown = CliRunner().invoke(bench, ("scenarios", "show", "footbridge"))
+    shown = call_bench("scenarios", "show", "footbridge", code=None)
     assert "24 degrees of freedom, matrices from files" in shown.stdout
 
 
 def refused(*words: str) -> str:
-    result = CliRunner().invoke(bench, words)
+    result = call_bench(*words, code=None)
     assert (result.exit_code, result.stdout) == (2, "")
     (line,) = result.stderr.splitlines()
     return line

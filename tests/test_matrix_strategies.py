@@ -41,6 +41,7 @@ from femubench.plugins.strategies.baruch import Baruch
 from femubench.plugins.strategies.berman import Berman
 from femubench.plugins.strategies.kabe import Kabe, KabeRigid
 from femubench.update import SelfCheckFailed
+from tests.simulated import modes_at
 
 PAPER = np.array([226.8, 275.2, 537.4])  # Hz, measured modes 1-3 of the paper's ladder
 FrameBuilder = Callable[..., Frame]
@@ -63,14 +64,7 @@ def sensors_of(frame: Frame) -> Sensors:
 
 def measured(truth: Frame, count: int, frequencies: Any = None) -> Measurement:
     """Return the lowest modes of a truth model at its sensors."""
-    model, sensors = Model.of(truth), sensors_of(truth)
-    modes = solve_modes(model, count + 3).elastic.take(np.arange(count))
-    shapes = np.asarray(model.observe(sensors) @ modes.shapes)
-    found = modes.natural_frequencies if frequencies is None else np.asarray(frequencies)
-    sigma = 0.015 * np.abs(shapes).max(axis=0) * np.ones_like(shapes)
-    numbers = tuple(range(1, count + 1))
-    damping = np.full(count, np.nan)
-    return Measurement(sensors, numbers, found, 1e-3 * found, damping, shapes, sigma)
+    return modes_at(Model.of(truth), sensors_of(truth), count, hertz=frequencies)
 
 
 @pytest.fixture(scope="module")

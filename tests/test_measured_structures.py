@@ -5,12 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
-from click.testing import CliRunner
 
 import femubench
-from femubench.core.cli.main import bench
 from femubench.core.modal.eigen import solve_modes
 from femubench.scenarios import HERE, OWN_FILES, femubench_scenarios
+from tests.command import call_bench
 
 LISTED = {s.name: s for s in femubench_scenarios() if s.name.startswith("tests/")}
 OWN = "tests/four-storey"
@@ -35,7 +34,7 @@ def test_a_page_says_what_is_stated_and_what_is_assumed(name: str) -> None:
 def test_a_file_is_read_in_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(OWN_FILES, raising=False)
     run = ("run", "tests", "-s", "unchanged", "--nominal", "drawn", "--store", str(tmp_path))
-    without, alone = (CliRunner().invoke(bench, words) for words in (run, ("run", OWN)))
+    without, alone = (call_bench(*words, code=None) for words in (run, ("run", OWN)))
     assert (without.exit_code, alone.exit_code) == (0, 2)
     assert [line for line in without.stderr.splitlines() if OWN in line] == [
         f"bench: left out: {OWN}, {alone.stderr.removeprefix('bench: ').rstrip()}"

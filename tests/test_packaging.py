@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
-from click.testing import CliRunner
 
 import femubench
-from femubench.core.cli.main import bench
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.markers import PROJECT
 from femubench.core.schema.diagnosis import Verdict
+from tests.command import call_bench
 
 ROOT = Path(__file__).parents[1]
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -96,10 +95,10 @@ def test_help_has_every_key_effect_and_verdict_of_pages_that_are_installed() -> 
     keys = set(re.findall(r"^(\w+) = ", example, re.MULTILINE))
     assert len(keys) > 15
     for key in (*keys, *load_plugins().effects, *get_args(Verdict), "measurement.tolerance"):
-        done = CliRunner().invoke(bench, ["help", key])
+        done = call_bench("help", key, code=None)
         assert (done.exit_code, len(done.output) > 40) == (0, True), key
     assert done.output.startswith("tolerance (measurement, docs/case-format.md)\n  how far a")
-    done = CliRunner().invoke(bench, ["help", "tolerence"])
+    done = call_bench("help", "tolerence", code=None)
     assert (done.exit_code, done.output) == (
         2,
         "bench: no key 'tolerence'; did you mean 'tolerance'?\n",

@@ -9,12 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
 import femubench.papers
 from femubench import InputError, read_case
-from femubench.core.cli.main import bench as command
 from femubench.core.plugin.loader import load_plugins
 from femubench.papers import PAPERS, study
 from femubench.papers.frame import (
@@ -28,6 +26,7 @@ from femubench.papers.frame.common import CASE, TRUTH, rigid_modes, strain_modes
 from femubench.papers.printed import read_printed
 from femubench.reproduction import Cell, Extra, Study, Workbench
 from femubench.update import QuasiModes
+from tests.command import call_bench
 
 pytestmark = pytest.mark.slow(20)
 
@@ -269,7 +268,7 @@ def test_the_document_of_the_verb_holds_every_figure(
     rerun: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(femubench.papers, "study", lambda *_: rerun)
-    result = CliRunner().invoke(command, ["reproduce", "frame", "-o", str(tmp_path)])
+    result = call_bench("reproduce", "frame", "-o", tmp_path, code=None)
     assert (result.exit_code, result.stderr) == (0, "")
     source = (tmp_path / "reproduce.html").read_text(encoding="utf-8")
     drawings = list((tmp_path / "figures").iterdir())

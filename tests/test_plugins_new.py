@@ -15,15 +15,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
+from distributions import install_metadata
 
 import femubench
 from femubench import InputError
-from femubench.core.cli.main import bench
 from femubench.core.library import new_package
 from femubench.core.library.new_package import KINDS, write_package
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import KINDS as COLLECTIONS
+from tests.command import call_bench
 
 pytestmark = pytest.mark.slow(10)
 
@@ -37,7 +38,7 @@ def at_night(*values: str) -> Any:
 
 
 def invoke(*words: str | Path) -> Result:
-    return CliRunner().invoke(bench, [str(word) for word in words])
+    return call_bench(*words, code=None)
 
 
 @pytest.fixture(scope="module")
@@ -54,13 +55,8 @@ def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def installed(package: Path) -> None:
     """Make a package importable with its entry points, as `pip install -e` would."""
     project = tomllib.loads((package / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    info = package / "src" / f"{project['name'].replace('-', '_')}-{project['version']}.dist-info"
-    info.mkdir(exist_ok=True)
-    head = f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
-    (info / "METADATA").write_text(head, encoding="utf-8")
-    points = project["entry-points"]["femubench"]
-    lines = [f"{name} = {module}" for name, module in points.items()]
-    (info / "entry_points.txt").write_text("\n".join(["[femubench]", *lines]), encoding="utf-8")
+    points, version = project["entry-points"]["femubench"], project["version"]
+    install_metadata(package / "src", project["name"], points, version)
 
 
 def python(

@@ -12,15 +12,15 @@ from xml.etree import ElementTree
 
 import harness_toys as toys
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from run_edits import called, failed, moved, renamed, scaled, versioned
 
-from femubench.core.cli.main import bench
 from femubench.core.publish import publishing
 from femubench.core.publish.submissions import slug
 from femubench.core.run.runner import run_jobs
 from femubench.core.schema.records import read_run, run_from_json, run_to_json
 from femubench.core.score.leaderboard import leaderboard
+from tests.command import call_bench
 
 Data = dict[str, Any]
 HOSTILE = "../../<script>alert(1)</script>\"'\x1b[2J"
@@ -49,7 +49,7 @@ class Site:
             file = self.room / f"run{self.count}.json"
             file.write_text(run if isinstance(run, str) else json.dumps(run))
             files.append(str(file))
-        return CliRunner().invoke(bench, ["publish", str(self.folder), *files, *self.words])
+        return call_bench("publish", self.folder, *files, *self.words, code=None)
 
     def content(self) -> dict[str, bytes]:
         return {
@@ -132,12 +132,7 @@ def test_data_files_are_runs_that_can_be_read_again(data: Data, site: Site) -> N
     assert len(read_run(file).results) == 6
     other = Site(site.room)
     other.folder = site.room / "again"
-    assert (
-        CliRunner()
-        .invoke(bench, ["publish", str(other.folder), str(file), "--unverified"])
-        .exit_code
-        == 0
-    )
+    assert call_bench("publish", other.folder, file, "--unverified", code=None).exit_code == 0
     assert other.content() == site.content()
 
 

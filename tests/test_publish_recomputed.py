@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
 
-from femubench.core.cli.main import bench
 from femubench.core.library.cases import usable_plugins
 from femubench.core.library.rank import Run, plan_run
 from femubench.core.library.report import report
@@ -22,6 +20,7 @@ from femubench.core.run.runner import Receivers
 from femubench.core.schema.records import run_from_json
 from femubench.core.schema.results import JobName
 from femubench.core.score.ranking import rank_results
+from tests.command import call_bench
 
 pytestmark = pytest.mark.slow(40)
 Data, Handed = dict[str, Any], tuple[dict[str, Any], Path]
@@ -50,7 +49,7 @@ def publish(room: Path, data: Data, answers: Path | None, rerun: int = 0) -> tup
     if answers is not None:
         (room / "run.answers").write_bytes(answers.read_bytes())
     words = ["publish", str(room / "site"), str(room / "run.json"), "--rerun", str(rerun)]
-    done = CliRunner().invoke(bench, words)
+    done = call_bench(*words, code=None)
     return done.exit_code, done.output
 
 
@@ -241,10 +240,9 @@ def test_a_run_writes_its_answers_next_to_its_json(tmp_path: Path) -> None:
     file, answers = tmp_path / "run.json", tmp_path / "run.answers"
     words = ["run", "suite/bracket", "-s", "unchanged", "--twins", "2", "--json", str(file), "-q"]
     words += ["--store", str(tmp_path / "store")]
-    assert CliRunner().invoke(bench, words).exit_code == 0
+    call_bench(*words)
     assert len(read_answers(answers)[1]) == 4  # the case, two twins, one job again
     # What comes from the store has no models, and those of another run must not stand for them.
-    done = CliRunner().invoke(bench, [*words, "--resume"])
-    assert done.exit_code == 0
+    done = call_bench(*words, "--resume")
     assert "run.answers: 4 results come from the store, without their models" in done.stderr
     assert not answers.exists()

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
-from femubench.core.cli.main import bench
 from femubench.core.library.publish import InstalledCases
 from femubench.core.library.rank import rank
 from femubench.core.library.report import report
 from femubench.core.publish.verification import _Known
 from femubench.core.run.provenance import plan_digest
+from tests.command import call_bench
 
 pytestmark = pytest.mark.slow(10)
 
@@ -60,7 +60,7 @@ def honest() -> Data:
 def publish(room: Path, data: Data, *words: str) -> Result:
     file = room / "run.json"
     file.write_text(json.dumps(data))
-    return CliRunner().invoke(bench, ["publish", str(room / "site"), str(file), *words])
+    return call_bench("publish", room / "site", file, *words, code=None)
 
 
 def edited(data: Data, edit: Edit) -> Data:

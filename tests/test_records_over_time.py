@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.io
-from click.testing import CliRunner
 
 import femubench
 from femubench import Identification, Sensors, identify
-from femubench.core.cli.main import bench
 from femubench.core.identify.averaging import average_records, guess_excitation
 from femubench.modal import TimeSignals, mac
+from tests.command import call_bench
 from tests.hammer_problems import RATE, Structure, cantilever, frame, hit, write_mat
 
 
@@ -196,8 +195,7 @@ def test_variables_that_cannot_be_guessed_are_one_line(
     tmp_path: Path, held: Any, words: str, says: str
 ) -> None:
     scipy.io.savemat(tmp_path / "a.mat", held)
-    done = CliRunner().invoke(bench, ["identify", str(tmp_path / "a.mat"), *words.split()])
-    assert done.exit_code == 2, done.output
+    done = call_bench("identify", tmp_path / "a.mat", *words.split(), code=2)
     assert says in done.output
     assert done.output.count("\n") == 1
 
@@ -238,8 +236,7 @@ def test_from_hammer_records_to_the_cause_in_four_commands(
         "identify after.mat -o after",
         "init case --model model.npz --modes after --reference before --sensors places.csv",
     ):
-        done = CliRunner().invoke(bench, words.split())
-        assert done.exit_code == 0, done.output
+        call_bench(*words.split())
     said = femubench.diagnose("case")
     assert said.verdict == "named"
     assert f"{said.causes[0].effect} at {said.causes[0].place}" == cause

@@ -11,17 +11,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from store_edits import change_data, edit
 from synthetic_run import synthetic_run
 from test_page_data import data_in
 
-from femubench.core.cli.main import bench
 from femubench.core.run.frames import results_frame
 from femubench.core.run.record_file import read_records, write_file
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.runs import MarkdownReporter
 from femubench.results import Run, Store, run_to_json
+from tests.command import call_bench
 
 RUN = synthetic_run(4, 6)
 RUN_ID = RUN.meta["run"]
@@ -54,7 +54,7 @@ def folder(tmp_path: Path) -> Path:
 @pytest.fixture
 def report(folder: Path) -> Report:
     def call(*words: object) -> Result:
-        return CliRunner().invoke(bench, ["report", "--store", str(folder), *map(str, words)])
+        return call_bench("report", "--store", folder, *words, code=None)
 
     return call
 
@@ -219,17 +219,14 @@ class TestFormats:
 @pytest.mark.slow(5)
 def test_a_diagnosis_is_reported_too(tmp_path: Path) -> None:
     file = tmp_path / "found.json"
-    runner = CliRunner()
-    words = ["diagnose", "frame", "--json", str(file), "-q", "--no-pairs"]
-    words += ["--effects", "torsion-constant,added-mass"]
-    assert runner.invoke(bench, words).exit_code == 0
-    written = runner.invoke(bench, ["report", str(file), "-f", "html"])
-    assert (written.exit_code, written.stdout) == (0, f"html: {tmp_path / 'found.html'}\n")
+    effects = ("--effects", "torsion-constant,added-mass")
+    call_bench("diagnose", "frame", "--json", file, "-q", "--no-pairs", *effects)
+    written = call_bench("report", file, "-f", "html")
+    assert written.stdout == f"html: {tmp_path / 'found.html'}\n"
     assert "<html" in (tmp_path / "found.html").read_text()
-    shown = runner.invoke(bench, ["report", str(file)])
-    assert "torsion-constant" in shown.stdout
-    wrong = runner.invoke(bench, ["report", str(file), "-f", "csv"])
-    assert (wrong.exit_code, wrong.stdout) == (2, "")
+    assert "torsion-constant" in call_bench("report", file).stdout
+    wrong = call_bench("report", file, "-f", "csv", code=2)
+    assert wrong.stdout == ""
     assert "a diagnosis has no format 'csv'" in wrong.stderr
     file.write_text(file.read_text().replace('"verdict": "', '"verdict": "x', 1))
-    assert runner.invoke(bench, ["report", str(file)]).exit_code == 2
+    call_bench("report", file, code=2)

@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 import reproduction_toys as toys
-from click.testing import CliRunner, Result
+from click.testing import Result
 
 import femubench.papers
-from femubench.core.cli.main import bench
 from femubench.core.errors import StrategyFailure
 from femubench.core.reproduction.ground import VERDICTS
 from femubench.core.reproduction.study import cells_to_json
 from femubench.reproduction import Study, Workbench
+from tests.command import call_bench
 
 Invoke = Callable[..., Result]
 KEYS = [
@@ -65,7 +65,7 @@ def papers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Papers:
 
 @pytest.fixture
 def invoke(papers: Papers) -> Invoke:
-    return lambda *words: CliRunner().invoke(bench, ["reproduce", *words])
+    return lambda *words: call_bench("reproduce", *words, code=None)
 
 
 class TestAsking:

@@ -51,6 +51,7 @@ from femubench.update import (
     scale_property,
     sensitivity_update,
 )
+from tests.simulated import modes_at
 
 RNG = np.random.default_rng(0)
 HFRAME_HZ = np.array([77.13, 137.60, 300.90, 404.98, 482.23])
@@ -64,14 +65,7 @@ def measured(
     """Return modes of a truth at sensors; frequencies replaced by printed ones where given."""
     model = Model.of(truth) if isinstance(truth, Frame) else truth
     sensors = sensors_on_joints(model.frame_structure.frame)
-    modes = solve_modes(model).elastic
-    shapes = model.observe(sensors) @ modes.shapes[:, :count]
-    hertz = modes.natural_frequencies[:count] if frequencies is None else frequencies
-    deviation = 0.015 * np.abs(shapes).max(axis=0) * np.ones_like(shapes)
-    numbers = tuple(range(1, count + 1))
-    return Measurement(
-        sensors, numbers, hertz, std * hertz, np.full(count, np.nan), shapes, deviation
-    )
+    return modes_at(model, sensors, count, hertz=frequencies, hertz_std=std)
 
 
 def with_shear(frame: Frame) -> Frame:

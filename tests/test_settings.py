@@ -6,11 +6,9 @@ import re
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 from diagnosis_problems import effects_named
 
 from femubench.core.challenge.draw import draw_case
-from femubench.core.cli.main import bench
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.errors import InputError
 from femubench.core.inference.settings import (
@@ -23,6 +21,7 @@ from femubench.core.inference.settings import (
     settings,
     settings_table,
 )
+from tests.command import call_bench
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("inference", "look", "advise", "diagnosis")
@@ -83,8 +82,7 @@ def test_what_cannot_be_set_gives_one_line(word: str, what: str, expected: str) 
         decisions_from([word])
     assert what in caught.value.what
     assert expected in (caught.value.expected or "")
-    result = CliRunner().invoke(bench, ["diagnose", "frame", "--set", word])
-    assert result.exit_code == 2
+    result = call_bench("diagnose", "frame", "--set", word, code=2)
     assert result.stderr.splitlines() == [f"bench: {caught.value}"]
 
 
@@ -110,5 +108,5 @@ def test_the_option_reaches_the_diagnosis(monkeypatch: pytest.MonkeyPatch) -> No
 
     monkeypatch.setattr("femubench.core.library.diagnose.search", search)
     words = ["--set", "sure_fault=0.95", "--set", "largest_group=2", "--set", "largest_group=3"]
-    assert CliRunner().invoke(bench, ["diagnose", "frame", *words]).exit_code == 2
+    call_bench("diagnose", "frame", *words, code=2)
     assert seen == [{"sure_fault": 0.95, "largest_group": 3}]

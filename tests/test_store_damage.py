@@ -15,16 +15,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from store_edits import change_data, edit
 
-from femubench.core.cli.main import bench
 from femubench.core.errors import InputError
 from femubench.core.run import record_file
 from femubench.core.run.store import Store
-from femubench.core.run.upkeep import find_store_faults
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block, JobResult, Run
+from tests.command import call_bench
 
 FLIPS = 100
 RUN = "20260101T000000Z-000000"
@@ -64,7 +63,7 @@ def plain(run: Run) -> list[JobResult]:
 
 
 def call(*words: object) -> Result:
-    return CliRunner().invoke(bench, ["store", *map(str, words)])
+    return call_bench("store", *words, code=None)
 
 
 def test_every_flipped_bit_is_noticed_and_changes_nothing(tmp_path: Path) -> None:
@@ -73,7 +72,7 @@ def test_every_flipped_bit_is_noticed_and_changes_nothing(tmp_path: Path) -> Non
     store = stored(tmp_path)
     store.exhibits.put("ab" * 8, {"modes": [], "mac": {"rows": [], "columns": [], "values": []}})
     (file,), (picture,) = store.files, (tmp_path / "exhibits").iterdir()
-    assert find_store_faults(store) == []
+    assert store.faults() == []
     for turn in range(FLIPS):
         flipped = picture if turn % 30 == 0 else file
         content = bytearray(flipped.read_bytes())
@@ -81,7 +80,7 @@ def test_every_flipped_bit_is_noticed_and_changes_nothing(tmp_path: Path) -> Non
         place = draw.randrange(8 * (2048 if turn % 5 == 1 else len(content)))
         content[place // 8] ^= 1 << place % 8
         before, _ = flipped.read_bytes(), flipped.write_bytes(content)
-        faults = find_store_faults(store)
+        faults = store.faults()
         assert faults, f"bit {place} of {flipped.name}"
         assert all(str(flipped) in str(fault) for fault in faults)
         run = store.load()
@@ -110,11 +109,11 @@ def test_a_lost_a_doubled_and_a_moved_record_are_noticed(tmp_path: Path) -> None
         (["DELETE FROM records WHERE number = 1", "DELETE FROM copies"], 0),
     ):
         edit(file, *changes)
-        assert find_store_faults(store) != []
+        assert store.faults() != []
         assert plain(store.load()) != list(RESULTS) or not lost
         assert len(store.load().results) == len(RESULTS) - lost
         store.repair(RUN)
-        assert find_store_faults(store) == []
+        assert store.faults() == []
         assert file.with_name(f"{file.name}.damaged").exists()
         file.write_bytes(whole)
 
@@ -256,7 +255,7 @@ def test_processes_write_and_some_are_killed(tmp_path: Path) -> None:
                     os.kill(int(pid), signal.SIGKILL)
         assert writers.wait(60) == 0
     assert [item.seed for item in store.load("steady").results] == [*range(400)]
-    assert find_store_faults(store) == []
+    assert store.faults() == []
     for turn in range(3):
         run = f"killed-{turn}"
         seeds = [item.seed for item in store.load(run).results]
@@ -264,7 +263,7 @@ def test_processes_write_and_some_are_killed(tmp_path: Path) -> None:
         with store.exclusive(run):  # its lock went with the process
             store.append(run, JobResult("c", "s", 10**7, "failed", "after"))
         assert len(store.load(run).results) == len(seeds) + 1
-    assert find_store_faults(store) == []
+    assert store.faults() == []
 
 
 def test_a_disk_that_fails_is_reported_with_the_next_record(

@@ -19,7 +19,6 @@ import pytest
 from femubench.core.errors import InputError
 from femubench.core.run.record_file import Record, write_file
 from femubench.core.run.store import Store
-from femubench.core.run.upkeep import find_store_faults
 from femubench.core.schema.records import encode_result
 from femubench.core.schema.results import JobResult
 
@@ -47,7 +46,7 @@ def test_no_bit_of_the_first_page_shuts_a_store(bits: Sequence[int], tmp_path: P
         run = store.load()
         assert [replace(item, rank=None) for item in run.results] == list(RESULTS), bit
         assert run.meta["seeds"] == META["seeds"]
-        assert find_store_faults(store), bit
+        assert store.faults(), bit
         for log in tmp_path.glob("*.sqlite-*"):
             log.unlink()
 
@@ -73,7 +72,7 @@ def test_a_file_with_other_tables_is_one_line(statements: list[str], tmp_path: P
     other = tmp_path / "zzz.sqlite"
     edit(other, *statements, "PRAGMA user_version = 7")
     before = other.read_bytes()
-    (fault,) = find_store_faults(store)
+    (fault,) = store.faults()
     assert str(fault).startswith(f"{other}: damaged: its tables are not those of a run")
     assert store.load().meta["run"] == RUN  # no other is the latest
     assert len(store.by_key()) == len(RESULTS)
@@ -95,35 +94,6 @@ def test_a_trigger_makes_nothing_happen(tmp_path: Path) -> None:
         assert connection.execute("SELECT count(*) FROM sqlite_schema").fetchone() == (2,)
 
 
-def test_lines_of_others_are_left_alone(tmp_path: Path) -> None:
-    store = stored(tmp_path)
-    for name, text in {
-        "mine.jsonl": '{"schema": 3, "record": "run"}\n',
-        "notes\x1b[2J.jsonl": "not JSON\n",
-        "empty.jsonl": "",
-    }.items():
-        (tmp_path / name).write_text(text)
-    (tmp_path / "folder.jsonl").mkdir()
-    names = sorted(os.listdir(tmp_path))
-    assert store.load().meta["notes"] == []
-    done = call("repair", "--store", tmp_path)
-    assert done.exit_code == 0
-    assert done.output.count("not of an earlier version, left alone\n") == 4
-    assert "notes\\x1b[2J.jsonl: not of" in done.output
-    assert sorted(os.listdir(tmp_path)) == names
-
-
-def test_names_of_old_files_reach_no_terminal_raw(tmp_path: Path) -> None:
-    folder = tmp_path / "a\x1b[2Jb"
-    store = stored(folder)
-    (folder / "old\x1b[31m.jsonl").write_text('{"schema": 1, "record": "run", "run": "r"}\n')
-    (note,) = store.load().meta["notes"]
-    assert "(old\\x1b[31m.jsonl)" in note
-    assert note.isprintable()
-    for word in ("check", "repair", "repair"):
-        assert "\x1b" not in call(word, "--store", folder).output
-
-
 def test_a_folder_and_a_wrong_time_are_a_line_each(tmp_path: Path) -> None:
     store = stored(tmp_path)
     (tmp_path / "x.sqlite").mkdir()
@@ -131,7 +101,7 @@ def test_a_folder_and_a_wrong_time_are_a_line_each(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.sqlite")
     start = json.dumps({"at": "noon", "meta": {**META, "run": "text"}}).encode()
     write_file(tmp_path / "text.sqlite", [Record("run", "", "", start)])
-    faults = [str(fault).removeprefix(f"{tmp_path}/") for fault in find_store_faults(store)]
+    faults = [str(fault).removeprefix(f"{tmp_path}/") for fault in store.faults()]
     assert faults == [
         "nowhere.sqlite: cannot be read: No such file or directory"
         " (expected a file that can be read)",
@@ -162,7 +132,7 @@ def test_a_repair_leaves_out_what_has_no_sense_and_keeps_every_copy(tmp_path: Pa
             f"{file}: 1 fault, 1 record left out, as it was in {file.name}.damaged{end}\n"
         )
         assert file.with_name(f"{file.name}.damaged{end}").read_bytes() == before
-        assert find_store_faults(store) == []
+        assert store.faults() == []
     assert len(store.load().results) == len(RESULTS)
 
 
@@ -217,7 +187,7 @@ def test_who_may_not_write_reads_a_whole_file(state: str, public: Path) -> None:
 
     def read() -> None:
         assert not os.access(public, os.W_OK)
-        assert find_store_faults(Store(public)) == []
+        assert Store(public).faults() == []
         run = Store(public).load()
         assert (len(run.results), run.meta["notes"]) == (len(RESULTS), [])
         with pytest.raises(InputError, match="Permission denied"):
@@ -235,7 +205,7 @@ def test_a_file_that_may_not_be_read_is_a_line(public: Path) -> None:
     (public / "zzz.sqlite").chmod(0o600)
 
     def read() -> None:
-        (fault,) = find_store_faults(Store(public))
+        (fault,) = Store(public).faults()
         assert "zzz.sqlite: cannot be read: Permission denied" in str(fault)
         assert Store(public).load().meta["run"] == RUN
 

@@ -11,13 +11,11 @@ from pathlib import Path
 import harness_toys as toys
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from twin_toys import Ratios
 
 import femubench
 from femubench import read_case
 from femubench.core.case.case import Case
-from femubench.core.cli.main import bench
 from femubench.core.errors import InputError, NotApplicable
 from femubench.core.run.companions import choose_companions
 from femubench.core.run.runner import run_jobs
@@ -26,6 +24,7 @@ from femubench.core.score.twin_gain import TwinGain, twin_gains
 from femubench.core.twin.reduced_solid import ReducedSolid
 from femubench.core.twin.stretched_case import FILE, draw_stretched_case, stretch_case
 from femubench.core.twin.twins import FAMILIES, TruthFamily, twin_of, twins_of
+from tests.command import call_bench
 from truths.drawing import case_text
 from truths.measurement import modes_csv, record, sensors_csv
 from truths.modes_of import assembled
@@ -312,8 +311,7 @@ def test_strategies_that_reckon_are_not_marked() -> None:
 
 def test_the_command_tells_the_kinds(tmp_path: Path) -> None:
     words = ["run", "suite/bracket", "frame-solid", "-s", "unchanged", "--twins", "1:77", "-j", "1"]
-    answer = CliRunner().invoke(bench, [*words, "--store", str(tmp_path / "s")])
-    assert answer.exit_code == 0, answer.output
+    answer = call_bench(*words, "--store", tmp_path / "s")
     text = " ".join(answer.output.split())
     assert "2 twins (seed 77; 1 " in text
     assert "2 twins (1 stretched) of 2 cases, seed 77" in text

@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
 from harness_toys import tiny_case
 from numpy.testing import assert_allclose
 from study_toys import BROKEN, Spy
 
 import femubench
 from femubench import InputError
-from femubench.core.cli.main import bench
 from femubench.core.library.rank import Run
 from femubench.core.library.report import render_report, reporter
 from femubench.core.library.study import StudyPlan, study_plan
@@ -28,6 +26,7 @@ from femubench.core.score.leaderboard import leaderboard
 from femubench.core.study.conditions import vary_case
 from femubench.core.study.gain import gain_by
 from femubench.core.study.study_file import read_study
+from tests.command import call_bench
 
 ROD = """\
 [case]
@@ -256,8 +255,7 @@ class TestDryRun:
 
         monkeypatch.setattr("femubench.core.run.runner.Plan.run", refuse)
         Path("study.toml").write_text(self.TEXT, encoding="utf-8")
-        done = CliRunner().invoke(bench, ["study", "study.toml", "--dry-run", "--store", "kept"])
-        assert done.exit_code == 0, done.output
+        done = call_bench("study", "study.toml", "--dry-run", "--store", "kept")
         assert "A spy: 6 cells on 1 case, 2 seeds, 12 jobs" in done.output
         assert "0 jobs in kept already, 12 to run" in done.output
         assert "unknown, since no result is stored, jobs of: unchanged on rod 12" in done.output

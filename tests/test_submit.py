@@ -13,10 +13,9 @@ from typing import Any
 
 import pytest
 import yaml
-from click.testing import CliRunner
 
 import femubench
-from femubench.core.cli.main import bench
+from tests.command import call_bench
 
 pytestmark = pytest.mark.slow(20)
 
@@ -40,7 +39,7 @@ class Repository:
 
     def __init__(self, folder: Path) -> None:
         words = ["plugins", "new", "fitted", "--output", str(folder)]
-        assert CliRunner().invoke(bench, words).exit_code == 0
+        call_bench(*words)
         self.folder, self.source = folder / "fitted", folder / "fitted/src/fitted/__init__.py"
         text = self.source.read_text(encoding="utf-8")
         assert text.count(FACTOR) == 1
@@ -113,8 +112,7 @@ def test_the_result_file_goes_onto_a_leaderboard(repository: Repository, tmp_pat
     assert data["meta"]["twins"]["number"] == 2
     words = ["publish", str(site), str(file)]
     enclosed = data["meta"]["sandbox"] == "namespaces"
-    answer = CliRunner().invoke(bench, words if enclosed else [*words, "--unverified"])
-    assert answer.exit_code == 0, answer.output
+    call_bench(*words if enclosed else [*words, "--unverified"])
     index = json.loads((site / "index.json").read_text(encoding="utf-8"))
     assert [run["proof"] for run in index["runs"]] == ["recomputed" if enclosed else "unverified"]
     (item,) = index["strategies"]

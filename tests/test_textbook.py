@@ -8,19 +8,18 @@ from pathlib import Path
 import harness_toys as toys
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from distributions import install_module
 from effect_checks import as_matrices
 
 import femubench
 from femubench import NotApplicable
-from femubench.core.cli.main import bench
 from femubench.core.plugin.loader import list_effects, load_plugins
 from femubench.core.run.store import Store
 from femubench.core.score.scoring import score_model
 from femubench.effect import textbook_model
 from femubench.fem import Section
 from femubench.results import run_from_json, run_to_json
-from tests.test_cli import put_distribution
+from tests.command import call_bench
 
 EFFECTS = list_effects()
 
@@ -112,7 +111,7 @@ def test_no_plugin_moves_what_all_are_measured_against(
 ) -> None:
     plain = femubench.rank("frame", "unchanged", jobs=1).meta["reference"]
     monkeypatch.syspath_prepend(tmp_path)
-    put_distribution(tmp_path, "lead", OUTSIDER)
+    install_module(tmp_path, "lead", OUTSIDER)
     assert "lead-filling" in load_plugins().effects
     assert femubench.rank("frame", "unchanged", jobs=1).meta["reference"] == plain
 
@@ -140,6 +139,5 @@ def test_who_is_not_applicable_counts_as_who_leaves_the_model_as_it_is(tmp_path:
 
 
 def test_a_locked_run_takes_no_start_of_its_own() -> None:
-    locked = CliRunner().invoke(bench, ["run", "--locked", "x", "--nominal", "textbook"])
-    assert locked.exit_code == 2
+    locked = call_bench("run", "--locked", "x", "--nominal", "textbook", code=2)
     assert "nominal cannot be given with it" in locked.output

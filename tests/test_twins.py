@@ -12,13 +12,11 @@ import harness_toys as toys
 import numpy as np
 import pytest
 import scored
-from click.testing import CliRunner
 from twin_toys import Chance, Drawn, Memory
 
 import femubench
 from femubench.core.case.case import Case
 from femubench.core.case.reader import read_case
-from femubench.core.cli.main import bench
 from femubench.core.errors import InputError, NotApplicable
 from femubench.core.fem.frame import (
     Brace,
@@ -59,6 +57,7 @@ from femubench.core.twin.disguise import disguise_case
 from femubench.core.twin.similarity import Similarity, matrix_factors, similar_case, similar_frame
 from femubench.core.twin.twins import FAMILIES, Twin, again, twin_of, twins_of
 from femubench.core.typing import SparseArray
+from tests.command import call_bench
 
 BY = Similarity(length=1.3, modulus=0.7, density=1.4)
 COMPUTED = ["frame-solid", "suite/bracket", "suite/tower"]
@@ -442,6 +441,5 @@ def test_what_was_measured_has_no_twins(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="twins"):
         plan_run("frame", "unchanged", load_plugins(), {"twins": 101})
     for word in ("1:", "101"):
-        refused = CliRunner().invoke(bench, ["run", "frame", "--twins", word])
-        assert refused.exit_code == 2
+        refused = call_bench("run", "frame", "--twins", word, code=2)
         assert "no number of twins" in refused.output

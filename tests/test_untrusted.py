@@ -14,7 +14,6 @@ from itertools import product
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 from seeds import a_run, matrix_case, run_text, universal_case
 
 import femubench
@@ -22,12 +21,12 @@ from femubench import InputError, read_case
 from femubench.core.case import files, matrices as matrix_text
 from femubench.core.case.files import LARGEST_FILE, LARGEST_TEXT
 from femubench.core.case.reader import read_case as read_folder
-from femubench.core.cli.main import bench
 from femubench.core.schema import records as schema
 from femubench.core.schema.records import read_run, run_from_json
 from femubench.plugins.readers.universal import UniversalReader
 from femubench.reports.cells import plain
 from femubench.reports.markdown import escape
+from tests.command import call_bench
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("core", "papers", "plugins", "reports", "scenarios")
@@ -294,8 +293,7 @@ def test_broken_json(tmp_path: Path, text: str, what: str) -> None:
     (tmp_path / "run.json").write_text(text)
     with pytest.raises(InputError, match=what):
         read_run(tmp_path / "run.json")
-    answer = CliRunner().invoke(bench, ["report", str(tmp_path / "run.json")])
-    assert answer.exit_code == 2
+    answer = call_bench("report", tmp_path / "run.json", code=2)
     assert len(answer.output.splitlines()) == 1
 
 
@@ -312,8 +310,7 @@ def test_a_result_file_has_limits(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_a_pipe_for_a_result_file(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    answer = CliRunner().invoke(bench, ["report", str(tmp_path / "pipe")])
-    assert answer.exit_code == 2
+    answer = call_bench("report", tmp_path / "pipe", code=2)
     assert "pipe or a device" in answer.output
 
 
@@ -331,13 +328,12 @@ def test_a_name_neither_breaks_the_screen_nor_the_document(tmp_path: Path) -> No
     file = tmp_path / "run.json"
     file.write_text(json.dumps(data))
     for name in ("terminal", "markdown"):
-        answer = CliRunner().invoke(bench, ["report", str(file), "-f", name])
-        assert answer.exit_code == 0
+        answer = call_bench("report", file, "-f", name)
         assert all(line.isprintable() for line in answer.output.split("\n"))
         assert name == "terminal" or "<script" not in answer.output
         assert name == "terminal" or "![x](" not in answer.output
     words = ["report", str(file), "-f", "markdown", "-o", str(tmp_path / "out")]
-    assert CliRunner().invoke(bench, words).exit_code == 0
+    call_bench(*words)
     assert [path.parent.name for path in tmp_path.rglob("*.md")] == ["out"]
     assert plain(EVIL).isprintable()
     assert "<" not in escape(EVIL)

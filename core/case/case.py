@@ -12,7 +12,7 @@ from femubench.core.display import Shown, count_noun, modes_line
 from femubench.core.fem.alteration import Alteration, alter_model
 from femubench.core.fem.frame import GroundSpring, Place, PointMass
 from femubench.core.fem.model import Model
-from femubench.core.modal.eigen import DENSE_LIMIT, once_for
+from femubench.core.modal.eigen import DENSE_LIMIT, keep_last
 from femubench.core.modal.frf import FrequencyResponses, ResponseSplit
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray
@@ -57,13 +57,13 @@ class Modification:
             NotApplicable: where members are to be taken of matrices.
         """
 
-        def make() -> tuple[Modification, Model]:
+        def make() -> Model:
             attached = model.attach(self.masses, self.springs)
-            return self, alter_model(attached, self.alteration) if self.alteration else attached
+            return alter_model(attached, self.alteration) if self.alteration else attached
 
-        # A small one is kept with all that follows from it, and this object with its number.
+        # A small one is kept with all that follows from it.
         few = model.size <= DENSE_LIMIT
-        return (once_for(model, ("with", id(self)), make) if few else make())[1]
+        return keep_last(model, ("with", id(self)), self, make) if few else make()
 
 
 @dataclass(frozen=True)

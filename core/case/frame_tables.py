@@ -35,11 +35,7 @@ def columns_of(key: str) -> tuple[str, ...]:
 
 
 class FrameTables:
-    """The tables that a `case.toml` names, put in the place of its lists of joints and members.
-
-    Arguments:
-        files: of the case.
-    """
+    """The tables that a `case.toml` names, put in the place of its lists of joints and members."""
 
     def __init__(self, files: CaseFiles) -> None:
         self.files = files

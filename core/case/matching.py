@@ -216,9 +216,6 @@ class Placement:
     def check_apart(self, found: Sequence[tuple[Match, str]]) -> None:
         """Check that no two sensors of different places went to one place and direction.
 
-        Arguments:
-            found: every match and its direction.
-
         Raises:
             Misfit: naming both sensors and the place.
         """

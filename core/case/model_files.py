@@ -111,11 +111,6 @@ def further_files(path: Path, readers: Sequence[Reader]) -> tuple[Path, ...]:
 def remarks_of(spec: FileSpec, files: CaseFiles, readers: Sequence[Reader]) -> tuple[str, ...]:
     """Return what the reader of a model took otherwise than it stands in the file.
 
-    Arguments:
-        spec: of a case whose model has been read.
-        files: of the case.
-        readers: reader plugins.
-
     Raises:
         InputError: for what is wrong in the file.
     """

@@ -29,10 +29,6 @@ def in_si(model: Model, unit: LengthUnit) -> Model:
     The force is N (or lbf with in and ft) and the time s, so that the mass is N s2 / unit: with
     mm this is the system of tonnes and MPa. With T, 1 / unit for translations and 1 for
     rotations, and the energy e = force times unit in J, K is e T K T and M e T M T.
-
-    Arguments:
-        model: in the units of its file.
-        unit: of its lengths.
     """
     return _converted(model, METRES[unit], NEWTONS[unit])
 

@@ -93,18 +93,8 @@ _SAME_MATRIX = 1e-9  # of the diagonal: far above rounding, far below any change
 
 
 _SETTINGS = (
-    *(
-        "name",
-        "title",
-        "source",
-        "structure",
-        "used",
-        "held_out",
-        "band",
-        "reference_used",
-        "split",
-    ),
-    *("tolerance", "model_error", "beam_share"),
+    *("name", "title", "source", "structure", "used", "held_out", "band", "reference_used"),
+    *("split", "tolerance", "model_error", "beam_share"),
 )
 
 
@@ -354,7 +344,7 @@ def _model_part(
     The tables of members as modifications exchange them come last, in the order of these.
     """
     model = case.model
-    if model.structure is not None and not _matrices_changed(model):
+    if model.structure is not None and model.has_matrices(*model.structure.matrices()):
         frame = describe_frame(model.structure)
         keys, exchanged = frame_keys(frame, known, _exchanged_members(frame, case))
         return keys, frame_files(_model_of(frame)), case.modifications, exchanged
@@ -405,10 +395,3 @@ def _at_nodes(item: Modification, model: Model) -> Modification:
     springs = tuple(replace(spring, at=places[spring.at]) for spring in item.springs)
     supports = tuple(replace(support, at=places[support.at]) for support in own.supports)
     return replace(item, masses=masses, springs=springs, alteration=Alteration(supports))
-
-
-def _matrices_changed(model: Model) -> bool:
-    """Tell whether the matrices of a frame model are others than those of its frame."""
-    if model.mass_change is not None or model.stiffness_change is not None:
-        return True
-    return not model.has_matrices(*model.frame_structure.matrices())

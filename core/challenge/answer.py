@@ -11,8 +11,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import InputError
 from femubench.core.files import MIB, read_text
-from femubench.core.roles import Side
 from femubench.core.schema.diagnosis import Verdict
+from femubench.core.typing import Side
 
 _AND = " + "
 _ROUNDING = 1e-6

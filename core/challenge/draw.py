@@ -12,7 +12,7 @@ from zlib import crc32
 import numpy as np
 
 from femubench.core.case.case import TOLERANCE, Case, Modification
-from femubench.core.challenge.measuring import QUALITY, Seen, add_mass, chi2, record, see
+from femubench.core.challenge.measuring import QUALITY, Ideal, add_mass, chi2, record, see
 from femubench.core.challenge.outside import OUTSIDE, SENSOR_FAULTS
 from femubench.core.challenge.structures import Specimen, structure_named
 from femubench.core.challenge.truth import (
@@ -66,7 +66,7 @@ class Candidate:
         """Return the model of the frame."""
         return Model.of(self.frame)
 
-    def observe(self, model: Model, specimen: Specimen) -> Seen:
+    def observe(self, model: Model, specimen: Specimen) -> Ideal:
         """Return what the sensors show of a model."""
         seen = see(model, specimen)
         if self.sensors is None:
@@ -75,7 +75,7 @@ class Candidate:
 
 
 @lru_cache(maxsize=16)
-def _clean(structure: str) -> Seen:
+def _clean(structure: str) -> Ideal:
     """Return what an ideal test sees of the structure without any fault, on the finer mesh."""
     specimen = structure_named(structure)
     return see(Model.of(finer(specimen.frame)), specimen)
@@ -108,7 +108,7 @@ class Candidates:
     scatter_words: np.random.SeedSequence
 
     @property
-    def clean(self) -> Seen:
+    def clean(self) -> Ideal:
         """Return what an ideal test sees of the structure without any fault."""
         return _clean(self.specimen.name)
 
@@ -209,7 +209,7 @@ class Candidates:
             seen, self.specimen, self.kind, quality.used, None, shapes_up_to=quality.shapes
         )
 
-    def check(self, seen: Seen) -> None:
+    def check(self, seen: Ideal) -> None:
         """Refuse an absurd truth.
 
         Raises:
@@ -262,12 +262,7 @@ _WEIGHED = 0.5  # share of cases with a known mass, where there are shapes
 
 @dataclass(frozen=True)
 class BlindCase:
-    """A case and what it hides.
-
-    Arguments:
-        case: what may be shown.
-        truth: what may not.
-    """
+    """A case and what it hides."""
 
     case: Case
     truth: Truth
@@ -341,7 +336,9 @@ def draw_case(
     return BlindCase(case, truth)
 
 
-def _accepted(candidates: Candidates, hidden: Hidden, effect: str | None) -> tuple[Candidate, Seen]:
+def _accepted(
+    candidates: Candidates, hidden: Hidden, effect: str | None
+) -> tuple[Candidate, Ideal]:
     """Return the first sensible truth and what an ideal test sees of it."""
     draws: dict[Hidden, Callable[[], Candidate]] = {
         "none": candidates.nothing,
@@ -361,7 +358,7 @@ def _accepted(candidates: Candidates, hidden: Hidden, effect: str | None) -> tup
     raise FemubenchError(f"no sensible truth in {_ATTEMPTS} draws of {what}")
 
 
-def _case(candidates: Candidates, drawn: Candidate, seen: Seen, rng: np.random.Generator) -> Case:
+def _case(candidates: Candidates, drawn: Candidate, seen: Ideal, rng: np.random.Generator) -> Case:
     """Return the case that the owner of the nominal model would have after the test."""
     specimen, kind, quality = candidates.specimen, candidates.kind, QUALITY[candidates.kind]
     count = quality.used + quality.held_out

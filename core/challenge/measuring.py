@@ -54,7 +54,7 @@ QUALITY: Mapping[DataKind, DataQuality] = {
 
 
 @dataclass(frozen=True)
-class Seen:
+class Ideal:
     """What an ideal test sees of a model.
 
     Arguments:
@@ -68,7 +68,7 @@ class Seen:
     mass: float
 
 
-def see(model: Model, specimen: Specimen) -> Seen:
+def see(model: Model, specimen: Specimen) -> Ideal:
     """Return the elastic modes of a model at the measuring points of a specimen.
 
     The points sit on joints and members, wherever these are in this model.
@@ -84,7 +84,7 @@ def see(model: Model, specimen: Specimen) -> Seen:
         raise ModelError("the structure is a mechanism")
     rows = _reading_rows(model, specimen)
     readings = np.asarray(rows @ elastic.shapes[:, :MODES])
-    return Seen(elastic.natural_frequencies[:MODES], readings, model.total_mass)
+    return Ideal(elastic.natural_frequencies[:MODES], readings, model.total_mass)
 
 
 def _reading_rows(model: Model, specimen: Specimen) -> SparseArray:
@@ -100,7 +100,7 @@ def _reading_rows(model: Model, specimen: Specimen) -> SparseArray:
 
 
 def record(
-    seen: Seen,
+    seen: Ideal,
     specimen: Specimen,
     kind: DataKind,
     count: int,
@@ -152,7 +152,7 @@ def add_mass(measurement: Measurement, mass: float, rng: np.random.Generator) ->
     return replace(measurement, total_mass=(value, MASS_STD * value))
 
 
-def chi2(measurement: Measurement, seen: Seen) -> float:
+def chi2(measurement: Measurement, seen: Ideal) -> float:
     """Return the squared residuals of a model in standard deviations, modes paired by them."""
     data = Data(measurement, np.zeros(0))
     readings = seen.readings if len(measurement.sensors) else seen.readings[:0]

@@ -159,13 +159,7 @@ def size_errors(truth: KnownCase, record: Record, same: Same) -> tuple[SizeError
 
 
 def judge_by_truth(truth: KnownCase, answer: Answer, same: Same) -> Judgement:
-    """Judge an answer to a truth from outside.
-
-    Arguments:
-        truth: what is wrong.
-        answer: what is said.
-        same: whether two places are one.
-    """
+    """Judge an answer to a truth from outside."""
     record = record_of(answer)
     said = outcome(truth, record, same)
     right = counts_as_right(truth, said)

@@ -57,10 +57,6 @@ def seal(truth: Truth | GivenTruth, nonce: str | None = None) -> tuple[str, str]
 def unseal(text: str, file: Path | None = None) -> tuple[Truth | GivenTruth, str]:
     """Return the truth of a sealed file and the commitment that it keeps.
 
-    Arguments:
-        text: of the file.
-        file: for messages.
-
     Raises:
         InputError: when it is no sealed truth, or was changed after it was sealed.
     """

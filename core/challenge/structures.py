@@ -18,8 +18,8 @@ from femubench.core.fem.frame import (
     Place,
     PointMass,
     Support,
-    Vector,
 )
+from femubench.core.fem.mesh import place_xyz
 from femubench.core.fem.model import Model
 from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
@@ -59,21 +59,9 @@ class Specimen:
         return sensors_on(self.frame, self.points)
 
 
-def position(frame: Frame, place: Place) -> Vector:
-    """Return where a place of a frame lies, in m."""
-    if place.joint is not None:
-        return frame.joint(place.joint).xyz
-    assert place.member is not None
-    assert place.s is not None
-    ends = frame.members[frame.member_index[place.member]].ends
-    first, second = (np.array(frame.joint(name).xyz) for name in ends)
-    x, y, z = (float(v) for v in (1.0 - place.s) * first + place.s * second)
-    return x, y, z
-
-
 def sensors_on(frame: Frame, points: Mapping[str, tuple[Place, str]]) -> Sensors:
     """Return the measuring points on a frame, which may differ from the nominal one."""
-    xyz = np.array([position(frame, place) for place, _ in points.values()])
+    xyz = np.array([place_xyz(frame, place) for place, _ in points.values()])
     return Sensors(tuple(points), xyz, tuple(direction for _, direction in points.values()))
 
 

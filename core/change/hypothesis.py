@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import product
 
 import numpy as np
@@ -15,9 +15,9 @@ from femubench.core.change.tabulated import change_of, place_change
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import (
     enough_modes,
+    keep_last,
     loose_motions,
     modes_of,
-    once_for,
     zero_tolerance,
 )
 from femubench.core.roles import Effect, EffectParameter
@@ -33,7 +33,7 @@ _SIZES, _FREQUENCIES = (0.3, 1.5), 15
 _ALWAYS = 1e-6  # of a factor, from which on what is there at x = 0 counts
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Hypothesis:
     """An effect at a place.
 
@@ -46,6 +46,9 @@ class Hypothesis:
     effect: Effect
     change: Change
     places: int
+
+    def __repr__(self) -> str:
+        return f"{self.effect.name} at {self.place}"
 
     @property
     def place(self) -> str:
@@ -241,14 +244,11 @@ def _offered(
     model: Model, effects: Iterable[Effect], damage: float
 ) -> list[tuple[Hypothesis, bool]]:
     """Return every effect at every place, and whether it holds what is known to hang free."""
-    kept: dict[str, tuple[Effect, list[tuple[Hypothesis, bool]]]]
-    kept = once_for(model, ("hypotheses", damage), dict)
     found: list[tuple[Hypothesis, bool]] = []
     for effect in effects:
         # One of a name: every look for plugins makes effects anew.
-        if effect.name not in kept or kept[effect.name][0] is not effect:
-            kept[effect.name] = effect, _placed(model, effect, damage)
-        found += kept[effect.name][1]
+        key, make = ("hypotheses", effect.name, damage), partial(_placed, model, effect, damage)
+        found += keep_last(model, key, effect, make)
     return found
 
 

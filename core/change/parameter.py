@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from femubench.core.roles import Scaling, Wording
+from femubench.core.roles import Scaling
+from femubench.core.typing import Wording
 
 _NOTHING = -1.0 + 1e-12  # a factor is positive
 

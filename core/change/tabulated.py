@@ -9,7 +9,6 @@ from itertools import product
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.core import roles
 from femubench.core.change.change import Change
 from femubench.core.change.interpolation import ChebyshevPoints
 from femubench.core.change.terms import Term
@@ -110,7 +109,7 @@ def _within(parameter: EffectParameter) -> tuple[float, float]:
     return (max(low, 1e-6), high) if parameter.scaling == "compliance" else (low, high)
 
 
-def _difference(model: Model, extended: roles.Model) -> tuple[SparseArray, SparseArray]:
+def _difference(model: Model, extended: Model) -> tuple[SparseArray, SparseArray]:
     """Return what the extended model adds to mass and stiffness on the nominal dofs."""
     mass, stiffness = extended.mass, extended.stiffness
     old, new = model.structure, extended.structure
@@ -127,15 +126,11 @@ def _condensed(
     """Return both matrices on some dofs, the others following statically (Guyan 1965)."""
     rest = np.setdiff1d(np.arange(mass.shape[0]), keep)
     k = sp.csr_array(stiffness)
-    pick = sp.csr_array(
-        (np.ones(len(keep)), (keep, np.arange(len(keep)))), shape=(k.shape[0], len(keep))
-    )
+    unit = sp.eye_array(k.shape[0], format="csr")
+    pick = unit[:, keep]
     if len(rest) == 0:
         return sp.csr_array(pick.T @ mass @ pick), sp.csr_array(pick.T @ k @ pick)
     inner, cross = k[rest][:, rest], k[rest][:, keep]
     follow = -sp.csr_array(LU(inner, pivot=0.01).solve(cross.toarray()))
-    place = sp.csr_array(
-        (np.ones(len(rest)), (rest, np.arange(len(rest)))), shape=(k.shape[0], len(rest))
-    )
-    expand = pick + place @ follow
+    expand = pick + unit[:, rest] @ follow
     return sp.csr_array(expand.T @ mass @ expand), sp.csr_array(expand.T @ k @ expand)

@@ -148,11 +148,7 @@ def address_space() -> int:
 
 
 def object_frames(sent: object) -> Iterator[bytes | memoryview]:
-    """Yield the bytes by which `read_object` reads an object; a `PickleBuffer` in it is not copied.
-
-    Arguments:
-        sent: can be pickled.
-    """
+    """Yield the bytes by which `read_object` reads an object; no `PickleBuffer` in it is copied."""
     buffers: list[pickle.PickleBuffer] = []
     whole = pickle.dumps(sent, protocol=5, buffer_callback=buffers.append)
     parts = [memoryview(whole), *(buffer.raw() for buffer in buffers)]

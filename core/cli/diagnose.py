@@ -94,8 +94,9 @@ def diagnose(
     with a case.toml. Held-out modes and design changes only judge the outcome.
     """
     plugins = plugins_for(ctx)
-    if report_file is not None:
-        _check_report(report_file)
+    if report_file is not None and report_file.suffix.lower() not in _STYLES:
+        expected = f"a name with {' or '.join(_STYLES)}"
+        raise InputError("does not say its format", file=report_file, expected=expected)
     if output is not None:
         check_new(output)
     names = None if effects is None else [word.strip() for word in effects.split(",")]
@@ -133,17 +134,6 @@ def diagnose(
     if output is not None and written is None:
         what = f"the verdict is {found.verdict!r}: nothing was written to {output}"
         click.echo(f"bench: {' '.join(what.split())}", err=True)
-
-
-def _check_report(file: Path) -> None:
-    """Make sure that the suffix of a report says its format, and that it can be written.
-
-    Raises:
-        InputError: otherwise.
-    """
-    if file.suffix.lower() not in _STYLES:
-        known = " or ".join(_STYLES)
-        raise InputError("does not say its format", file=file, expected=f"a name with {known}")
 
 
 def _fault(found: Diagnosis, folder: Path) -> Exception | None:

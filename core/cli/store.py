@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,7 +30,7 @@ def _open(folder: Path | None) -> Store:
     from femubench.core.library.rank import store_in
 
     found = store_in(folder)
-    if not (found.files or found.old_files):
+    if not found.files:
         expected = "a run stored by `bench run`"
         raise InputError("no results", file=found.folder, expected=expected)
     return found
@@ -45,14 +44,10 @@ def check(ctx: click.Context, store: Path | None) -> None:
 
     A fault is one line: file, number of the record, what is wrong.
     """
-    from femubench.core.run.upkeep import find_store_faults
-
     kept = _open(store)
-    faults = find_store_faults(kept)
+    faults = kept.faults()
     for fault in faults:
         click.echo(fault)
-    for note in kept.notes_of_old_files():
-        click.echo(note)
     runs = count_noun(len(kept.runs()), "run")
     click.echo(harmless(f"{kept.folder}: {runs}, {count_noun(len(faults), 'fault')}"))
     ctx.exit(int(bool(faults)))
@@ -63,31 +58,20 @@ def check(ctx: click.Context, store: Path | None) -> None:
 def repair(store: Path | None) -> None:
     """Leave out what is damaged, so that `bench run --resume` computes it again.
 
-    A damaged file is kept as RUN.sqlite.damaged. Runs of an earlier version are converted. A file
-    without any record of a run is left alone.
+    A damaged file is kept as RUN.sqlite.damaged. A file without any record of a run is left alone.
     """
     kept, line = _open(store), ""
-    for line in _repaired(kept):
-        click.echo(harmless(line))
-    if not line:
-        click.echo(harmless(f"{kept.folder}: nothing to repair"))
-
-
-def _repaired(kept: Store) -> Iterator[str]:
-    """Convert and repair the files of a store; yield a line for each."""
-    from femubench.core.run.upkeep import convert_old_files
-
-    for file, (records, lost) in convert_old_files(kept).items():
-        found = f"{count_noun(records, 'record')} converted, {count_noun(len(lost), 'fault')}"
-        yield f"{file}: {found}"
-    for file in sorted(kept.folder.glob("*.jsonl")):
-        yield f"{file}: not of an earlier version, left alone"
     for file in kept.files:
         with kept.exclusive(file.stem):
             faults, copy = kept.repair(file.stem)
         if copy is not None:
             out = sum(fault.line is not None for fault in faults)
             found = f"{count_noun(len(faults), 'fault')}, {count_noun(out, 'record')} left out"
-            yield f"{file}: {found}, as it was in {copy.name}"
+            line = f"{file}: {found}, as it was in {copy.name}"
         elif faults:
-            yield f"{faults[0]}: no record of a run, left alone"
+            line = f"{faults[0]}: no record of a run, left alone"
+        else:
+            continue
+        click.echo(harmless(line))
+    if not line:
+        click.echo(harmless(f"{kept.folder}: nothing to repair"))

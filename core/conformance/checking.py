@@ -34,12 +34,7 @@ _SOURCES = (strategy_checks, effect_checks, other_checks)
 
 @dataclass(frozen=True)
 class Subject:
-    """A plugin that is checked.
-
-    Arguments:
-        role, name: what it is and what it is called.
-        bench: where it is tried.
-    """
+    """A plugin that is checked."""
 
     role: Role
     name: str

@@ -26,8 +26,9 @@ from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
 from femubench.core.look.modes import Seen
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.roles import Effect, EffectParameter, Wording
+from femubench.core.roles import Effect, EffectParameter
 from femubench.core.schema.diagnosis import LookWarning
+from femubench.core.typing import Wording
 from femubench.core.update.strategy import UpdateResult
 
 _PROBLEMS = (

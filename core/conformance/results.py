@@ -12,12 +12,12 @@ import scipy.sparse as sp
 from femubench.core.conformance.fingerprints import fingerprint, first_difference
 from femubench.core.conformance.problems import UpdatingProblem
 from femubench.core.errors import FemubenchError
-from femubench.core.fem.model import LowRank, Model
+from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import enough_modes, solve_modes, zero_tolerance
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.run.answers import pack_outcome, read_report, unpack_outcome
 from femubench.core.run.jobs import JobOutcome, one_line
-from femubench.core.run.model_checks import check_model
+from femubench.core.run.model_checks import check_model, check_numbers, check_sizes
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.score.scoring import frequency_error, predict_block
 from femubench.core.update.promise import USED_ERROR, eigenvalue_rounding
@@ -47,45 +47,24 @@ Look = Callable[[Given], str | None]
 
 def sizes(given: Given) -> str | None:
     """Return what is wrong with the kinds and sizes of the matrices."""
-    model, nominal = given.result.model, given.problem.model
-    size = len(model.dofs)
-    own = model.structure is not None and model.structure.kinematics.transform.shape[1] == size
-    if size != nominal.size and not own:
-        return f"the updated model has {size} degrees of freedom, expected {nominal.size}"
-    for name in ("mass", "stiffness"):
-        matrix, change = getattr(model, name), getattr(model, f"{name}_change")
-        if not sp.issparse(matrix):
-            return f"{name} is {type(matrix).__name__}, expected a sparse array"
-        if tuple(matrix.shape) != (size, size):
-            return f"{name} has shape {tuple(matrix.shape)}, expected {(size, size)}"
-        if change is None:
-            continue
-        if not isinstance(change, LowRank):
-            return f"{name}_change is {type(change).__name__}, expected LowRank"
-        basis, core = np.shape(change.basis), np.shape(change.core)
-        if len(basis) != 2 or basis[0] != size or core != (basis[1], basis[1]):
-            wanted = f"({size}, p) and (p, p)"
-            return f"{name}_change has shapes {basis} and {core}, expected {wanted}"
-    return None
+    return _fault(check_sizes, given.result.model, given.problem.model)
 
 
 def finite(given: Given) -> str | None:
     """Return which matrix has entries that are no finite real numbers."""
-    for name, numbers in _numbers(given.result.model):
-        if numbers.dtype.kind not in "fiu":
-            return f"{name} has entries of type {numbers.dtype}, expected real numbers"
-        bad = int(np.count_nonzero(~np.isfinite(numbers)))
-        if bad:
-            return f"{name} has {bad} entries that are not finite, expected none"
-    return None
+    return None if sizes(given) else _fault(check_numbers, given.result.model)
 
 
 def symmetric(given: Given) -> str | None:
     """Return which matrix is not symmetric, as the harness sees it."""
     if sizes(given) or finite(given):
         return None
+    return _fault(check_model, given.result.model, given.problem.model)
+
+
+def _fault(check: Callable[..., None], *models: Model) -> str | None:
     try:
-        check_model(given.result.model, given.problem.model)
+        check(*models)
     except FemubenchError as error:
         return str(error)
     return None
@@ -248,16 +227,6 @@ def faults_of(given: Given) -> dict[str, str]:
         if fault:
             found[name] = " ".join(fault.split())
     return found
-
-
-def _numbers(model: Model) -> Iterator[tuple[str, np.ndarray[Any, Any]]]:
-    for name in ("mass", "stiffness"):
-        matrix, change = getattr(model, name), getattr(model, f"{name}_change")
-        if sp.issparse(matrix):
-            yield name, sp.coo_array(matrix).data
-        if isinstance(change, LowRank):
-            yield f"{name}_change.basis", np.asarray(change.basis)
-            yield f"{name}_change.core", np.asarray(change.core)
 
 
 def _figures(result: UpdateResult) -> Iterator[tuple[str, object]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import log
 
 import numpy as np
@@ -24,7 +24,7 @@ from femubench.core.inference.effort import Effort
 from femubench.core.inference.examine import Examination
 from femubench.core.inference.posterior import Explanation, Posterior
 from femubench.core.inference.settings import settings
-from femubench.core.modal.eigen import enough_modes, modes_of, once_for
+from femubench.core.modal.eigen import enough_modes, keep_last, modes_of
 from femubench.core.modal.measurement import Measurement
 from femubench.core.schema.diagnosis import Gain, States
 from femubench.core.schema.results import Block
@@ -245,10 +245,6 @@ def predict_left_out(posterior: Posterior, leader: Explanation) -> Unseen:
     In closed form: every explanation is linear in its causes nearby, and is weighed anew without
     the frequency and the shape of the mode, so that these have no part in what predicts it.
 
-    Arguments:
-        posterior: all explanations of all used modes.
-        leader: one with the name.
-
     Source: Sundararajan & Keerthi (2001), Neural Computation 13, 1103-1118, for leaving out in
     closed form.
     """
@@ -351,25 +347,16 @@ def gain_of(before: Blocks, after: Blocks, crossed: Unseen | None) -> Gain:
     return Gain(used, pair("higher"), pair("modified"), cross)  # type: ignore[arg-type]
 
 
-def extend_by(model: Model, explanation: Explanation, x: FloatArray | None = None) -> Model:
+def extend_by(model: Model, explanation: Explanation) -> Model:
     """Return the model with textbook effects and causes in it.
-
-    Arguments:
-        model: the nominal model.
-        explanation: base and causes.
-        x: coordinates of the causes, taken within their bounds, (p,); None for the fitted ones.
 
     Examples:
         >>> diagnosis.extend_by(model, examination.best).size == model.size
         True
     """
-    if x is not None:
-        return _extended(model, explanation, np.clip(x, *bounds_of(explanation.parts)))
     # The last one alone: an explanation holds all that it was fitted with.
-    kept: dict[str, tuple[Explanation, Model]] = once_for(model, "extended by", dict)
-    if "last" not in kept or kept["last"][0] is not explanation:
-        kept["last"] = explanation, _extended(model, explanation, explanation.fit.state.x)
-    return kept["last"][1]
+    make = partial(_extended, model, explanation, explanation.fit.state.x)
+    return keep_last(model, "extended by", explanation, make)
 
 
 def _extended(model: Model, explanation: Explanation, x: FloatArray) -> Model:
@@ -430,15 +417,7 @@ def holds(
     model: Model,
     unseen: Sequence[Unseen],
 ) -> bool:
-    """Tell whether unseen data get no worse by an explanation.
-
-    Arguments:
-        case: what holds them.
-        examination: what the explanation was weighed in.
-        explanation: base and causes.
-        model: with the explanation in it.
-        unseen: its errors.
-    """
+    """Tell whether unseen data get no worse by an explanation."""
     if all(part.holds for part in unseen):
         return True
     if not explanation.parts or not case.modifications:

@@ -43,9 +43,6 @@ def scatter_rows(state: State) -> tuple[Scatter, ...]:
 
     All data together are warned of where no kind by itself is; of too little only where somebody
     has measured the scatter.
-
-    Arguments:
-        state: after the fit.
     """
     known = [row for kind in get_args(Kind) if (row := scatter_of(state, kind)) is not None]
     assumed = state.problem.data.measurement.assumed

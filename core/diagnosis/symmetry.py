@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from femubench.core.drawing.places import PlacedWireframe, find_wireframe
 from femubench.core.fem.model import Model
 from femubench.core.inference.settings import settings
-from femubench.core.typing import FloatArray, SparseArray
+from femubench.core.typing import FloatArray
 
 
 def symmetries(model: Model) -> tuple[FloatArray, ...]:
@@ -30,13 +30,7 @@ def symmetries(model: Model) -> tuple[FloatArray, ...]:
 
 
 def mirror_places(model: Model, place: str, others: Iterable[str]) -> tuple[str, ...]:
-    """Return those of some places that are images of one place.
-
-    Arguments:
-        model: whose symmetry counts.
-        place: word of a place.
-        others: words of places.
-    """
+    """Return those of some places that are images of one place."""
     words = tuple(others)
     wireframe = find_wireframe(model, (place, *words))
     extents = {word: _extent(wireframe, word) for word in (place, *words)}
@@ -75,12 +69,11 @@ def _leaves(model: Model, turn: FloatArray) -> bool:
     sign = np.einsum("ij,ij->i", turned, motions[image])
     if (np.abs(np.abs(sign) - 1.0) > settings.negligible).any():
         return False
-    return all(_unmoved(matrix, image, sign) for matrix in (model.stiffness, model.mass))
-
-
-def _unmoved(matrix: SparseArray, image: FloatArray, sign: FloatArray) -> bool:
-    moved = matrix.tocsr()[image][:, image].multiply(sign[:, None]).multiply(sign[None])
-    return bool(abs(moved - matrix).max() <= settings.negligible * abs(matrix).max())
+    for matrix in (model.stiffness, model.mass):
+        moved = matrix.tocsr()[image][:, image].multiply(sign[:, None]).multiply(sign[None])
+        if not abs(moved - matrix).max() <= settings.negligible * abs(matrix).max():
+            return False
+    return True
 
 
 def _extent(wireframe: PlacedWireframe, word: str) -> FloatArray:

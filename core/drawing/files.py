@@ -6,6 +6,7 @@ import base64
 import json
 import re
 import time
+import zlib
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -20,17 +21,16 @@ from femubench.core.errors import InputError, OutputError
 from femubench.core.files import read_bytes, write_atomically
 from femubench.core.schema.bounds import Real
 from femubench.core.schema.records import parse_json, to_plain
-from femubench.core.schema.sealing import TAIL, is_whole, seal, sum_of
 from femubench.core.schema.validation import read_plain
 
 FOLDER = "exhibits"
 MOST_BYTES = 4 * 2**20
 _CASE = "structure-"
-_SCHEMA = 2  # of 1 there were no checksums
-_HEAD = b'{"schema":2,'
+_SCHEMA = 2
 _KEY = re.compile(r"[0-9a-f]{8,64}")
 _MOST = 20_000
 _STALE = 60.0  # s; a file is written in a fraction of one
+_TAIL = len(b',"sum":"01234567"}')  # what `_seal` ends a file with
 
 _Row = Annotated[list[Real | None], Meta(max_length=_MOST)]
 _Hertz = Annotated[list[Real], Meta(max_length=_MOST)]
@@ -108,11 +108,7 @@ class _CaseDrawing(Wireframe):
 
 
 class Exhibits:
-    """What is drawn of the cases and jobs of a store.
-
-    Arguments:
-        folder: of the store.
-    """
+    """What is drawn of the cases and jobs of a store."""
 
     def __init__(self, folder: Path) -> None:
         self.store, self._folder = folder, folder / FOLDER
@@ -177,19 +173,24 @@ class Exhibits:
         with suppress(OSError, OutputError, ValueError):
             plain = {"schema": _SCHEMA, **data}
             text = json.dumps(plain, allow_nan=False, separators=(",", ":"))
-            if len(text) > MOST_BYTES - TAIL:
+            if len(text) > MOST_BYTES - _TAIL:
                 return
             self._folder.mkdir(parents=True, exist_ok=True)
-            write_atomically(path, seal(text.encode()))
+            write_atomically(path, _seal(text.encode()[:-1]))
+
+
+def _seal(body: bytes) -> bytes:
+    """Return a table of JSON without its last bracket, closed with its own checksum."""
+    return body + b',"sum":"%08x"}' % zlib.crc32(body)
 
 
 def _whole(path: Path) -> bytes:
-    """Return the content of a file; one of an earlier version has no checksum.
+    """Return the content of a file.
 
     Raises:
         InputError: when it is not as it was written.
     """
     content = read_bytes(path, MOST_BYTES)
-    if not is_whole(content) and (content.startswith(_HEAD) or sum_of(content)):
+    if content != _seal(content[:-_TAIL]):
         raise InputError("damaged", file=path, expected="the picture that was written")
     return content

@@ -53,12 +53,7 @@ class Finding(DrawnPlace):
 
 
 def causes_found(data: Data, structure: PlacedWireframe) -> list[Finding]:
-    """Return the causes of a diagnosis where they sit, and the faults of its data.
-
-    Arguments:
-        data: the JSON of the diagnosis.
-        structure: with the places of the causes.
-    """
+    """Return the causes of a diagnosis where they sit, and the faults of its data."""
     found = []
     for number, cause in enumerate(data["causes"], 1):
         place, fault = structure.place(cause["place"]), cause.get("side", "model") != "model"

@@ -6,11 +6,12 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from femubench.core.case.case import Case, Modification
+from femubench.core.case.case import Case
 from femubench.core.drawing.element_change import difference_picture, relative_changes
 from femubench.core.drawing.files import Exhibits
 from femubench.core.drawing.findings import changes_found
@@ -19,7 +20,7 @@ from femubench.core.drawing.wireframe import MOST_NODES, node_positions, wirefra
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.correlation import mac, modal_scale_factor
-from femubench.core.modal.eigen import Modes, modes_of, once_for
+from femubench.core.modal.eigen import Modes, keep_last, modes_of
 from femubench.core.modal.frf import modal_sum, receptance
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import Pairing, pair_measured
@@ -61,11 +62,6 @@ def exhibit_of(
 ) -> dict[str, Any] | None:
     """Return what a model predicts, in plain data.
 
-    Arguments:
-        case: what it is compared with.
-        model: an updated model of the case.
-        parameters: of the update, as a result has them.
-
     Returns None for a model that is too large to draw.
 
     Raises:
@@ -106,16 +102,9 @@ def _structures(case: Case, model: Model) -> Iterator[tuple[str, Model, Measurem
     """Yield the structure as tested (``""``) and with every modification, and what was measured."""
     yield "", model, case.measurement.select((*case.used, *case.held_out))
     for change in case.modifications:
-        yield change.name, _attached(model, change), change.measurement
-
-
-def _attached(model: Model, change: Modification) -> Model:
-    """Return a modified structure, the same one every time, so that it is solved once."""
-
-    def make() -> tuple[Modification, Model]:
-        return change, change.modify(model)
-
-    return once_for(model, ("attached", id(change)), make)[1]
+        # The same one every time, so that it is solved once.
+        own = keep_last(model, ("attached", id(change)), change, partial(change.modify, model))
+        yield change.name, own, change.measurement
 
 
 def _modes(case: Case, model: Model, nodes: IntArray | None = None) -> dict[str, Any]:
@@ -381,12 +370,7 @@ def _unit(shape: FloatArray) -> FloatArray:
 
 
 def keep_drawings(exhibits: Exhibits, cases: Iterable[Case]) -> None:
-    """Keep what is drawn of cases and their nominal models; no picture is worth a run.
-
-    Arguments:
-        exhibits: of the store.
-        cases: those of a run.
-    """
+    """Keep what is drawn of cases and their nominal models; no picture is worth a run."""
     exhibits.tidy()
     for case in cases:
         if exhibits.has_case(case.digest):

@@ -32,11 +32,7 @@ _FEW = 4
 
 @dataclass(frozen=True)
 class ModelPlaces:
-    """The places of a model, a meshed frame or one that came as matrices, whose nodes are places.
-
-    Arguments:
-        model: any model.
-    """
+    """The places of a model, a meshed frame or one from matrices, whose nodes are places."""
 
     model: Model
 

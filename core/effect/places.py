@@ -49,11 +49,7 @@ def split_direction(place: str) -> tuple[str, str | None]:
 
 @dataclass(frozen=True)
 class Places:
-    """The places of a frame: which there are, and what their words stand for.
-
-    Arguments:
-        frame: any frame.
-    """
+    """The places of a frame: which there are, and what their words stand for."""
 
     APART: ClassVar[str] = APART
     FREE: ClassVar[str] = FREE

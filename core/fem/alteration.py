@@ -109,11 +109,7 @@ def alter_model(model: Model, alteration: Alteration) -> Model:
             raise NotApplicable(what)
         return _hold(model, alteration.supports)
     old, members = model.structure, [p for p in alteration.removed if isinstance(p, Member)]
-    if (members or alteration.exchanged) and (
-        model.mass_change is not None
-        or model.stiffness_change is not None
-        or not model.has_matrices(*old.matrices())
-    ):
+    if (members or alteration.exchanged) and not model.has_matrices(*old.matrices()):
         what = "the matrices were updated as a whole, in which no member can be taken or exchanged"
         raise NotApplicable(what)
     gone, frame = {member.name for member in members}, alter_frame(old.frame, alteration)
@@ -250,16 +246,13 @@ def _without_members(frame: Frame, gone: set[str]) -> Frame:
         raise ModelError("no member is left")
     pairs = [m.ends for m in members] + [b.ends for b in found.braces]
     pairs += [(link.leads, name) for link in found.links for name in link.follows]
-    bodies = sp.csgraph.connected_components(_graph(found, pairs), directed=False)[0]
+    ends = np.array([[found.joint_index[joint] for joint in pair] for pair in pairs])
+    shape = (len(found.joints), len(found.joints))
+    graph = sp.csr_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=shape)
+    bodies = sp.csgraph.connected_components(graph, directed=False)[0]
     if bodies > 1:
         raise ModelError("without it the structure falls apart")
     return found
-
-
-def _graph(frame: Frame, pairs: Sequence[tuple[str, str]]) -> SparseArray:
-    index, count = frame.joint_index, len(frame.joints)
-    ends = np.array([[index[one], index[other]] for one, other in pairs])
-    return sp.csr_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
 
 
 def _hold(model: Model, supports: Sequence[Support]) -> Model:

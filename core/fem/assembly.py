@@ -191,14 +191,9 @@ def narrow_indices(matrix: SparseArray) -> SparseArray:
     return found
 
 
-def prune(matrix: SparseArray, reference: SparseArray | None = None) -> SparseArray:
-    """Return the matrix without the entries that cancelled to roundoff.
-
-    Arguments:
-        matrix: sparse symmetric, (n, n).
-        reference: what sets the scale of a row; the matrix's own diagonal by default.
-    """
-    scale = np.sqrt(np.abs((matrix if reference is None else reference).diagonal()))
+def prune(matrix: SparseArray) -> SparseArray:
+    """Return a symmetric matrix without the entries that cancelled to roundoff, (n, n)."""
+    scale = np.sqrt(np.abs(matrix.diagonal()))
     whole = sp.csc_array(matrix)
     whole.sum_duplicates()
     column = np.repeat(np.arange(whole.shape[1]), np.diff(whole.indptr))

@@ -21,7 +21,7 @@ _Meshed = TypeVar("_Meshed", bound=MeshedFrame)
 # What follows from mesh and kinematics alone, so that it stays where no element is split.
 _OF_THE_MESH = (
     *("gather", "plan", "spring_rows", "labels", "spring_labels", "label_index"),
-    *("member_labels", "spring_index", "element_ends", "joint_ends", "active_local"),
+    *("place_index", "member_labels", "spring_index", "element_ends", "joint_ends", "active_local"),
 )
 
 

@@ -87,9 +87,7 @@ def _resolved(structure: MeshedFrame, parameters: Sequence[Property]) -> tuple[T
         if kind == _RIGID:
             found += _rigid_ends(structure, parameters, numbers)
             continue
-        positions = structure.spring_index if kind == _SPRING else structure.label_index
-        if kind != _SPRING and structure.half_index:
-            positions = {**positions, **structure.half_index}
+        positions = structure.spring_index if kind == _SPRING else structure.place_index
         places = [_places(parameters[p]) for p in numbers]
         named = list(chain.from_iterable(places))
         try:

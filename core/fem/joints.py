@@ -212,11 +212,7 @@ def _size(frame: Frame, member: Member, across: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class Joints:
-    """The joints of a meshed frame and the ends of members there, ``member@joint``.
-
-    Arguments:
-        structure: a meshed frame.
-    """
+    """The joints of a meshed frame and the ends of members there, ``member@joint``."""
 
     structure: Structure
 

@@ -143,9 +143,9 @@ class MeshedFrame:
         return _positions(self.labels)
 
     @cached_property
-    def half_index(self) -> dict[str, IntArray]:
-        """Return the elements of every half of a ``member/k`` that a factor of the frame is on."""
-        found = {}
+    def place_index(self) -> dict[str, IntArray]:
+        """Return the elements of every ``member/k``, and of halves that a factor is on."""
+        found = dict(self.label_index)
         for place in (place for factor in self.frame.factors for place in factor.at):
             element, half = split_half(place)
             if half and element in self.label_index:

@@ -208,7 +208,12 @@ class Model(Shown):
     def has_matrices(
         self, mass: SparseArray, stiffness: SparseArray, tolerance: float = 1e-12
     ) -> bool:
-        """Tell whether both matrices agree with the model's, to a share of their diagonals."""
+        """Tell whether both matrices are the model's, to a share of their diagonals.
+
+        They are not where a change of low rank comes on top of its own.
+        """
+        if self.mass_change is not None or self.stiffness_change is not None:
+            return False
         for own, other in ((self.mass, mass), (self.stiffness, stiffness)):
             if own.shape != other.shape:
                 return False

@@ -392,9 +392,6 @@ class GeometricStiffness:
 
     The stress is that of the frame as it is described: parameters set by `Structure.with_values`
     leave it alone.
-
-    Arguments:
-        structure: a meshed frame.
     """
 
     structure: MeshedFrame

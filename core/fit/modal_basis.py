@@ -137,10 +137,6 @@ class Space:
         In a mode of eigenvalue lambda the high coordinates are (lambda - Lambda)^-1 rows' g,
         whatever the size of the hypotheses, so that this at three lambdas spans what they do.
 
-        Arguments:
-            parts: the hypotheses.
-            count: number of modes that are asked for.
-
         Source: Grimme (1997), rational Krylov methods, for the span.
         """
         key = count, *map(id, parts)

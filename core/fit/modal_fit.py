@@ -44,10 +44,10 @@ class Problem:
     """
 
     model: Model
-    space: Space
-    data: Data
-    noise: Noise
-    offset: FloatArray | float = 0.0
+    space: Space = field(repr=False)
+    data: Data = field(repr=False)
+    noise: Noise = field(repr=False)
+    offset: FloatArray | float = field(default=0.0, repr=False)
     kept: dict[object, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
@@ -71,14 +71,14 @@ class State:
         raw: residuals in standard deviations of the measurement, (n_data,).
     """
 
-    problem: Problem
+    problem: Problem = field(repr=False)
     parts: tuple[Projection, ...]
     x: FloatArray
-    eigenvalues: FloatArray
-    vectors: FloatArray
-    partner: IntArray
+    eigenvalues: FloatArray = field(repr=False)
+    vectors: FloatArray = field(repr=False)
+    partner: IntArray = field(repr=False)
     mass: float
-    raw: FloatArray
+    raw: FloatArray = field(repr=False)
 
     @cached_property
     def residual(self) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -43,10 +43,10 @@ class Projection:
     """
 
     hypothesis: Hypothesis
-    rows: FloatArray
-    cores: FloatArray
-    is_mass: BoolArray
-    weights: FloatArray
+    rows: FloatArray = field(repr=False)
+    cores: FloatArray = field(repr=False)
+    is_mass: BoolArray = field(repr=False)
+    weights: FloatArray = field(repr=False)
     whole: bool = False
 
     @property

@@ -11,8 +11,10 @@ Source: MacNeal (1971), residual flexibility; Fox & Kapoor (1968) for the forces
 
 from __future__ import annotations
 
+import ctypes
+import sys
 from collections.abc import Hashable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from weakref import WeakValueDictionary
 
@@ -22,7 +24,6 @@ import scipy.linalg as la
 from femubench.core.change.hypothesis import Hypothesis, magnitudes
 from femubench.core.change.terms import ElementOperator, RowOperator, Term
 from femubench.core.fem.model import Model
-from femubench.core.fit.free_memory import give_back
 from femubench.core.fit.modal_basis import Space, nominal_space, rigid_first
 from femubench.core.fit.modal_fit import Problem
 from femubench.core.fit.noise import Noise
@@ -33,6 +34,7 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.sparse_eigen import ShiftedModel
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
+_IS_LINUX = sys.platform == "linux"
 _A_MODE, _SPARE = 4, 20  # modes that are solved for every measured one, and as well
 _RIGID, _MISSED = 6, 6
 _SHIFT = 0.5  # of the first elastic eigenvalue, below zero
@@ -140,7 +142,10 @@ class Basis:
         if not self.complete:
             for name in ("bare", "projector", "momentum"):
                 vars(self).pop(name, None)
-            give_back()
+            # glibc keeps what large arrays leave behind; see malloc_trim(3). musl has no such call.
+            trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if _IS_LINUX else None
+            if trim is not None:
+                trim(0)
 
     def response(
         self, forces: FloatArray, most: int, known: FloatArray | None = None
@@ -190,20 +195,21 @@ class Basis:
             whole = np.ones(moved.shape[1])
         return blocks
 
-    def enrich(self, space: Space, parts: Sequence[Projection], rounds: int = 2) -> Coordinates:
+    def enrich(self, space: Space, parts: Sequence[Projection]) -> Coordinates:
         """Return coordinates of their own for some hypotheses.
+
+        They hold the response to what these exert on the modes, and that to what they exert on
+        this response as well, and to its inertia.
 
         Arguments:
             space: the coordinates of the basis.
             parts: the hypotheses, in any coordinates of the model.
-            rounds: 1 for the response to what they exert on the modes, 2 for that to what they
-                exert on this response as well, and to its inertia.
         """
         near = self.modes.take(np.arange(self.tracked))
         forces = [find_forces(part.hypothesis, near) for part in parts]
         nothing = np.zeros((self.model.size, 0))
         added = self.response(np.hstack([nothing, *forces]), _FROM_HYPOTHESIS * len(parts))
-        if rounds > 1 and added.shape[1]:
+        if added.shape[1]:
             there = Modes(np.full(added.shape[1], near.eigenvalues[-1]), added, near.rigid[:0])
             forces = [find_forces(part.hypothesis, there) for part in parts]
             forces.append(self.model.mass_times(added))
@@ -216,10 +222,6 @@ class Basis:
 
         They hold the exact modes and the response to what it exerts on these; many are solved at
         once. Forces at the sensors, which serve those that have none of their own, are left out.
-
-        Arguments:
-            space: the coordinates of the basis.
-            parts: the hypotheses in them.
         """
         near, known = self.modes.take(np.arange(self.tracked)), len(self.modes)
         self.forget()
@@ -405,8 +407,8 @@ class LargeProblem(Problem):
     The coordinates hold a short list of the hypotheses; `hypotheses` are all of them.
     """
 
-    basis: Basis | None = None
-    hypotheses: tuple[Hypothesis, ...] = ()
+    basis: Basis | None = field(default=None, repr=False)
+    hypotheses: tuple[Hypothesis, ...] = field(default=(), repr=False)
 
     @property
     def common(self) -> Basis:
@@ -416,7 +418,7 @@ class LargeProblem(Problem):
 
 
 def enrich_problem(
-    problem: Problem, parts: Sequence[Projection], rounds: int = 2
+    problem: Problem, parts: Sequence[Projection]
 ) -> tuple[Problem, tuple[Projection, ...]]:
     """Return the data in coordinates that hold the response to some hypotheses, and these there.
 
@@ -425,11 +427,10 @@ def enrich_problem(
     Arguments:
         problem: of the model.
         parts: the hypotheses, in any coordinates of the model.
-        rounds: as in `Basis.enriched`.
     """
     if not isinstance(problem, LargeProblem) or not parts:
         return problem, tuple(parts)
-    space = problem.common.enrich(problem.space, parts, rounds).space
+    space = problem.common.enrich(problem.space, parts).space
     return replace(problem, space=space), space.projections
 
 

@@ -65,13 +65,13 @@ class Examination:
     """
 
     model: Model
-    problem: Problem
-    slopes: FloatArray
+    problem: Problem = field(repr=False)
+    slopes: FloatArray = field(repr=False)
     tolerance: float
     posterior: Posterior
-    found: tuple[Found, ...]
+    found: tuple[Found, ...] = field(repr=False)
     modes: Modes
-    error: Inadequacy | None = None
+    error: Inadequacy | None = field(default=None, repr=False)
     reference: Measurement | None = None
 
     @cached_property

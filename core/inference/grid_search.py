@@ -7,7 +7,7 @@ ones to it (Fox & Kapoor 1968), so that thousands of candidates cost one batched
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import log_ndtr
@@ -35,8 +35,8 @@ class Screened:
     """
 
     projection: Projection
-    grid: FloatArray
-    residuals: FloatArray
+    grid: FloatArray = field(repr=False)
+    residuals: FloatArray = field(repr=False)
     x: FloatArray
     cost: float
     log_evidence: float

@@ -393,8 +393,8 @@ def _first_of_a_name(screened: Sequence[Screened]) -> list[Screened]:
 def _are_alike(item: Screened, fitted: Fit) -> bool:
     """Tell whether a hypothesis is the effect that was fitted alone, with as many values."""
     (part,) = fitted.parts
-    one, other = item.projection.hypothesis.cause, part.hypothesis.cause
-    return (one[0], one[2]) == (other[0], other[2])
+    one, other = item.projection.hypothesis, part.hypothesis
+    return one.effect.name == other.effect.name and len(one.parameters) == len(other.parameters)
 
 
 def _fit_from_grid(

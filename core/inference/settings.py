@@ -434,9 +434,6 @@ def settings_table() -> dict[str, Setting]:
 def overridden(values: Mapping[str, Value]) -> Iterator[None]:
     """Give some numbers other values inside a block, and nowhere else.
 
-    Arguments:
-        values: by name.
-
     Raises:
         InputError: for a name that is not in the table, or a value of another type.
     """

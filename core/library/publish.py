@@ -88,11 +88,7 @@ def refusal_of(file: Path) -> str:
 
 
 class InstalledCases:
-    """The cases of the scenarios that are installed, each read once, and the strategies.
-
-    Arguments:
-        plugins: where they come from.
-    """
+    """The cases of the scenarios that are installed, each read once, and the strategies."""
 
     def __init__(self, plugins: Plugins) -> None:
         self._plugins = plugins

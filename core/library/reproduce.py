@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import accumulate
 from os import PathLike
 from pathlib import Path
@@ -62,17 +62,15 @@ def studies_of(
     papers: Sequence[str],
     plugins: Plugins,
     on_advance: OnAdvance | None = None,
-    clock: Callable[[], float] = time.monotonic,
 ) -> tuple[Study, ...]:
     """Return the studies of papers; see `reproduce`.
 
     Arguments:
         on_advance: called after each update with how many are computed, of how many.
-        clock: seconds from any time on.
     """
     found = []
     wanted = [plugins.papers[name] for name in papers]
-    watched = _Updates([getattr(paper, "done", (1,)) for paper in wanted], on_advance, clock)
+    watched = _Updates([getattr(paper, "done", (1,)) for paper in wanted], on_advance)
     for paper in wanted:
         cases = {case.name: case for case in read_cases(paper.cases, plugins)}
         # Many small matrices: threads would only wait for each other.
@@ -84,18 +82,13 @@ def studies_of(
 class _Updates:
     """Updates that are computed, and the time that the rest takes, as such re-runs have it."""
 
-    def __init__(
-        self,
-        rows: Sequence[Sequence[int]],
-        on_advance: OnAdvance | None,
-        clock: Callable[[], float],
-    ) -> None:
+    def __init__(self, rows: Sequence[Sequence[int]], on_advance: OnAdvance | None) -> None:
         before = accumulate((row[-1] for row in rows), initial=0)
         self._after = [
             first + x for first, row in zip(before, rows, strict=False) for x in row[:-1]
         ]
         self._whole = sum(row[-1] for row in rows)
-        self._on_advance, self._clock, self._begin = on_advance, clock, clock()
+        self._on_advance, self._begin = on_advance, time.monotonic()
         self._done = 0
 
     def step(self) -> None:
@@ -106,7 +99,7 @@ class _Updates:
         after = [*self._after, self._whole]
         place = min(self._done, len(self._after))
         here, following = after[place - 1], after[place]
-        rate = (self._clock() - self._begin) / here
+        rate = (time.monotonic() - self._begin) / here
         left = rate * (self._whole - here), rate * (following - here)
         total = max(len(self._after), self._done)
         self._on_advance(Advance(self._done, total, "updates", *left))

@@ -40,11 +40,7 @@ from femubench.core.study.study_file import StudyFile, grid, read_study
 
 @dataclass(frozen=True, kw_only=True)
 class StudyPlan(Plan):
-    """A study with all that its words stand for: cases under every condition, all strategies.
-
-    Arguments:
-        axes: where its jobs stand.
-    """
+    """A study with all that its words stand for: cases under every condition, all strategies."""
 
     axes: StudyAxes
 

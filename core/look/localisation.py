@@ -27,11 +27,7 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Elements:
-    """The elements of a frame with their strain energies, and how they make up members.
-
-    Arguments:
-        structure: a meshed frame.
-    """
+    """The elements of a frame with their strain energies, and how they make up members."""
 
     structure: Structure
 
@@ -230,10 +226,6 @@ def locate(model: Model, measurement: Measurement) -> tuple[LocationRow, ...]:
     Frames have rows for members, ``member/k`` and joints, models from files for nodes and groups,
     `ecomac` for sensors. Without shapes only `mdlac` is left. Within an indicator the largest of
     every kind of place is 1.
-
-    Arguments:
-        model: the nominal one.
-        measurement: the used modes.
 
     Raises:
         ModelError: when the model has no modes.

@@ -29,12 +29,7 @@ Changes = tuple[tuple[int, float], ...]
 
 @dataclass(frozen=True)
 class Seen:
-    """A model and its measurement.
-
-    Arguments:
-        model: any model.
-        measurement: some measured modes.
-    """
+    """A model and its measurement."""
 
     model: Model
     measurement: Measurement

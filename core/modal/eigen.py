@@ -267,6 +267,21 @@ def once_for(model: Model, key: Hashable, make: Callable[[], _Kept]) -> _Kept:
     return value
 
 
+def keep_last(model: Model, key: Hashable, source: object, make: Callable[[], _Kept]) -> _Kept:
+    """Return what was made last under a key where it was of this very source, or make it anew.
+
+    Arguments:
+        key: what it is, among all that is kept of a model, as for `once_for`.
+        source: what it is made of; kept with it, so that an `id` of it in the key is no other's.
+        make: called where it was not made of the source.
+    """
+    last: list[Any] = once_for(model, (keep_last, key), list)
+    if not last or last[0] is not source:
+        last[:] = source, make()
+    value: _Kept = last[1]
+    return value
+
+
 def cache_by_model(
     function: Callable[Concatenate[Model, _Given], _Kept],
 ) -> Callable[Concatenate[Model, _Given], _Kept]:

@@ -51,11 +51,7 @@ def _energy(part: SparseArray, rigid: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class GroupPriors:
-    """What is known of the groups of a model from matrices before any measurement.
-
-    Arguments:
-        model: from matrices.
-    """
+    """What is known of the groups of a model from matrices before any measurement."""
 
     model: Model
 

@@ -13,7 +13,6 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.factorisation import LU, Cholesky, DefiniteLU, Symmetric, cholmod_obstacle
-from femubench.core.modal.generalised_mass import generalised_masses
 from femubench.core.modal.inertia import Change, negative_after, negative_by_pins, signs_hold
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.modal.smooth_fields import softest_smooth_field
@@ -275,7 +274,8 @@ def _shift_invert(
     order = np.argsort(eigenvalues, kind="stable")
     if np.any(np.diff(order) < 0):
         shapes = shapes[:, order]
-    shapes /= np.sqrt(generalised_masses(model, shapes))  # in place: nothing is as large as these
+    # In place: nothing is as large as these.
+    shapes /= np.sqrt(np.einsum("ij,ij->j", shapes, model.mass_times(shapes)))
     return eigenvalues[order], shapes
 
 

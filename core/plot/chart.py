@@ -104,12 +104,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Mark:
-    """A line across a chart.
-
-    Arguments:
-        axis: that it stands on.
-        value, label: where, and what it is.
-    """
+    """A line across a chart."""
 
     axis: Literal["x", "y"]
     value: float

@@ -217,21 +217,13 @@ def _power(value: float, position: int | None) -> str:
 
 
 def render_figure(figure: Figure) -> str:
-    """Return a figure as one ``<svg>`` element that needs no other file.
-
-    Arguments:
-        figure: what it shows.
-    """
+    """Return a figure as one ``<svg>`` element that needs no other file."""
     draw = partial(draw_figure, figure)
     return svg(draw, name=figure.name, title=figure.title, caption=figure.caption)
 
 
 def draw_figure(figure: Figure, ax: Axes) -> None:
-    """Draw a figure on axes, and set title and size of the figure that they lie in.
-
-    Arguments:
-        figure: what it shows.
-    """
+    """Draw a figure on axes, and set title and size of the figure that they lie in."""
     title = fill(figure.title, _TITLE)
     figure_of(ax).suptitle(title, x=0.01, ha="left", fontsize=11.0, parse_math=False)
     figure.draw(ax)

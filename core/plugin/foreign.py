@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -238,38 +238,50 @@ class _Maker:
 
 
 @dataclass(frozen=True)
-class ForeignReader:
-    """A reader of a third party: imported here when a file with its suffix is to be read.
+class _Offered:
+    """A reader or a reporter of a third party.
 
     Arguments:
         handle: by which it is imported.
-        suffixes: of the files that it reads.
-        ways: what it offers apart from the two methods of every reader.
+        ways: what it offers apart from the methods of every one.
         doc: what it says of itself.
     """
 
     handle: Handle
-    suffixes: tuple[str, ...]
-    ways: frozenset[str] = field(default=frozenset())
-    doc: str = ""
+    ways: frozenset[str]
+    doc: str
 
     @property
     def name(self) -> str:
         """Return its name."""
         return self.handle.name
 
-    def read_matrix(self, path: Path) -> Any:  # noqa: ANN401 - checked by who asks for it
-        """Import the reader here and return what it reads."""
-        return _loaded(self.handle).read_matrix(path)
-
-    def read_modes(self, path: Path) -> Any:  # noqa: ANN401 - likewise
-        """Import the reader here and return what it reads."""
-        return _loaded(self.handle).read_modes(path)
-
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any of its ways
         if name.startswith("_") or name not in self.__dict__.get("ways", ()):
             raise AttributeError(name)
-        return lambda *args: getattr(_loaded(self.handle), name)(*args)
+        return partial(self._call, name)
+
+
+@dataclass(frozen=True)
+class ForeignReader(_Offered):
+    """A reader of a third party: imported here when a file with its suffix is to be read.
+
+    Arguments:
+        suffixes: of the files that it reads.
+    """
+
+    suffixes: tuple[str, ...]
+
+    def read_matrix(self, path: Path) -> Any:  # noqa: ANN401 - checked by who asks for it
+        """Import the reader here and return what it reads."""
+        return self._call("read_matrix", path)
+
+    def read_modes(self, path: Path) -> Any:  # noqa: ANN401 - likewise
+        """Import the reader here and return what it reads."""
+        return self._call("read_modes", path)
+
+    def _call(self, way: str, *args: Any) -> Any:  # noqa: ANN401
+        return getattr(_loaded(self.handle), way)(*args)
 
 
 @lru_cache(maxsize=100)
@@ -278,36 +290,16 @@ def _loaded(handle: Handle) -> Any:  # noqa: ANN401 - as the kind has it
 
 
 @dataclass(frozen=True)
-class ForeignReporter:
-    """A reporter of a third party, whose text is written in a process of its own.
+class ForeignReporter(_Offered):
+    """A reporter of a third party, whose text is written in a process of its own."""
 
-    Arguments:
-        handle: by which it is imported.
-        suffix: of its files.
-        ways: what it offers apart from `render`.
-        doc: what it says of itself.
-    """
-
-    handle: Handle
     suffix: str
-    ways: frozenset[str] = field(default=frozenset())
-    doc: str = ""
-
-    @property
-    def name(self) -> str:
-        """Return its name."""
-        return self.handle.name
 
     def render(self, run: Run) -> Any:  # noqa: ANN401 - checked by who asks for it
         """Return the report."""
-        return self._written("render", run)
+        return self._call("render", run)
 
-    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any of its ways
-        if name.startswith("_") or name not in self.__dict__.get("ways", ()):
-            raise AttributeError(name)
-        return partial(self._written, name)
-
-    def _written(self, way: str, run: Run, exhibits: Any = None) -> Any:  # noqa: ANN401
+    def _call(self, way: str, run: Run, exhibits: Any = None) -> Any:  # noqa: ANN401
         from femubench.core.schema.records import run_to_json
 
         store = None if exhibits is None else str(exhibits.store.absolute())
@@ -333,7 +325,7 @@ class ForeignReporter:
 
 def is_foreign(offered: object) -> bool:
     """Tell whether the code of what is offered is that of a third party and not imported here."""
-    return isinstance(offered, (Foreign, ForeignStrategy, ForeignReader, ForeignReporter))
+    return isinstance(offered, (Foreign, ForeignStrategy, _Offered))
 
 
 def import_thing(offered: Any) -> Any:  # noqa: ANN401 - as the kind has it
@@ -345,7 +337,7 @@ def import_thing(offered: Any) -> Any:  # noqa: ANN401 - as the kind has it
 
 def doc_of(offered: object) -> str:
     """Return the docstring that somebody wrote for the class of what is offered."""
-    if isinstance(offered, (Foreign, ForeignStrategy, ForeignReader, ForeignReporter)):
+    if isinstance(offered, (Foreign, ForeignStrategy, _Offered)):
         return offered.doc
     return (type(offered).__doc__ or "")[:_LONGEST_DOC]
 
@@ -398,12 +390,12 @@ def _scenario(handle: Handle, description: Mapping[str, Any]) -> Scenario:
 
 def _reader(handle: Handle, description: Mapping[str, Any]) -> ForeignReader:
     suffixes = tuple(check_texts(description.get("suffixes"), "suffixes"))
-    return ForeignReader(handle, suffixes, _ways(description), _doc(description))
+    return ForeignReader(handle, _ways(description), _doc(description), suffixes)
 
 
 def _reporter(handle: Handle, description: Mapping[str, Any]) -> ForeignReporter:
     suffix = of_type(description.get("suffix"), str, "suffix")
-    return ForeignReporter(handle, suffix, _ways(description), _doc(description))
+    return ForeignReporter(handle, _ways(description), _doc(description), suffix)
 
 
 def _ways(description: Mapping[str, Any]) -> frozenset[str]:
@@ -422,10 +414,6 @@ def _fault(handle: Handle, description: Mapping[str, Any]) -> Foreign:
     return Foreign(handle, _doc(description), side=side)
 
 
-def _paper(handle: Handle, description: Mapping[str, Any]) -> Foreign:
-    return Foreign(handle, _doc(description))
-
-
 _MADE: Mapping[str, Callable[[Handle, Mapping[str, Any]], Any]] = {
     "strategies": strategy_of,
     "scenarios": _scenario,
@@ -433,7 +421,7 @@ _MADE: Mapping[str, Callable[[Handle, Mapping[str, Any]], Any]] = {
     "faults": _fault,
     "readers": _reader,
     "reporters": _reporter,
-    "papers": _paper,
+    "papers": lambda handle, description: Foreign(handle, _doc(description)),
 }
 
 

@@ -185,9 +185,9 @@ def read_submission(
     return Submission(ranked, text, f"{slug(str(meta['run']))}-{digest}.json", proof)
 
 
-def slug(text: str, longest: int = 40) -> str:
+def slug(text: str) -> str:
     """Return a file name for any text: letters, digits, and a hash that keeps it apart."""
-    word = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")[:longest].strip("-")
+    word = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")[:40].strip("-")
     digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]
     return f"{word}-{digest}" if word else digest
 

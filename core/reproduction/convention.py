@@ -31,9 +31,6 @@ class Choice:
 
         What agrees is worth no more than the choice; what cannot be checked stays so.
 
-        Arguments:
-            cells: of the study.
-
         Raises:
             InputError: for a cell that is not there, or that does not know how it was judged.
 

@@ -36,9 +36,6 @@ class Grid:
     def places_of(entry: Entry) -> tuple[Place, ...]:
         """Return where the cells of an entry belong: none, one or two.
 
-        Arguments:
-            entry: of a grid.
-
         Examples:
             >>> reproduction.Grid.places_of((("mode 1", "FE"), ("mode 1", "error")))
             (('mode 1', 'FE'), ('mode 1', 'error'))

@@ -346,11 +346,7 @@ def _no_script() -> Iterator[None]:
 
 
 def _local(count: int) -> Cluster:
-    """Start a scheduler in this process and workers, which listen to this machine alone.
-
-    Arguments:
-        count: number of workers.
-    """
+    """Start a scheduler in this process and workers, which listen to this machine alone."""
     from distributed import LocalCluster, Nanny
 
     class SilentNanny(Nanny):  # type: ignore[misc]

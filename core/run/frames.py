@@ -1,4 +1,4 @@
-"""Results as data frames, and as the JSON of ``bench run --json``."""
+"""Results as data frames."""
 
 from __future__ import annotations
 
@@ -6,15 +6,12 @@ from typing import TYPE_CHECKING
 
 from msgspec import to_builtins
 
-from femubench.core.schema.records import run_from_json, run_to_json
 from femubench.core.schema.results import BLOCKS, Run
 from femubench.core.score.scoring import frequency_error
 from femubench.core.study.axes import StudyAxes
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["modes_frame", "results_frame", "run_from_json", "run_to_json"]
 
 
 def results_frame(run: Run) -> pd.DataFrame:

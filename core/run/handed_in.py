@@ -33,11 +33,7 @@ _MOST = 100_000  # answers
 
 @dataclass(frozen=True)
 class Absent:
-    """Stands for a strategy that is not here: what it has not answered has failed.
-
-    Arguments:
-        name, citation, yardstick: of the strategy.
-    """
+    """Stands for a strategy that is not here: what it has not answered has failed."""
 
     name: Name
     citation: Text

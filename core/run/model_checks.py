@@ -11,6 +11,7 @@ from femubench.core.errors import StrategyFailure
 from femubench.core.fem.model import LowRank, Model
 
 _SYMMETRY = 1e-8  # of the largest entry
+_MATRICES = ("mass", "stiffness")
 
 
 def check_model(model: Model, nominal: Model) -> None:
@@ -22,30 +23,53 @@ def check_model(model: Model, nominal: Model) -> None:
     Raises:
         StrategyFailure: with what was seen and what was expected.
     """
+    check_sizes(model, nominal)
+    check_numbers(model)
+    for name in _MATRICES:
+        entries = sp.csr_array(getattr(model, name))
+        _check_symmetry(name, entries - entries.T, entries.data)
+        change = getattr(model, f"{name}_change")
+        if change is not None:
+            core = np.asarray(change.core)
+            _check_symmetry(f"{name}_change: core", core - core.T, core)
+
+
+def check_sizes(model: Model, nominal: Model) -> None:
+    """Check that matrices and changes are of the right kind and size; as `check_model`."""
     size = len(model.dofs)
     own = model.structure is not None and model.structure.kinematics.transform.shape[1] == size
     if size != nominal.size and not own:
         raise StrategyFailure(
             f"the updated model has {size} degrees of freedom, expected {nominal.size}"
         )
-    for name in ("mass", "stiffness"):
-        matrix = getattr(model, name)
-        check_entries(name, matrix)
+    for name in _MATRICES:
+        matrix, change = getattr(model, name), getattr(model, f"{name}_change")
+        _check_sparse(name, matrix)
         _check_shape(name, matrix.shape, (size, size))
+        if change is None:
+            continue
+        check_change(f"{name}_change", change)
+        basis, core = np.asarray(change.basis), np.asarray(change.core)
+        if basis.ndim != 2:
+            what = f"{name}_change: basis has {basis.ndim} dimensions, expected 2"
+            raise StrategyFailure(what)
+        _check_shape(f"{name}_change: basis", basis.shape, (size, basis.shape[1]))
+        _check_shape(f"{name}_change: core", core.shape, (basis.shape[1], basis.shape[1]))
+
+
+def check_numbers(model: Model) -> None:
+    """Check that matrices and changes of the right kind hold finite real numbers; likewise."""
+    for name in _MATRICES:
+        matrix, change = getattr(model, name), getattr(model, f"{name}_change")
         check_indices(name, matrix)
-        entries = sp.coo_array(matrix)
-        _check_numbers(name, entries.data)
-        transposed = sp.csr_array(entries).T
-        _check_symmetry(name, sp.csr_array(entries) - transposed, entries.data)
-        change = getattr(model, f"{name}_change")
-        if change is not None:
-            _check_low_rank(f"{name}_change", change, size)
+        _check_numbers(name, sp.coo_array(matrix).data)
+        for part in () if change is None else ("basis", "core"):
+            _check_numbers(f"{name}_change: {part}", np.asarray(getattr(change, part)))
 
 
 def check_entries(name: str, matrix: Any) -> None:  # noqa: ANN401 - whatever came back
     """Check that a matrix is a sparse array of real numbers; raises StrategyFailure."""
-    if not sp.issparse(matrix):
-        raise StrategyFailure(f"{name} is {type(matrix).__name__}, expected a sparse array")
+    _check_sparse(name, matrix)
     _check_real(name, matrix)
     if matrix.format not in ("csr", "csc"):
         check_indices(name, matrix)
@@ -76,16 +100,9 @@ def check_indices(name: str, matrix: Any) -> None:  # noqa: ANN401
         raise StrategyFailure(f"{name} is not a valid sparse array: {error}") from error
 
 
-def _check_low_rank(name: str, change: Any, size: int) -> None:  # noqa: ANN401
-    check_change(name, change)
-    basis, core = np.asarray(change.basis), np.asarray(change.core)
-    if basis.ndim != 2:
-        raise StrategyFailure(f"{name}: basis has {basis.ndim} dimensions, expected 2")
-    _check_shape(f"{name}: basis", basis.shape, (size, basis.shape[1]))
-    _check_shape(f"{name}: core", core.shape, (basis.shape[1], basis.shape[1]))
-    _check_numbers(f"{name}: basis", basis)
-    _check_numbers(f"{name}: core", core)
-    _check_symmetry(f"{name}: core", core - core.T, core)
+def _check_sparse(name: str, matrix: Any) -> None:  # noqa: ANN401
+    if not sp.issparse(matrix):
+        raise StrategyFailure(f"{name} is {type(matrix).__name__}, expected a sparse array")
 
 
 def _check_shape(name: str, shape: tuple[int, ...], expected: tuple[int, ...]) -> None:

@@ -189,10 +189,9 @@ def blas_name() -> str:
 _PACKAGES = ("femubench", "numpy", "scipy")
 
 
-def new_run_id(now: datetime | None = None) -> str:
+def new_run_id() -> str:
     """Return a run id that sorts by time: UTC time stamp and six random hexadecimal digits."""
-    moment = datetime.now(UTC) if now is None else now
-    return f"{moment:%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
+    return f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
 
 
 def run_meta(

@@ -16,10 +16,8 @@ from typing import Any
 
 from femubench.core.drawing.files import Exhibits
 from femubench.core.errors import InputError, harmless
-from femubench.core.files import open_regular
 from femubench.core.garbage import pause_collection
 from femubench.core.run.record_file import (
-    LARGEST,
     Record,
     RecordWriter,
     find_faults,
@@ -41,8 +39,7 @@ from femubench.core.score.ranking import Scale, rate_results
 _MOST_NOTES, _MOST_JOBS = 3, 5
 _SUFFIX = ".sqlite"
 _STORED = "a run stored by `bench run`"
-_RUN_ID = re.compile(r"(?!results$)[A-Za-z0-9][A-Za-z0-9._-]{0,199}")
-_OLD = re.compile(rb'\{"schema": ?[12], ?"record": ?"(run|result|end)"')
+_RUN_ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,199}")
 
 
 def notes_of(faults: Sequence[InputError], folder: Path) -> list[str]:
@@ -53,13 +50,6 @@ def notes_of(faults: Sequence[InputError], folder: Path) -> list[str]:
         records = "record was" if more == 1 else "records were"
         shown.append(harmless(f"{folder}: {more} more {records} left out"))
     return shown
-
-
-def _is_old(file: Path) -> bool:
-    """Tell whether a file begins as those of earlier versions do."""
-    with suppress(OSError, InputError), open_regular(file, LARGEST) as stream:
-        return _OLD.match(stream.read(64)) is not None
-    return False
 
 
 def hold_lock(path: Path) -> int:
@@ -118,11 +108,6 @@ class Store:
         """Return the files that hold records, one a run."""
         found = (file for file in self.folder.glob(f"*{_SUFFIX}") if _RUN_ID.fullmatch(file.stem))
         return tuple(sorted(found))
-
-    @property
-    def old_files(self) -> tuple[Path, ...]:
-        """Return the files of earlier versions, which `bench store repair` converts."""
-        return tuple(file for file in sorted(self.folder.glob("*.jsonl")) if _is_old(file))
 
     @cached_property
     def exhibits(self) -> Exhibits:
@@ -185,7 +170,7 @@ class Store:
         check_extent(meta, tuple(listed), file=self.folder)
         known, missing = meta.get("notes"), self.note_missing_jobs(meta, everything)
         notes = [*(known if isinstance(known, list) else []), *notes_of(faults, self.folder)]
-        notes += [*self.notes_of_old_files(), *([missing] if missing else [])]
+        notes += [missing] if missing else []
         rate_results(listed, Scale.of(meta))
         return Run({**meta, "notes": notes}, tuple(listed), companions)
 
@@ -220,9 +205,9 @@ class Store:
                         found[record.key] = record
         return found
 
-    def read_start(self, run_id: str | None = None) -> dict[str, Any]:
-        """Return the meta data with which a run began; arguments and errors as for `load`."""
-        wanted = self._find(run_id)
+    def read_start(self) -> dict[str, Any]:
+        """Return the meta data with which the latest run began; errors as for `load`."""
+        wanted = self._find(None)
         return {**(self._starts()[wanted] or {}), "run": wanted}
 
     def latest_of_plan(self, plan: str) -> dict[str, Any] | None:
@@ -255,6 +240,11 @@ class Store:
             self._close(run_id)
             path.unlink(missing_ok=True)
             os.close(descriptor)
+
+    def faults(self) -> list[InputError]:
+        """Return what is damaged or missing, one error a fault, pictures last."""
+        faults = [fault for file in self.files for fault in find_faults(file)]
+        return [*faults, *self.exhibits.faults()]
 
     def repair(self, run_id: str) -> tuple[list[InputError], Path | None]:
         """Write the file of a run anew if it has faults; return these and a copy of it as it was.
@@ -291,12 +281,6 @@ class Store:
                         found[file.stem] = first.at, {**first.meta(), "run": file.stem}
         return {run: meta for run, (_, meta) in sorted(found.items(), key=lambda item: item[1][0])}
 
-    def notes_of_old_files(self) -> list[str]:
-        """Return a line where there are runs of an earlier version."""
-        names = ", ".join(file.name for file in self.old_files[:_MOST_NOTES])
-        how = "runs of an earlier version; `bench store repair` converts them"
-        return [harmless(f"{self.folder}: {how} ({names})")] if names else []
-
     def _find(self, run_id: str | None) -> str:
         """Return the id of the run that is meant."""
         known = list(self._starts())
@@ -305,7 +289,6 @@ class Store:
         matching = [name for name in known if run_id is None or name.startswith(run_id)]
         if not matching:
             what = "no results" if not known else f"no run {run_id!r}"
-            what = "; ".join([what, *self.notes_of_old_files()])
             stored = f"one of the {len(known)} stored, e.g. {known[-1]}" if known else _STORED
             raise InputError(what, file=self.folder, expected=stored)
         if run_id is not None and len(matching) > 1:

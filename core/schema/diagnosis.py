@@ -8,8 +8,8 @@ from typing import Literal
 
 from msgspec import Struct, field
 
-from femubench.core.roles import Side, Wording
 from femubench.core.schema.bounds import Number
+from femubench.core.typing import Side, Wording
 
 Verdict = Literal["named", "none", "unknown", "ambiguous", "not-confirmed"]
 RegionKind = Literal["stiffness lost", "stiffness added", "mass lost", "mass added"]

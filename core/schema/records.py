@@ -86,11 +86,6 @@ class _MetaRecord(Struct):
 def check_depth(data: object, what: str, **where: Any) -> None:  # noqa: ANN401 - of InputError
     """Check that plain data are not nested deeply, which functions that call themselves rely on.
 
-    Arguments:
-        data: mappings, lists and plain values.
-        what: its name, for the message.
-        where: file, line and key, for the message.
-
     Raises:
         InputError: when they are.
     """

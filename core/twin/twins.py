@@ -57,11 +57,7 @@ class Twin(Case):
 
 @dataclass(frozen=True, repr=False)
 class Again(Case):
-    """A case whose jobs are run a second time, with the same random numbers.
-
-    Arguments:
-        origin: name of the case.
-    """
+    """A case whose jobs are run a second time, with the same random numbers."""
 
     origin: str = ""
 

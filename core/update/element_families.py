@@ -407,12 +407,7 @@ class ElementFamily(Family):
 
 @dataclass(frozen=True, kw_only=True)
 class GroupFamily(Family):
-    """Factors on the groups of a model from matrices.
-
-    Arguments:
-        model: with the groups.
-        factors: on them.
-    """
+    """Factors on the groups of a model from matrices."""
 
     model: Model
     factors: tuple[Property, ...]

@@ -64,10 +64,6 @@ def with_measured_frequencies(model: Model, measurement: Measurement) -> Model:
     other frequency, the rigid-body modes and the mass stay. A measured mode without a partner
     changes nothing.
 
-    Arguments:
-        model: any model.
-        measurement: the used modes.
-
     Raises:
         SelfCheckFailed: when the frequencies are not met to 1e-8.
 

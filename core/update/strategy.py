@@ -130,8 +130,6 @@ class Strategy(ABC):
 
 if TYPE_CHECKING:
 
-    def _play(
-        model: Model, measurement: Measurement, result: UpdateResult, strategy: Strategy
-    ) -> tuple[roles.Model, roles.Measurement, roles.Result, roles.Strategy]:
-        """Let type checkers see that the data classes play the roles."""
-        return model, measurement, result, strategy
+    def _play(result: UpdateResult, strategy: Strategy) -> tuple[roles.Result, roles.Strategy]:
+        """Let type checkers see that the classes play the roles."""
+        return result, strategy

@@ -149,10 +149,6 @@ def shares_of(ladder: Ladder) -> Shares:
 def mean_share(error: Mapping[frozenset[str], FloatArray], cause: str) -> FloatArray:
     """Return what a cause takes off the errors, as the mean over all orders of the causes.
 
-    Arguments:
-        error: with every set of causes.
-        cause: one of them.
-
     Source: Shapley (1953), A value for n-person games.
     """
     count = max(len(causes) for causes in error)

@@ -16,11 +16,7 @@ SOLUTIONS = {"least squares": "generic-ls", "adjusted": "generic-adjusted"}
 
 
 def change_figures(bench: Workbench) -> tuple[Figure, ...]:
-    """Return figures 3 to 5, from modes 1-3 of the case ``frame``.
-
-    Arguments:
-        bench: with that case.
-    """
+    """Return figures 3 to 5, from modes 1-3 of the case ``frame``."""
     model = bench.cases[CASE].model
     baruch = bench.update(CASE, "baruch").model
     return (
@@ -30,12 +26,7 @@ def change_figures(bench: Workbench) -> tuple[Figure, ...]:
 
 
 def recover_change(family: ElementFamily, result: UpdateResult) -> FloatArray:
-    """Return the change of the local element matrices from the parameters, (n_elements, 12, 12).
-
-    Arguments:
-        family: the one that the strategy looked in.
-        result: of that strategy.
-    """
+    """Return the change of the local element matrices from the parameters, (n_elements, 12, 12)."""
     assert family.names == tuple(p.name for p in result.parameters)
     after = np.array([p.after for p in result.parameters])
     return family.change(family.relative(after))
@@ -99,11 +90,7 @@ def solution_changes(bench: Workbench, words: str) -> FloatArray:
 
 
 def change_sentences(bench: Workbench) -> tuple[str, ...]:
-    """Return where the paper finds the errors of the elements, and where they come out here.
-
-    Arguments:
-        bench: with the case ``frame``.
-    """
+    """Return where the paper finds the errors of the elements, and where they come out here."""
     structure = bench.cases[CASE].model.frame_structure
     kinds = element_kinds(structure)
     parts = []

@@ -176,7 +176,6 @@ def _case(standings: Standings, case: str, exhibits: ExhibitSource | None) -> di
 def _result(result: JobResult, case: int, strategy: int, standings: Standings) -> dict[str, Any]:
     scale = standings.own.scale
     blocks = [result.blocks.get(name) for name in BLOCKS]
-    lost = (result.rigid_body_modes_expected or 0) - (result.rigid_body_modes or 0)
     return {
         "c": case,
         "s": strategy,
@@ -191,7 +190,7 @@ def _result(result: JobResult, case: int, strategy: int, standings: Standings) -
         "responses": None
         if result.responses is None
         else round_figures(result.responses.rms_db, 4),
-        "lost": max(lost, 0) if result.status == "ok" else 0,
+        "lost": result.rigid_modes_lost if result.status == "ok" else 0,
         "negative": result.negative_eigenvalues or 0,
         "unphysical": result.unphysical,
         "mac": [None if block is None else round_figures(block.mean_mac, 5) for block in blocks],

@@ -12,14 +12,13 @@ from typing import Any
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from click.testing import CliRunner
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from femubench import report
-from femubench.core.cli.main import bench
 from femubench.core.schema.records import read_run
 from femubench.core.score.ranking import rank_results
 from femubench.results import JobResult, Run
+from tests.command import call_bench
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 STRATEGIES = ("unchanged", "baruch", "generic-ls", "local", "nobari", "kabe")
@@ -94,9 +93,7 @@ def chromium() -> str:
 
 def call(*arguments: object, code: int = 0) -> str:
     """Call the command line; return what it printed."""
-    answer = CliRunner().invoke(bench, [str(argument) for argument in arguments])
-    assert answer.exit_code == code, answer.output
-    return answer.output
+    return call_bench(*arguments, code=code).output
 
 
 @pytest.fixture(scope="session")

@@ -176,13 +176,3 @@ def a_run() -> Run:
 def run_text() -> str:
     """Return the JSON of a run."""
     return json.dumps(run_to_json(a_run()), indent=1)
-
-
-def store_text() -> str:
-    """Return the lines of a store of version 0.1, without checksums, that holds a run."""
-    run = run_to_json(a_run())
-    end = {"finished": "2026-01-01T00:01:00+00:00"}
-    records = [{"record": "run", "meta": run["meta"]}, {"record": "end", "meta": end}]
-    records[1:1] = [{"record": "result", "result": result} for result in run["results"]]
-    common = {"schema": 1, "run": run["meta"]["run"]}
-    return "".join(json.dumps({**common, **record}) + "\n" for record in records)

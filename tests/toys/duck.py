@@ -9,6 +9,7 @@ import numpy as np
 
 from femubench import Measurement, Model, UpdateResult, hookimpl, solve_modes
 from femubench.core import roles
+from femubench.core.typing import Wording
 
 
 class Duck:
@@ -39,7 +40,7 @@ class Size:
     scaling: roles.Scaling = "linear"
     one_sided: bool = False
     textbook: float | None = None
-    wording: roles.Wording = "change"
+    wording: Wording = "change"
     range: tuple[float, float] = (-6.0, 6.0)
 
     def value(self, x: float) -> float:

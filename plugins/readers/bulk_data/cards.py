@@ -107,9 +107,9 @@ class Card:
         x, y, z = (self.real(number + i, f"{key}{i + 1}", 0.0) for i in range(3))
         return x, y, z
 
-    def components(self, number: int, key: str, default: str = "") -> str:
+    def components(self, number: int, key: str) -> str:
         """Return directions such as ``123``, each once; raises InputError."""
-        text = self.text(number) or default
+        text = self.text(number)
         if text == "0":
             return ""
         if not set(text) <= set("123456") or len(set(text)) < len(text):
@@ -149,9 +149,6 @@ class Deck:
     `end` is the file and line, from 0, behind the last card: of ``ENDDATA`` where it is there;
     `chosen` is the set that case control chooses, for ``SPC`` and ``MPC``; `controlled` tells
     whether there is a case control.
-
-    Arguments:
-        file: the main one.
 
     Raises:
         InputError: for what cannot be read, a line that is no card, a continuation of another

@@ -160,9 +160,6 @@ def _unread(card: Card) -> InputError:
 class BulkFrame:
     """Bulk data as a frame.
 
-    Arguments:
-        deck: all cards.
-
     Raises:
         InputError: for a card that is not read and may carry stiffness or mass, and all that is
             wrong in those that are.
