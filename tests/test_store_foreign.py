@@ -210,3 +210,9 @@ def test_a_file_that_may_not_be_read_is_a_line(public: Path) -> None:
         assert Store(public).load().meta["run"] == RUN
 
     assert as_nobody(read) == 0
+
+
+def test_a_line_says_what_converts_runs_of_earlier_versions(tmp_path: Path) -> None:
+    (tmp_path / "results.jsonl").write_text('{"schema": 1, "record": "run"}\n')
+    with pytest.raises(InputError, match=r"results\.jsonl is of before 0\.2\.0.*repair"):
+        Store(tmp_path).load()

@@ -289,6 +289,8 @@ class Store:
         matching = [name for name in known if run_id is None or name.startswith(run_id)]
         if not matching:
             what = "no results" if not known else f"no run {run_id!r}"
+            if old := next(self.folder.glob("*.jsonl"), None):
+                what += f"; {old.name} is of before 0.2.0: its `bench store repair` converts it"
             stored = f"one of the {len(known)} stored, e.g. {known[-1]}" if known else _STORED
             raise InputError(what, file=self.folder, expected=stored)
         if run_id is not None and len(matching) > 1:
