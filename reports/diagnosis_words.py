@@ -126,9 +126,11 @@ def _of_modes(line: Data, wanted: Sequence[bool]) -> Data:
 def budget_line(line: Data) -> str:
     """Return a class of a budget with its place and size."""
     where = "" if line["place"] == "all" else f" at {line['place']}"
-    size = estimate(abs(line["rms_percent"]), line["rms_std"])
+    value, std = abs(line["rms_percent"]), line["rms_std"]
+    size = estimate(value, std) if std else figure(value, 2)
     sign = "-" if line["rms_percent"] < 0.0 else "+"
-    return f"{line['class']}{where} ({sign}{size} %)"
+    what = {"mesh": "a finer mesh"}.get(line["class"], line["class"])
+    return f"{what}{where} ({sign}{size} %)"
 
 
 def as_drawn(lines: Iterable[Data], least: float) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -39,12 +39,14 @@ class MatrixGeometry:
         dofs: the rows; `dofs.node` counts the names.
         first_row: the number that the dofs file gives to the first row, 0 or 1.
         mesh: which nodes share an element, sparse (k, k); None where a sensor sits at nodes alone.
+        outlines: ends in m of edges that draw a group, (e, 2, 3), by its name; "" of all.
     """
 
     names: tuple[str, ...]
     dofs: Dofs
     first_row: int = 1
     mesh: SparseArray | None = None
+    outlines: Mapping[str, FloatArray] = field(default_factory=dict, compare=False)
 
     @cached_property
     def rows(self) -> dict[tuple[str, str], int]:

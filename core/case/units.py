@@ -66,7 +66,11 @@ def _converted(model: Model, length: float, force: float) -> Model:
         mass_change=None,
         stiffness_change=None,
         dofs=dofs,
-        geometry=replace(model.geometry, dofs=dofs),
+        geometry=replace(
+            model.geometry,
+            dofs=dofs,
+            outlines={name: length * ends for name, ends in model.geometry.outlines.items()},
+        ),
         groups={name: turned(part) for name, part in model.groups.items()},
         mass_groups={name: turned(part) for name, part in model.mass_groups.items()},
     )

@@ -83,8 +83,10 @@ def changes_found(source: Case | Model, parameters: Sequence[Data]) -> list[Find
     for item in changed:
         own = [places[word] for word in _words(item) if word in places]
         spans = tuple(span for place in own for span in place.spans)
-        points = tuple(dict.fromkeys(point for place in own for point in place.points))
         kind = own[0].kind if own else "elsewhere"
+        points = tuple(point for place in own for point in place.points)
+        # Of an outline every two are a line.
+        points = points if kind == "outline" else tuple(dict.fromkeys(points))
         where = _BETWEEN.join(dict.fromkeys(split_direction(place.place)[0] for place in own))
         groups.setdefault((where, kind, spans, points), []).append(item)
     found = []

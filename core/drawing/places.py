@@ -17,7 +17,9 @@ from femubench.core.fem.frame import Frame, Place
 from femubench.core.fem.mesh import place_xyz
 from femubench.core.fem.model import Model
 
-PlaceKind = Literal["all", "joint", "member", "element", "end", "point", "pair", "elsewhere"]
+PlaceKind = Literal[
+    "all", "joint", "member", "element", "end", "point", "pair", "outline", "elsewhere"
+]
 _Station = Annotated[float, Meta(ge=0.0, le=1.0)]
 
 _SENSOR = "sensor:"  # or several with + between
@@ -35,7 +37,10 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class DrawnPlace:
-    """What the word of a place covers; nothing for ``all`` and for what is nowhere in space."""
+    """What the word of a place covers; nothing for ``all`` and for what is nowhere in space.
+
+    The points of an outline are the ends of its lines, two for each.
+    """
 
     place: str
     kind: PlaceKind
@@ -84,6 +89,10 @@ def _plain_place(wireframe: Wireframe, word: str, head: str) -> DrawnPlace:
     """Return the place of a joint, a member, an element or a sensor by its name alone."""
     if head == ALL:
         return DrawnPlace(word, "all")
+    for outline in wireframe.outlines:
+        if outline.place == head:
+            ends = tuple(end for line in outline.lines for end in line)
+            return DrawnPlace(word, "outline", points=ends)
     for joint in wireframe.joints:
         if joint.name == head:
             return DrawnPlace(word, "joint", points=(joint.xyz,))

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from femubench.core.case.case import Case
 from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.effect.places import ALL
 from femubench.core.fem.mesh import ON_MEMBER, place_xyz
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
@@ -83,6 +84,14 @@ class DrawnSupport:
 
 
 @dataclass(frozen=True, slots=True)
+class DrawnOutline:
+    """The edges of a part of a mesh, with the word of the place that it is; ends in m."""
+
+    place: str
+    lines: tuple[tuple[Point, Point], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Wireframe:
     """A structure as every drawing shows it, checked to be whole.
 
@@ -93,6 +102,7 @@ class Wireframe:
         nodes: of the mesh in m; empty where the mesh is too fine to draw.
         elements: pairs of nodes; `element_labels` (``member/k``) and `member_of` go with them.
             Without members they are the lines of a test, which belong to none.
+        outlines: of the parts of a model of solids and shells.
     """
 
     plane: Plane
@@ -106,6 +116,7 @@ class Wireframe:
     elements: tuple[Pair, ...] = ()
     element_labels: tuple[str, ...] = ()
     member_of: tuple[int, ...] = ()
+    outlines: tuple[DrawnOutline, ...] = ()
 
     def __post_init__(self) -> None:
         check_within((end for m in self.members for end in m.ends), self.joints, "joint")
@@ -121,12 +132,15 @@ class Wireframe:
     def points(self) -> FloatArray:
         """Return all points with a name and all nodes in m, (n, 3)."""
         named = [joint.xyz for joint in self.joints] + [sensor.xyz for sensor in self.sensors]
-        return np.array([*named, *self.nodes], dtype=float).reshape(-1, 3)
+        ends = self.lines.reshape(-1, 3) if self.outlines else ()
+        return np.array([*named, *self.nodes, *ends], dtype=float).reshape(-1, 3)
 
     @property
     def lines(self) -> FloatArray:
-        """Return the ends of all members, or of all elements where none has a name, (n, 2, 3)."""
-        if self.members:
+        """Return the ends of all members, or of all edges or elements, (n, 2, 3)."""
+        if self.outlines:
+            ends = [list(line) for outline in self.outlines for line in outline.lines]
+        elif self.members:
             ends = [[self.joints[end].xyz for end in member.ends] for member in self.members]
         else:
             ends = [[self.nodes[end] for end in pair] for pair in self.elements]
@@ -211,7 +225,23 @@ def wireframe_of(source: Case | Model) -> Wireframe:
     lines = _test_lines(source, xyz) if isinstance(source, Case) and nodes else ()
     labels = tuple(f"line {k + 1}" for k in range(len(lines)))
     return Wireframe(
-        "matrices", joints, (), sensors, nodes=nodes, elements=lines, element_labels=labels
+        "matrices", joints, (), sensors, nodes=nodes, elements=lines, element_labels=labels,
+        outlines=_outlines(source.whole or model if isinstance(source, Case) else model),
+    )  # fmt: skip
+
+
+def _outlines(model: Model) -> tuple[DrawnOutline, ...]:
+    """Return the edges of the groups of a model of solids and shells, of all that are few."""
+    geometry = model.geometry
+    parts = geometry.outlines if isinstance(geometry, MatrixGeometry) else {}
+    if sum(map(len, parts.values())) > MOST_NODES:
+        return ()
+    return tuple(
+        DrawnOutline(
+            f"group:{name}" if name else ALL,
+            tuple((to_point(start), to_point(end)) for start, end in ends),
+        )
+        for name, ends in parts.items()
     )
 
 

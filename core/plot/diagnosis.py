@@ -470,7 +470,7 @@ def _draw_spot(
         dashed = {"linestyles": (0, (1.2, 0.8)), "capstyle": "butt"}
         more: dict[str, Any] = dashed if place.kind == "pair" else {}
         draw_lines(ax, lines, colors=colour, linewidths=width, zorder=2.5, **said, **more)
-    if place.points and place.kind != "pair":
+    if place.points and place.kind not in ("pair", "outline"):
         ax.plot(
             *view.flat(place.points).T, linestyle="none", marker="o",
             markersize=4.0 + 2.4 * spot.level, markerfacecolor=colour,

@@ -89,8 +89,8 @@ def lines_of(wireframe: Wireframe, view: View, place: DrawnPlace) -> FloatArray:
     members = view.flat(wireframe.lines)
     if place.kind == "all":
         return members
-    if place.kind == "pair" and len(place.points) == 2:
-        return view.flat([place.points])
+    if place.kind == "outline" or (place.kind == "pair" and len(place.points) == 2):
+        return view.flat(np.reshape(place.points, (-1, 2, 3)))
     found = [
         [(1.0 - s) * members[span.member, 0] + s * members[span.member, 1] for s in ends]
         for span in place.spans
@@ -137,12 +137,13 @@ def draw_findings(
                        label=f"_{name_of(finding.label)}")  # fmt: skip
         elif len(at):
             ax.plot(*at.T, gid=gid, **_mark(finding, look))
-        if len(finding.points) and finding.kind != "pair":
+        if len(finding.points) and finding.kind not in ("pair", "outline"):
             at = view.flat(finding.points)
             ax.plot(*at.T, gid=gid, **_mark(finding, look))
         handles.append(_handle(finding, look))
         if finding.number:
-            badges += [(point, str(finding.number)) for point in at[:_MOST_BADGES]]
+            few = 1 if finding.kind == "outline" else _MOST_BADGES
+            badges += [(point, str(finding.number)) for point in at[:few]]
     badge = {"boxstyle": "round,pad=0.25,rounding_size=0.7", "facecolor": INK, "edgecolor": PAGE}
     at_badges = np.array([point for point, _ in badges]).reshape(-1, 2)
     place_names(ax, at_badges, [number for _, number in badges], avoid=taken, size=8.5,
@@ -192,6 +193,6 @@ def _handle(finding: Finding, look: dict[str, Any]) -> Any:  # noqa: ANN401 - an
     where = f" ({name_of(where, 24)})" if finding.number and where else ""
     text = f"{finding.number or ''} {finding.label}{where}".strip()
     shown: dict[str, Any] = {**_mark(finding, look), "label": name_of(text, _LONGEST)}
-    if finding.symbol == "change" and not finding.points:
+    if finding.symbol == "change" and (finding.kind == "outline" or not finding.points):
         shown = {**look, "linestyle": "solid", "label": shown["label"]}
     return Line2D([], [], **shown)

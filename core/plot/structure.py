@@ -149,7 +149,10 @@ def draw_structure(
         attached: whether known masses (squares) and springs to ground (zigzags) are drawn.
         look: of the lines.
     """
+    width = min(width, 0.8) if wireframe.outlines else width
     draw_lines(ax, view.flat(wireframe.lines), linewidths=width, **{"colors": MEMBER, **look})
+    if wireframe.outlines:
+        return  # of the nodes of a mesh those next to sensors alone are known
     joints = view.flat([joint.xyz for joint in wireframe.joints] or np.empty((0, 3)))
     dot: dict[str, Any] = {"linestyle": "none", "markeredgecolor": PAGE, "markeredgewidth": 0.6}
     size = 4.5 if wireframe.members else 6.0

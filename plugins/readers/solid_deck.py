@@ -16,6 +16,7 @@ from femubench import InputError, Model
 from femubench.fem import FloatArray, MatrixGeometry, SparseArray, matrix_model
 from femubench.plugins.readers import nodes, shells, solid_elements
 from femubench.plugins.readers.nodes import Point
+from femubench.plugins.readers.outline import find_outline
 from femubench.plugins.readers.reading import DIRECTIONS, needs
 
 INSTEAD = "solids and shells alone, or the matrices of *FREQUENCY, SOLVER=MATRIXSTORAGE next to it"
@@ -198,8 +199,28 @@ def _model_of(
     names = tuple(dict.fromkeys(str(motion.node) for motion in found))
     if solid.lines:
         model = replace(model, dofs=dofs, geometry=MatrixGeometry(names, dofs))
+    drawn = {
+        name if groups else "": _outline(deck, numbers, own)
+        for name, numbers in (groups or {REST: list(material)}).items()
+    }
+    assert isinstance(model.geometry, MatrixGeometry)
+    model = replace(model, geometry=replace(model.geometry, outlines=drawn))
     small = [name for name in model.groups if heavy[name] < JOINT_SHARE * sum(heavy.values())]
     return replace(model, group_kinds=dict.fromkeys(small, "joint"))
+
+
+def _outline(deck: SolidDeck, numbers: Sequence[int], places: Mapping[int, Point]) -> FloatArray:
+    """Return the ends of the edges that draw some elements, (e, 2, 3)."""
+    row, xyz = {n: i for i, n in enumerate(places)}, np.array(list(places.values()))
+    by_shape: dict[tuple[bool, int], list[list[int]]] = {}
+    for number in numbers:
+        kind, own = deck.elements[number]
+        found = KINDS[kind]
+        solid = isinstance(found, solid_elements.Kind)
+        count = len(found.corners) if isinstance(found, solid_elements.Kind) else found.corners
+        by_shape.setdefault((solid, count), []).append([row[n] for n in own[:count]])
+    parts = [(solid, np.array(corners)) for (solid, _), corners in by_shape.items()]
+    return np.asarray(xyz[find_outline(parts, xyz)])
 
 
 def _thicken(

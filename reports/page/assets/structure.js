@@ -53,6 +53,12 @@
     return found;
   }, []).map(({ nodes }) => nodes);
 
+  /** Return the edges of a mesh, which stand still, as lines in m. */
+  const edgesOf = (stage) => (stage.outlines ?? []).flatMap(({ lines }) => lines);
+
+  const drawnEdges = (stage, project) => edgesOf(stage).map((line) => straight(line.map(project))).join("");
+  const allOf = (stage) => [...stage.nodes, ...edgesOf(stage).flat()];
+
   /** Return centre and size (radius in m) of the nodes. */
   const extent = (nodes) => {
     const sides = [0, 1, 2].map((k) => d3.extent(nodes, (node) => node[k]));
@@ -73,7 +79,7 @@
   const fitted = (turn, frame, stage, reach, width, height, margin = 40) => {
     const { project } = camera({ turn }, frame, width, height);
     const axes = new Map(stage.sensors.filter(({ rotation }) => reach && !rotation).map(({ axis }) => [axis.map(Math.abs).join(), axis]));
-    const points = stage.nodes.flatMap((node) => [node, ...[...axes.values()].flatMap((axis) => [add(node, axis, reach), add(node, axis, -reach)])]).map(project);
+    const points = allOf(stage).flatMap((node) => [node, ...[...axes.values()].flatMap((axis) => [add(node, axis, reach), add(node, axis, -reach)])]).map(project);
     const half = (k, size) => Math.max(d3.max(points, (p) => Math.abs(p[k] - size / 2)), 1);
     return Math.min((width / 2 - margin) / half(0, width), (height / 2 - 30) / half(1, height));
   };
@@ -133,10 +139,12 @@
 
   /** Return what was found with its lines and points in m; changes of elements where nothing better is known. */
   const foundIn = (stage, exhibit) => {
-    const whole = stage.members.length ? stage.members.map(({ ends }) => ends.map((end) => stage.joints[end].xyz)) : stage.elements.map((pair) => pair.map((k) => stage.nodes[k]));
+    const edges = edgesOf(stage);
+    const whole = edges.length ? edges : stage.members.length ? stage.members.map(({ ends }) => ends.map((end) => stage.joints[end].xyz)) : stage.elements.map((pair) => pair.map((k) => stage.nodes[k]));
     const linesOf = ({ kind, points, spans }) => {
       if (kind === "all") return whole;
       if (kind === "pair" && points.length === 2) return [points];
+      if (kind === "outline") return d3.range(0, points.length, 2).map((k) => points.slice(k, k + 2));
       return spans.filter(({ member }) => whole[member]).map(({ member, start, end }) => [mix(...whole[member], start), mix(...whole[member], end)]);
     };
     if (exhibit?.findings?.length) return exhibit.findings.map((finding) => ({ ...finding, lines: linesOf(finding) }));
@@ -159,7 +167,7 @@
       const sort = value === null || symbol !== "change" ? "other" : norm ? "norm" : value > 0 ? "more" : "less";
       const pair = kind === "pair";
       const middles = kind === "all" || pair ? [] : lines.map((line) => project(mix(...line, 0.5)));
-      const at = [...(pair ? [] : points.map(project)), ...(symbol === "change" ? [] : middles)];
+      const at = [...(pair || kind === "outline" ? [] : points.map(project)), ...(symbol === "change" ? [] : middles)];
       const paths = symbol === "change" || pair ? lines.map((line) => straight(line.map(project))).join("") : "";
       return { label, kind, value, norm, share, sort, pair, paths, signs: at.map((p) => SIGNS[symbol][1](p, 6)).join(""), sign: SIGNS[symbol][0], anchor: [...at, ...middles][0], size: Math.abs(value ?? 0), k };
     });
@@ -238,7 +246,7 @@
     const all = shown.map(({ exhibit }) => foundIn(stage, exhibit));
     const words = all.map((found) => new Set(found.flatMap(({ label, norm }) => (norm ? ["norm"] : label.split(", ").map((text) => text.split(" ")[0])))));
     const shared = all.length === 2 && all.every((found) => found.length) && !words[0].isDisjointFrom(words[1]);
-    const [width, height, turn, frame] = [Math.min(640, Math.max(document.documentElement.clientWidth - 60, 280)), 360, FLAT[stage.plane] ?? FLAT["3d"], extent(stage.nodes)];
+    const [width, height, turn, frame] = [Math.min(640, Math.max(document.documentElement.clientWidth - 60, 280)), 360, FLAT[stage.plane] ?? FLAT["3d"], extent(allOf(stage))];
     const { project } = camera({ turn, fit: fitted(turn, frame, stage, 0, width, height, 90) }, frame, width, height);
     return shown.map(({ name }, k) => {
       const [found, end] = [all[k], scaleEnd(shared ? all.flat() : all[k])];
@@ -255,7 +263,7 @@
       const rows = large.map(({ label, value }) => [label, bench.cell(value, (v) => (v === null ? "–" : (100 * v).toFixed(2)))]);
       return el("figure", { class: "case-figure" }, el("figcaption", {}, title),
         svg("svg", { viewBox: `0 0 ${width} ${height}`, width, height, class: "case-map structure", role: "img", "aria-label": `${title}. ${stated}` },
-          svg("path", { class: "still", d: outline(chainsOf(stage), stage.nodes.map(project)) }), marks, names),
+          svg("path", { class: "still", d: outline(chainsOf(stage), stage.nodes.map(project)) + drawnEdges(stage, project) }), marks, names),
         el("p", { class: "case-stated" }, stated, colours),
         bench.fold("Everything as a table", () => bench.scroll(bench.table(`Everything: ${title}`, ["What was found", "Change in %"], rows))));
     });
@@ -269,7 +277,7 @@
   bench.structure = (root, stage, exhibits) => {
     const shown = exhibits.filter((entry) => entry.exhibit);
     const start = START[stage.plane] ?? START["3d"];
-    const [view, frame, chains] = [{ turn: start, zoom: 1, fit: 1 }, extent(stage.nodes), chainsOf(stage)];
+    const [view, frame, chains] = [{ turn: start, zoom: 1, fit: 1 }, extent(allOf(stage)), chainsOf(stage)];
     const layers = { still: svg("path", { class: "still" }), found: svg("g"), fixed: svg("g"), names: svg("g"), shape: svg("path", { class: "shape" }), arrows: svg("path", { class: "measured line" }) };
     const drawing = svg("svg", { class: "case-view structure", tabindex: "0", role: "application", "aria-roledescription": "structure view" }, Object.values(layers));
     const stated = el("p", { class: "case-stated", role: "status" });
@@ -291,7 +299,7 @@
       const write = bench.writer(layers.names, [0, 0, ...size]);
       const arrows = stage.sensors.map(({ xyz, axis, rotation }, i) => !rotation && (now.arrows?.[i] ?? null) !== null && [eye.project(xyz), eye.direct(axis.map((v) => now.arrows[i] * v))]);
       flat = { nodes: stage.nodes.map(eye.project), ways: (now.shape ?? []).map(eye.direct), arrows: show.measured ? arrows.filter(Boolean) : [] };
-      layers.still.setAttribute("d", outline(chains, flat.nodes));
+      layers.still.setAttribute("d", outline(chains, flat.nodes) + drawnEdges(stage, eye.project));
       layers.still.classList.toggle("alone", !now.shape);
       if (show.found) drawFound(layers.found, write, found, scaleEnd(found), eye.project, moving || play.playing);
       drawFixed(layers.fixed, write, stage, show, eye, frame.radius, size[1]);
