@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from femubench import Identification, __version__
-from femubench.plot import stabilisation, svg, synthesis
+from femubench.plot import mode_shape, stabilisation, svg, synthesis
 from femubench.reports.blocks import Cell, Column, Drawing, Items, Passage, Row, Table
 from femubench.reports.cells import estimate, figure
 from femubench.reports.terminal import to_terminal
@@ -19,6 +19,7 @@ _COLUMNS = (
     *(Column("MPC", 6, digits=4), Column("MPD, deg", 8, digits=2)),
 )
 _SHOWN = 4  # channels drawn, those that fit worst
+_FEW, _MOST_SHAPES = 3, 12  # sensors that make a shape; shapes that are drawn
 _OVERVIEW, _SMALL = (8.6, 4.2), (4.0, 2.8)  # inch
 
 
@@ -81,6 +82,9 @@ def _sections(found: Identification) -> Iterator[Passage]:
     title = "Poles over model orders"
     drawn = _drawing(found, "stabilisation", title, stabilisation, _OVERVIEW)
     yield Passage(title, [said, Row([drawn])])
+    if shapes := list(_shapes(found)):
+        said = "Real parts at the sensors, the largest of each mode drawn alike."
+        yield Passage("Mode shapes", [said, Row(shapes)])
     if found.measured is not None:
         channels, title = int(_seen(found).sum()), "Synthesised over measured, all channels"
         said = f"Root mean square over {channels} channels, each at a level of one."
@@ -113,6 +117,17 @@ def _facts(found: Identification) -> Iterator[tuple[str, str]]:
 def _seen(found: Identification) -> Any:  # noqa: ANN401 - a bool array
     assert found.measured is not None
     return np.isfinite(found.measured.values[0])
+
+
+def _shapes(found: Identification) -> Iterator[Drawing]:
+    """Yield the first shapes, where the sensors have places that are apart."""
+    if len(found.sensors) < _FEW or not np.ptp(found.sensors.xyz, axis=0).max() > 0.0:
+        return
+    for mode in range(1, min(len(found), _MOST_SHAPES) + 1):
+        title = f"{mode}: {figure(found.frequencies[mode - 1], 5)} Hz"
+        yield _drawing(
+            found, f"shape-{mode}", title, partial(mode_shape, mode=mode, scale=1.6), _SMALL
+        )
 
 
 def _worst(found: Identification) -> Iterator[Drawing]:

@@ -14,7 +14,7 @@ import femubench
 from femubench import Identification, InputError, identify
 from femubench.core.identify.complexity import mean_phase_deviation, phase_collinearity
 from femubench.modal import FrequencyResponses, TimeSignals
-from femubench.plot import stabilisation, synthesis
+from femubench.plot import mode_shape, stabilisation, synthesis
 from femubench.reports.identification import identification_html
 from tests.command import call_bench
 from tests.frf_problems import frf_set, sensors, write_universal
@@ -201,6 +201,7 @@ def test_the_command_writes_tables_that_a_case_reads(tmp_path: Path, small: Any)
     )
     page = (tmp_path / "out" / "identification.html").read_text(encoding="utf-8")
     assert "test.uff" in page
+    assert "Mode shapes" in page
     assert "<script" not in page
     again = call_bench("identify", file, "--output", tmp_path / "out", code=2)
     assert "is not empty" in again.output
@@ -209,6 +210,9 @@ def test_the_command_writes_tables_that_a_case_reads(tmp_path: Path, small: Any)
 def test_drawings_refuse_what_they_cannot_draw(found: Identification) -> None:
     assert stabilisation(found).get_xlabel() == "frequency, Hz"
     assert synthesis(found, (2, 1)).get_ylabel() == "accelerance, dB re 1 m/(s² N)"
+    assert len(mode_shape(found, 1).collections) == 1
+    with pytest.raises(InputError, match="no mode 99"):
+        mode_shape(found, 99)
     with pytest.raises(InputError, match="no channel"):
         synthesis(found, (13, 0))
 

@@ -1,4 +1,4 @@
-"""What an identification rests on: poles over model orders, synthesised over measured responses."""
+"""What an identification rests on: poles over orders, synthesised responses, shapes at sensors."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femubench.core.drawing.wireframe import DrawnSensor, Wireframe, to_point
 from femubench.core.errors import InputError
 from femubench.core.identify.identification import Identification
+from femubench.core.plot.structure import frame_axes, view_of
 from femubench.core.plot.style import (
     AFTER,
     BEFORE,
@@ -115,6 +117,41 @@ def _thinned(hz: FloatArray, levels: FloatArray) -> tuple[FloatArray, FloatArray
     starts = np.arange(0, len(hz), block)
     best = [int(a + np.argmax(levels[a : a + block])) for a in starts]
     return hz[best], levels[best]
+
+
+def draw_identified(found: Identification, mode: int, reach: float, ax: Axes | None) -> Axes:
+    """Draw the real parts of an identified shape as arrows at its sensors.
+
+    Arguments:
+        found: what was identified.
+        mode: its number, from 1.
+        reach: of the largest arrow, in the longest side of the structure.
+        ax: to draw on; None for axes of a new figure.
+
+    Raises:
+        InputError: where there is no such mode, or the sensors have no extent.
+    """
+    if not 1 <= mode <= len(found):
+        raise InputError(f"there is no mode {mode}", expected=f"1 to {len(found)}")
+    moves = np.array(["r" not in name for name in found.sensors.directions], dtype=bool)
+    xyz, places = np.unique(found.sensors.xyz[moves], axis=0, return_inverse=True)
+    motion = np.zeros_like(xyz)
+    readings = np.nan_to_num(np.real(found.shapes[moves, mode - 1]))
+    np.add.at(motion, places.ravel(), readings[:, None] * found.sensors.axes[moves, :3])
+    sensors = tuple(DrawnSensor(str(k), to_point(at)) for k, at in enumerate(xyz))
+    wireframe = Wireframe("matrices", (), (), sensors)
+    view = view_of(wireframe, oblique=True)
+    ax = own_axes(ax, (4.0, 3.2))
+    largest = float(np.linalg.norm(motion, axis=1).max()) or 1.0
+    arrows = reach * float(np.ptp(xyz, axis=0).max()) / largest * motion
+    starts, ways = view.flat(xyz), view.flat(arrows)
+    ax.plot(*starts.T, linestyle="none", marker="o", markersize=2.5, color=MEMBER)
+    ax.quiver(
+        *starts.T, *ways.T, angles="xy", scale_units="xy", scale=1.0, width=0.006, headwidth=4.0,
+        color=AFTER, zorder=3,
+    )  # fmt: skip
+    frame_axes(ax, view, np.vstack([starts, starts + ways]), pad=0.06, scales=False)
+    return ax
 
 
 def synthesis(

@@ -12,8 +12,10 @@ from femubench.core.drawing.prediction import node_motions, pair_modes
 from femubench.core.drawing.wireframe import MOST_NODES, Wireframe, wireframe_of
 from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
+from femubench.core.identify.identification import Identification
 from femubench.core.modal.correlation import modal_scale_factor
 from femubench.core.modal.eigen import modes_of
+from femubench.core.plot.identification import draw_identified
 from femubench.core.plot.structure import View, draw_lines, draw_structure, frame_axes, view_of
 from femubench.core.plot.style import INK, PAGE, check_kind, curve_style, own_axes
 from femubench.core.typing import FloatArray
@@ -25,7 +27,7 @@ _REACH = 0.12  # of the largest side of the structure, a largest motion at a sca
 
 
 def mode_shape(
-    source: Case | Model,
+    source: Case | Model | Identification,
     mode: int | Sequence[int] = 1,
     *,
     measured: bool = True,
@@ -38,7 +40,8 @@ def mode_shape(
     from above a corner. Supports, known masses (squares) and springs to ground (zigzags) are shown.
 
     Arguments:
-        source: a case, for the modes of its nominal model, or a model.
+        source: a case, for the modes of its nominal model, a model, or an identification, whose
+            shapes are arrows at its sensors, one at a time.
         mode: numbers of elastic modes in ascending order, from 1; several differ by line.
         measured: whether the measured mode that pairs with the first one is drawn, as an arrow at
             every sensor; needs a case with shapes.
@@ -51,7 +54,10 @@ def mode_shape(
     Examples:
         >>> plot.mode_shape(case, 2).get_figure().savefig("mode-2.svg")
     """
+    if isinstance(source, Identification) and isinstance(mode, int):
+        return draw_identified(source, mode, scale * _REACH, ax)
     check_kind(source, (Case, Model), "mode shapes on a structure")
+    assert not isinstance(source, Identification)
     model = source.model if isinstance(source, Case) else source
     wireframe = wireframe_of(source)
     if not wireframe.nodes:
