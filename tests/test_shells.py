@@ -233,3 +233,27 @@ def test_solids_stand_on_shells(tmp_path: Path) -> None:
     assert abs(model.stiffness @ rigid).max() < 1e-9 * abs(model.stiffness).max()
     weight = 7850.0 * (0.5 * 0.3 * 0.004 + 0.125 * 0.1 * 0.1)
     assert rigid[:, 2] @ (model.mass @ rigid[:, 2]) == pytest.approx(weight, rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["S6", "S8R"])
+def test_shells_with_nodes_amid_their_edges_are_cut_in_four(kind: str, tmp_path: Path) -> None:
+    """A bend that hangs free and one that is clamped: half of the error of the mesh is left."""
+    for held in ((), (1, 2, 3, 4, 5, 6)):
+        model = read(tmp_path, shell_deck(kind, angle(0.5 * np.pi, 3), held, across=2))
+        fine = read(tmp_path, shell_deck(kind, angle(0.5 * np.pi, 12), held, across=8))
+        assert model.finer is not None
+        whole, better = model.finer()
+        rows = slice(whole.size)
+        np.testing.assert_allclose(better.dofs.xyz[rows], whole.dofs.xyz, atol=1e-4)
+        mass, more = (float(r @ (m.mass @ r)) for m in (whole, better) for r in [uniform(m)])
+        assert more == pytest.approx(mass, rel=0.2 if held else 1e-9)
+        coarse, true = (elastic_modes(m, 5).natural_frequencies[:5] for m in (model, fine))
+        bias = mesh_bias(model, 5)
+        assert bias is not None
+        off, left = (np.abs(f / true - 1.0).max() for f in (coarse, coarse * (1.0 + bias)))
+        assert left < 0.5 * off
+
+
+def uniform(model: Model) -> FloatArray:
+    """Return the translation along x."""
+    return np.asarray(model.dofs.motions[:, 0])

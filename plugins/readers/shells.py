@@ -52,6 +52,14 @@ class Shell(NamedTuple):
         pairs = [pair for chain in self.edges for pair in pairwise(chain)]
         return np.vstack([corners, *(corners[list(pair)].mean(axis=0) for pair in pairs)])
 
+    def edge_of(self, point: FloatArray) -> tuple[int, int, int] | None:
+        """Return the ends of the edge that a point of the reference element is on, and amid it."""
+        for i in range(self.corners):
+            start, end = self.places[i], self.places[(i + 1) % self.corners]
+            if abs(np.linalg.det(np.stack([end - start, point - start]))) < _STRAIGHT:
+                return i, (i + 1) % self.corners, self.corners + i
+        return None
+
 
 SHELLS = {
     "S3": Shell("C3D6", "ElementTriP1", 3),
@@ -61,6 +69,11 @@ SHELLS = {
     "S8R": Shell("C3D20R", "ElementQuadS2", 4),
 }
 BETTER = {"S3": "S6", "S4": "S8R"}
+# Corners of the parts of a shell that is cut in four, and which way their axes point.
+_QUARTERS = {
+    3: [((0.0, 0.0), 0.5), ((0.5, 0.0), 0.5), ((0.0, 0.5), 0.5), ((0.5, 0.5), -0.5)],
+    4: [((x, y), 0.5) for x in (0.0, 0.5) for y in (0.0, 0.5)],
+}
 _ALIKE = np.cos(np.deg2rad(20.0))  # of normals: elements that share a line of nodes
 _STRAIGHT = 1e-9  # of a unit vector: what rounding leaves of it
 
@@ -101,13 +114,17 @@ class Motions:
     Arguments:
         row: of every node of solids; direction d of it has row 3 row + d.
         held: node and direction of supports.
-        inner: whether a degree of freedom is inside a line of nodes; these come last.
+        early: nodes that come before those of better elements, as `find_lines_of_three` has them.
+        owner: the node of the input file whose degrees of freedom are added.
+        order: of the degrees of freedom: those inside a line of nodes behind those of nodes.
     """
 
     row: Mapping[int, int]
     held: Set[tuple[int, int]]
+    early: Mapping[int, bool]
     found: list[Motion] = field(default_factory=list)
-    inner: list[bool] = field(default_factory=list)
+    owner: int = 0
+    order: list[int] = field(default_factory=list)
     entries: list[tuple[int, int, float]] = field(default_factory=list)
 
     def add(self, motion: Motion, moved: Mapping[int, FloatArray], inner: bool = False) -> None:
@@ -119,7 +136,8 @@ class Motions:
                     (start + d, column, float(vector[d])) for d in range(3) if vector[d]
                 ]
         self.found.append(motion)
-        self.inner.append(inner)
+        late = not self.early.get(self.owner, False) if inner else self.owner not in self.early
+        self.order.append(2 * late + inner)
 
     def add_node(self, node: int, xyz: FloatArray, moved: Set[int]) -> None:
         """Add the translations of a node, which some nodes follow."""
@@ -129,11 +147,21 @@ class Motions:
 
     def matrix(self) -> tuple[list[Motion], SparseArray]:
         """Return the degrees of freedom and what they do to all rows of solids, (3 N, n)."""
-        order = np.argsort(self.inner, kind="stable")
+        order = np.argsort(self.order, kind="stable")
         rows, columns, values = zip(*self.entries, strict=True)
         shape = (3 * len(self.row), len(order))
         whole = sp.csc_array((values, (rows, columns)), shape=shape)
         return [self.found[i] for i in order], sp.csc_array(whole[:, order])
+
+
+def find_lines_of_three(elements: Mapping[int, Element]) -> dict[int, bool]:
+    """Return all nodes, and of which a shell makes a line with a node in the middle."""
+    found: dict[int, bool] = {}
+    for kind, own in elements.values():
+        three = SHELLS[kind].corners if kind in SHELLS and SHELLS[kind].edges else 0
+        for i, node in enumerate(own):
+            found[node] = i < three or found.get(node, False)
+    return found
 
 
 @cache
@@ -144,6 +172,64 @@ def _slopes(kind: str) -> FloatArray:
     element, places = getattr(skfem, SHELLS[kind].functions)(), SHELLS[kind].places
     far = np.linalg.norm(element.doflocs[None] - places[:, None], axis=-1)
     return np.array([element.lbasis(places.T, i)[1] for i in far.argmin(axis=1)])
+
+
+@cache
+def _values(kind: str) -> FloatArray:
+    """Return the functions (n) at the nodes of all quarters (4 n), (n, 4 n)."""
+    import skfem
+
+    element, places = getattr(skfem, SHELLS[kind].functions)(), SHELLS[kind].places
+    far = np.linalg.norm(element.doflocs[None] - places[:, None], axis=-1)
+    at = np.vstack([start + turn * places for start, turn in _quarters(kind)])
+    return np.array([element.lbasis(at.T, i)[0] for i in far.argmin(axis=1)])
+
+
+def _quarters(kind: str) -> list[tuple[FloatArray, float]]:
+    return [(np.array(start), turn) for start, turn in _QUARTERS[SHELLS[kind].corners]]
+
+
+def split_shells(
+    elements: Mapping[int, Element], places: Mapping[int, Point], held: Set[tuple[int, int]]
+) -> tuple[dict[int, list[Element]], dict[int, Point], set[tuple[int, int]]]:
+    """Return the four parts of every shell with nodes amid its edges, all nodes, and supports.
+
+    New nodes lie on the surface of the element, and are held as all of their edge is.
+
+    Arguments:
+        elements: kind and nodes by number.
+        places: of the nodes.
+        held: node and direction of supports.
+    """
+    found, own_places, own_held = {}, dict(places), set(held)
+    known: dict[tuple[object, ...], int] = {}
+    for number, (kind, own) in elements.items():
+        if kind not in SHELLS or not SHELLS[kind].edges:
+            continue
+        shell, xyz = SHELLS[kind], np.array([places[node] for node in own])
+        at = np.vstack([start + turn * shell.places for start, turn in _quarters(kind)])
+        nodes = []
+        for point, where in zip(at, _values(kind).T @ xyz, strict=True):
+            old = np.abs(shell.places - point).max(axis=1) < _STRAIGHT
+            if old.any():
+                nodes.append(own[int(old.argmax())])
+                continue
+            edge = shell.edge_of(point)
+            ends = () if edge is None else tuple(own[i] for i in edge)
+            # Two elements share a node of an edge by its ends and the nearer of these.
+            near = own[int(np.abs(shell.places[: shell.corners] - point).sum(axis=1).argmin())]
+            key = (*sorted(ends[:2]), near) if ends else (-number, *np.round(point, 6).tolist())
+            if key not in known:
+                known[key] = max(own_places) + 1
+                x, y, z = where
+                own_places[known[key]] = float(x), float(y), float(z)
+                own_held |= {
+                    (known[key], d) for d in range(6) if ends and {(e, d) for e in ends} <= held
+                }
+            nodes.append(known[key])
+        n = len(own)
+        found[number] = [(kind, tuple(nodes[i : i + n])) for i in range(0, 4 * n, n)]
+    return found, own_places, own_held
 
 
 def find_normals(kind: str, xyz: FloatArray) -> FloatArray:

@@ -81,10 +81,12 @@ class SolidDeck:
 
 @dataclass(frozen=True)
 class BetterElements:
-    """The model of a deck with linear elements, and the same with a node amid every edge of these.
+    """The model of a deck, and the same with better elements.
+
+    Those are linear elements with a node amid every edge, and shells with such nodes cut in four.
 
     Arguments:
-        deck: with linear elements.
+        deck: with elements that better ones stand for.
         places: of its nodes.
         whole: its model.
     """
@@ -99,24 +101,35 @@ class BetterElements:
 
     @cached_property
     def _better(self) -> Model:
-        deck, places = self.deck, dict(self.places)
-        better = replace(deck, elements={}, held=set(deck.held))
+        deck = self.deck
+        own_places = {int(node): at for node, at in self.places.items()}
+        quarters, own_places, held = shells.split_shells(deck.elements, own_places, deck.held)
+        places = {str(node): at for node, at in own_places.items()}
+        better = replace(deck, elements={}, held=held)
+        better.sets = {name: dict(own) for name, own in deck.sets.items()}
         amid: dict[tuple[int, ...], int] = {}
-        first = max(map(int, places)) + 1
+        next_node, next_element = max(own_places) + 1, max(deck.elements) + 1
         for number, (kind, own) in deck.elements.items():
             found = _BETTER.get(kind)
+            if number in quarters:
+                numbers = (number, *range(next_element, next_element + 3))
+                next_element += 3
+                better.elements |= dict(zip(numbers, quarters[number], strict=True))
+                for members in better.sets.values():
+                    members |= dict.fromkeys(numbers) if number in members else {}
+                continue
             if found is None:
                 better.elements[number] = kind, own
                 continue
             pairs = (pair for chain in KINDS[found].edges for pair in pairwise(chain))
             edges = [tuple(sorted((own[a], own[b]))) for a, b in pairs]
-            new = [amid.setdefault(edge, first + len(amid)) for edge in edges]
+            new = [amid.setdefault(edge, next_node + len(amid)) for edge in edges]
             better.elements[number] = found, (*own, *new)
         for (a, b), node in amid.items():
             x, y, z = 0.5 * (np.array(places[str(a)]) + np.array(places[str(b)]))
             places[str(node)] = float(x), float(y), float(z)
             better.held.update((node, d) for d in range(6) if {(a, d), (b, d)} <= deck.held)
-        return _model_of(better, _materials(deck), places, first)
+        return _model_of(better, _materials(better), places, deck)
 
 
 def read_deck(path: Path) -> SolidDeck:
@@ -139,8 +152,8 @@ def read_solids(path: Path) -> Model:
     """
     deck, places = read_deck(path), nodes.read_nodes(path)
     model = _model_of(deck, _materials(deck), places)
-    linear = any(kind in _BETTER for kind, _ in deck.elements.values())
-    if not linear or model.size > _SOLVED:
+    kinds = {kind for kind, _ in deck.elements.values()}
+    if not kinds & {*_BETTER, *shells.SHELLS} or model.size > _SOLVED:
         return model
     return replace(model, finer=BetterElements(deck, places, model))
 
@@ -149,19 +162,18 @@ def _model_of(
     deck: SolidDeck,
     material: Mapping[int, str],
     places: Mapping[str, Point],
-    first: float = np.inf,
+    before: SolidDeck | None = None,
 ) -> Model:
     """Return the model of a deck whose solid elements have these materials.
 
     Arguments:
         places: of its nodes.
-        first: number of a node, from which on they come behind all others.
+        before: whose degrees of freedom come first.
     """
     path = deck.path
     needs("skfem", "solids", path)
-    used = sorted(
-        dict.fromkeys(n for _, own in deck.elements.values() for n in own), key=lambda n: n >= first
-    )
+    early = shells.find_lines_of_three((before or deck).elements)
+    used = list(early | shells.find_lines_of_three(deck.elements))
     if lost := [n for n in used if str(n) not in places]:
         raise InputError(f"node {lost[0]} of an element has no place", file=path, expected="*NODE")
     own = {n: places[str(n)] for n in used}
@@ -170,8 +182,9 @@ def _model_of(
         n for kind, nodes in solid.elements.values() if kind != "MASS" for n in nodes
     )
     row, xyz = {n: i for i, n in enumerate(ends)}, np.array([solid.places[n] for n in ends])
-    motions = shells.Motions(row, deck.held)
+    motions = shells.Motions(row, deck.held, early)
     for n in used:
+        motions.owner = n
         if n in solid.lines:
             solid.add_motions(n, motions)
         elif n in row:
