@@ -5,9 +5,13 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
-from femubench.plot import Axis, Chart, Mark, Series
+from markupsafe import Markup
+
+from femubench import FemubenchError, cases
+from femubench.plot import Axis, Chart, Mark, Series, mode_shape, svg
 from femubench.reports.blocks import Column, Passage, Table
 from femubench.reports.cells import format_fixed, interval, plain, shorten_text
 from femubench.reports.feed import feeds_of, headline_of
@@ -52,7 +56,7 @@ def pages_of(index: Data) -> dict[str, str]:
     for item in index["cases"]:
         rows = _on_case(index["strategies"], item["name"], item["digest"])
         title = plain(item["title"]) or plain(item["name"])
-        pages[item["page"]] = _page("case", index, item, title, rows=rows)
+        pages[item["page"]] = _page("case", index, item, title, rows=rows, picture=_picture(item))
     style = asset("page.css") + asset("site.css")
     script = asset("sortable.js") + asset("site.js")
     return pages | feeds_of(index) | {"site.css": style, "site.js": script}
@@ -74,6 +78,19 @@ def _board_page(index: Data, board: Data) -> str:
         chart=gains_of(board),
         strategies={item["name"]: item for item in index["strategies"]},
     )  # fmt: skip
+
+
+def _picture(item: Data) -> Markup | None:
+    """Return the first mode of a case on its structure, where the same files are installed."""
+    name, said = plain(item["name"]), "The structure and its first mode, predicted and measured."
+    try:
+        if name not in cases or cases[name].digest != item["digest"]:
+            return None
+        draw = partial(mode_shape, cases[name], 1)
+        drawn = svg(draw, name="structure", title=name, caption=said, size=(6.0, 4.2), themed=True)
+    except FemubenchError:  # as of a model of more nodes than a picture has
+        return None
+    return Markup(drawn)
 
 
 def _strategy_page(item: Data, index: Data) -> str:

@@ -15,11 +15,13 @@ import pytest
 from click.testing import Result
 from run_edits import called, failed, moved, renamed, scaled, versioned
 
+import femubench
 from femubench.core.publish import publishing
 from femubench.core.publish.submissions import slug
 from femubench.core.run.runner import run_jobs
 from femubench.core.schema.records import read_run, run_from_json, run_to_json
 from femubench.core.score.leaderboard import leaderboard
+from femubench.reports.publish_page import pages_of
 from tests.command import call_bench
 
 Data = dict[str, Any]
@@ -104,6 +106,15 @@ def test_one_run_gives_its_leaderboard(data: Data, site: Site) -> None:
     assert json.loads(kept.read_text())["meta"]["structures"] == data["meta"]["structures"]
     text = (site.folder / "index.html").read_text()
     assert f"{found['strategies'][0]['versions'][0]['gain']:.3f}" in text
+
+
+def test_a_case_is_drawn_where_its_files_are_installed(data: Data, site: Site) -> None:
+    site.add(data)
+    case, digest = site.index()["cases"][0], femubench.cases["frame"].digest
+    for stated, drawn in ((digest, True), (digest[::-1], False)):
+        own = {**case, "name": "frame", "digest": stated}
+        page = pages_of({**site.index(), "cases": [own]})[case["page"]]
+        assert ("<strong>The structure</strong>" in page) == drawn
 
 
 def test_the_same_files_give_the_same_bytes(data: Data, tmp_path: Path) -> None:
