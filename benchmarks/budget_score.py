@@ -38,6 +38,7 @@ KINDS = {
     **dict.fromkeys(("joint-mass", "joint mass", "overlap of members", "added-mass"), "mass"),
     "rotary inertia of masses": "mass",
     **dict.fromkeys(("shear-deformation", "rotary-inertia"), "shear"),
+    "GJ": "torsion-constant",
 }
 
 

@@ -12,7 +12,7 @@ import pytest
 from msgspec import structs
 
 import femubench
-from femubench import plot
+from femubench import fem, plot
 from femubench.core.case.case import Case
 from femubench.core.case.writing import write_case
 from femubench.core.change.terms import sparse_matrix
@@ -38,6 +38,7 @@ from femubench.core.inference.settings import settings
 from femubench.core.library.cases import cases
 from femubench.core.modal.eigen import modes_of
 from femubench.core.plugin.loader import list_effects
+from femubench.core.typing import FloatArray
 from femubench.reports.diagnosis_words import as_drawn, budget
 from truths.lacks_file import LACKS, read_lacks
 
@@ -61,6 +62,12 @@ def measured_as(case: Case, model: Model) -> Case:
         total_mass=None,
     )
     return replace(case, measurement=fresh)
+
+
+def open_of(found: Budget) -> FloatArray:
+    """Return what data and drawing leave open of every mode, in % of its frequency, (m,)."""
+    slopes = frequency_slopes(found.state)
+    return np.asarray(100.0 * np.sqrt((slopes @ found.covariance @ slopes.T).diagonal()))
 
 
 @pytest.fixture(scope="module")
@@ -91,12 +98,40 @@ def test_a_soft_joint_is_found_with_its_sign_at_its_type(drawn: Case) -> None:
     assert np.linalg.norm(left) < 0.15 * np.linalg.norm(error)
 
 
+def test_one_heavy_joint_is_found_whole_and_nothing_else_takes_of_it() -> None:
+    case = cases["suite/box-frame"]
+    structure, heavy = case.model.frame_structure, 0.15 * case.model.total_mass
+    hung = (*structure.frame.masses, fem.PointMass(fem.Place(joint="B1"), heavy))
+    model = Model.of(structure.rebuilt(replace(structure.frame, masses=hung)))
+    found = budget_of(measured_as(case, model), [])
+    assert found is not None
+    added = {str(m.at): m.mass for m in found.extended.frame_structure.frame.masses}
+    # It is 42 prior deviations.
+    assert added.pop("B1") == pytest.approx(heavy, rel=0.02)
+    assert max(added.values(), default=0.0) < 0.01 * heavy
+
+
+def test_what_scales_show_of_a_base_plate_is_in_no_mode() -> None:
+    case = cases["suite/mast-lumps"]
+    sound, mass = measured_as(case, case.model), case.model.total_mass
+    weighed = replace(sound.measurement, total_mass=(1.3 * mass, 0.005 * mass))
+    found = budget_of(replace(sound, measurement=weighed), [])
+    assert found is not None
+    # That of the overlap at the tee, which the measured model has as drawn, is 0.4.
+    assert max(abs(line.rms_percent) for line in found.lines) < 0.5
+
+
 def test_lines_add_up_and_the_extended_model_gives_what_the_fit_does(real: Budget) -> None:
     total = sum(np.array(line.percent) for line in real.lines)
     left = np.array([mode.left_percent for mode in real.modes])
     error = np.array([mode.error_percent for mode in real.modes])
     np.testing.assert_allclose(total + left, error, atol=1e-9)
     assert {line.source for line in real.lines} == {"handbook", "data", "drawing"}
+    # A mode is as loose as what is open of it, an unseen one also as what is put in is ideal.
+    own = [line.percent for line in real.lines if line.source != "handbook"]
+    ideal = np.where([m.used for m in real.modes], 0.0, 0.3 * np.linalg.norm(own, axis=0))
+    std = [mode.std_percent for mode in real.modes]
+    np.testing.assert_allclose(std, np.hypot(open_of(real), ideal))
     solved = modes_of(real.extended, 20).elastic.natural_frequencies
     fitted = np.sort(real.state.frequencies)
     np.testing.assert_allclose(solved[:7], fitted[fitted > 1.0][:7], rtol=1e-6)
@@ -298,7 +333,7 @@ def test_the_mode_that_says_most_of_what_is_open_is_advised_first(drawn: Case) -
     found = budget_of(drawn, list_effects())
     assert found is not None
     rows = advise_modes(found, drawn)
-    stds = {mode.mode: mode.std_percent for mode in found.modes if not mode.used}
+    stds = {m.mode: s for m, s in zip(found.modes, open_of(found), strict=True) if not m.used}
     loosest = max(stds, key=lambda number: stds[number])
     (row,) = [row for row in rows if f"use mode {loosest} " in row.measurement]
     rest = 100.0 * settings.budget_rest[0]

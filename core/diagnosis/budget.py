@@ -4,10 +4,12 @@ The handbook says what it knows. Then all that drawings of real structures lack 
 the used modes, each with the room that the drawing leaves it. A joint zone may be stiffer or softer
 about every axis, with the drawing in the middle: the arm of half a depth, a wall that gives and a
 gusset are one net number, for data cannot tell them apart. Modulus, density and masses have little
-room, for they take what is not theirs. What the data do not see stays as drawn.
+room, for they take what is not theirs. Most joints and masses lack little, and a few much: their
+priors have tails. What the data do not see stays as drawn.
 
 Source: Tarantola (2005), section 3.2, the most probable point of an iterated linear-Gaussian model;
-Aumann & Shapley (1974) for the shares of what is fitted together.
+Lange, Little & Taylor (1989) for the tails; Aumann & Shapley (1974) for the shares of what is
+fitted together.
 """
 
 from __future__ import annotations
@@ -58,6 +60,8 @@ from femubench.core.typing import FloatArray, IntArray
 
 # Of every axis of a joint zone the displacements of an element, and what a factor multiplies.
 _JOINTS, _SPRINGS, _LUMPS = "joint stiffness", "springs to ground", "rotary inertia of masses"
+_MASSES = "joint mass"
+_TAILED = (_JOINTS, _SPRINGS, _LUMPS, _MASSES)  # of most a drawing lacks little, of a few much
 _WHOLES = ("E", "GJ", "density")  # of everything
 _AXES = {"rx": (TWIST, "GJ"), "ry": (BEND_XZ, "bending ry"), "rz": (BEND_XY, "bending rz")}
 Source = Literal["handbook", "data", "drawing"]
@@ -94,8 +98,7 @@ class Entry:
     def hypothesis(self) -> Hypothesis:
         """Return it as what a fit takes; a mass cannot be negative."""
         lower = -np.inf if self.quantities else 0.0
-        reach = settings.widest_coordinate
-        own = tuple(Parameter(n, "", 1.0, lower=lower, reach=reach) for n in self.names)
+        own = tuple(Parameter(n, "", 1.0, lower=lower, reach=np.inf) for n in self.names)
         change = Change(self.terms, self.grow, name=self.kind, places=(self.place,), parameters=own)
         return Hypothesis(cast(Effect, SimpleNamespace(name=self.kind)), change, 1)
 
@@ -150,6 +153,9 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
     model, every = case.model, case.measurement
     if model.structure is None and not model.groups:
         return None
+    if model.structure is not None and model.structure.frame.supports:
+        # Scales show what is held too, such as a base plate, which moves in no mode.
+        every = replace(every, total_mass=None)
     start = _as_it_is(model, every)
     # What the drawing has as a rigid motion has no ratio of frequencies, and which of its modes one
     # without a shape is, that no fit has seen, nobody knows where others have theirs.
@@ -184,17 +190,20 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
     entries = list_entries(model)
     hypotheses = [entry.hypothesis for entry in entries]
     problem, parts = _pose(model, every.select(used), hypotheses, every)
-    whole = fit(problem, parts, np.zeros(sum(len(entry.names) for entry in entries)))
-    if whole is None:
+    fitted = _fit_with_tails(problem, parts, entries)
+    if fitted is None:
         return None
-    # What is left beyond the noise makes all of it less sure (Birge 1932).
-    x, excess = whole.state.x, whole.state.chi2 / len(problem.data)
-    covariance = whole.covariance * max(1.0, excess)
+    x, covariance = fitted
     wide, places = _pose(model, every, hypotheses, every)
     state = state_at(wide, places, x)
     slopes, found = frequency_slopes(state), log_frequencies(state)
-    lines += _share_out(entries, state, slopes, covariance)
-    deviation = np.sqrt(np.einsum("mk,kl,ml->m", slopes, covariance, slopes))
+    fresh = _share_out(entries, state, slopes, covariance)
+    variance = np.einsum("mk,kl,ml->m", slopes, covariance, slopes)
+    # A used mode was fitted with all that its lines idealise, another was not.
+    shares = np.array([line.percent for line in fresh]) / 100.0
+    ideal = np.square(settings.own_error_of_change * shares).sum(axis=0)
+    deviation = np.sqrt(variance + np.where(np.isin(every.numbers, used), 0.0, ideal))
+    lines += fresh
     measured = np.log(every.frequencies)
     figures = 100.0 * np.column_stack([measured - drawn, measured - found, deviation])
     numbers = zip(every.numbers, figures.tolist(), strict=True)
@@ -202,6 +211,38 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
     extended = extend_model(model, entries, x)
     lines.sort(key=lambda line: -abs(line.rms_percent))
     return Budget(tuple(lines), modes, extended, state, covariance)
+
+
+def _fit_with_tails(
+    problem: Problem, parts: _Parts, entries: Sequence[Entry]
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return the most probable coordinates, (k,), and their covariance; None where no fit stands.
+
+    A normal prior whose width is known to its order alone is Cauchy's, of all numbers of an entry
+    together: fit and widths follow in turn, each given the other.
+
+    Source: Lange, Little & Taylor (1989), JASA 84, 881-896, for one degree of freedom.
+    """
+    split = _split(entries)
+    x = np.zeros(sum(len(entry.names) for entry in entries))
+    width = np.ones(len(x))
+    for _ in range(settings.scale_steps[1]):
+        own = [e.root * width[at] for e, at in zip(entries, split, strict=True)]
+        scaled = [replace(e, root=root).hypothesis for e, root in zip(entries, own, strict=True)]
+        posed = [replace(p, hypothesis=h) for p, h in zip(parts, scaled, strict=True)]
+        found = fit(problem, posed, x / width)
+        if found is None:
+            return None
+        x, before = width * found.state.x, width.copy()
+        covariance = found.covariance * np.outer(width, width)
+        size = np.square(x) + covariance.diagonal()
+        for entry, at in zip(entries, split, strict=True):
+            if entry.kind in _TAILED:
+                width[at] = np.sqrt((1.0 + size[at].sum()) / (1.0 + len(entry.names)))
+        if np.allclose(width, before, rtol=settings.budget_rest[0]):
+            break
+    # What is left beyond the noise makes all of it less sure (Birge 1932).
+    return x, covariance * max(1.0, found.state.chi2 / len(problem.data))
 
 
 def extend_model(model: Model, entries: Sequence[Entry], x: FloatArray) -> Model:
@@ -314,7 +355,7 @@ def list_entries(model: Model) -> list[Entry]:
         std = mass * model.total_mass / np.sqrt(len(alike_joints))
         for name in alike_joints:
             term = ModelPlaces(model).mass_term([Place(joint=name)])
-            found.append(_alone(place, "joint mass", term, std, (), (name,)))
+            found.append(_alone(place, _MASSES, term, std, (), (name,)))
     return [*found, *_attached(structure)]
 
 
