@@ -235,14 +235,15 @@ def _fit_with_tails(
             return None
         x, before = width * found.state.x, width.copy()
         covariance = found.covariance * np.outer(width, width)
+        # What is left beyond the noise makes all of it less sure (Birge 1932).
+        excess = max(1.0, found.state.chi2 / len(problem.data))
         size = np.square(x) + covariance.diagonal()
         for entry, at in zip(entries, split, strict=True):
             if entry.kind in _TAILED:
                 width[at] = np.sqrt((1.0 + size[at].sum()) / (1.0 + len(entry.names)))
         if np.allclose(width, before, rtol=settings.budget_rest[0]):
             break
-    # What is left beyond the noise makes all of it less sure (Birge 1932).
-    return x, covariance * max(1.0, found.state.chi2 / len(problem.data))
+    return x, covariance * excess
 
 
 def extend_model(model: Model, entries: Sequence[Entry], x: FloatArray) -> Model:
