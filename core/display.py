@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from html import escape
 
+from femubench.core.errors import clipped
+
 WIDTH, LINES = 100, 10
 
 
@@ -36,8 +38,7 @@ class Shown:
 
 def clip_text(text: str) -> str:
     """Return text on one line that is not longer than `WIDTH`."""
-    line = " ".join(text.split(" ")).replace("\n", " ").rstrip()
-    return line if len(line) <= WIDTH else f"{line[: WIDTH - 3]}..."
+    return clipped(text.replace("\n", " ").rstrip(), WIDTH)
 
 
 def count_noun(number: int, noun: str) -> str:

@@ -10,8 +10,9 @@ from pathlib import Path
 _LONGEST = 1000
 
 
-def _clipped(text: str) -> str:
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
+def clipped(text: str, longest: int = _LONGEST) -> str:
+    """Return text that is no longer, with dots where its end is missing."""
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
 def harmless(text: str) -> str:
@@ -52,8 +53,8 @@ class InputError(FemubenchError):
         self.what, self.file, self.line, self.key, self.expected = what, file, line, key, expected
         where = "" if file is None else str(file)
         where += "" if line is None else f":{line}"
-        parts = [part for part in (where, _clipped(key or ""), _clipped(what)) if part]
-        text = ": ".join(parts) + ("" if expected is None else f" (expected {_clipped(expected)})")
+        parts = [part for part in (where, clipped(key or ""), clipped(what)) if part]
+        text = ": ".join(parts) + ("" if expected is None else f" (expected {clipped(expected)})")
         super().__init__(harmless(text))
 
     def __reduce__(self) -> tuple[object, ...]:

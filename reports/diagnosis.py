@@ -1,7 +1,7 @@
 """A diagnosis as a report of any form, from the data of ``bench diagnose --json``.
 
 The argument `data` of all functions is what `diagnosis_to_json` gives, fresh or read from a file
-through `diagnosis_from_json`. Files of earlier versions hold no structure, and medians alone.
+through `diagnosis_from_json`.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def diagnosis_html(data: Data) -> str:
         lead="".join(_lead(data)),
         heading=_heading(data),
         brand=f"Diagnosis of {data['case']}",
-        foot=f"femubench {data.get('version') or ''}, {seconds}. The numbers are those of bench "
+        foot=f"femubench {data['version']}, {seconds}. The numbers are those of bench "
         "diagnose --json.",
         scripts=("sortable.js", "diagnosis.js"),
     )
@@ -95,9 +95,9 @@ def _heading(data: Data) -> str:
 
 def _lead(data: Data) -> list[str]:
     """Return what comes before any name: of two measurements, or of the drawing by itself."""
-    if data.get("states"):
+    if data["states"]:
         return [words.states(data["states"])]
-    return [words.budget(data)] if data.get("budget_modes") else []
+    return [words.budget(data)] if data["budget_modes"] else []
 
 
 def _sections(data: Data, *, page: bool = False) -> list[Passage]:
@@ -105,10 +105,10 @@ def _sections(data: Data, *, page: bool = False) -> list[Passage]:
     verdict, base, reason = data["verdict"], data["base"], sentence(data["reason"])
     name = verdict if page else f"{data['case']}: {verdict}"
     said = Items([(name, f"{words.MEANINGS[verdict]}.")], look=f"verdict {verdict}")
-    warned = [("", row["warning"]) for row in data.get("scatter") or () if row["warning"]]
+    warned = [("", row["warning"]) for row in data["scatter"] if row["warning"]]
     looks = [(words.place(look["where"]), words.look(look)) for look in data["looks"]]
     notes = [("", note) for note in data["notes"]]
-    if data.get("written"):
+    if data["written"]:
         notes.append(("", f"The extended case is in {data['written']}"))
     next_title = "What cannot be distinguished" if reason else ""
     if data["advice"]:
@@ -163,7 +163,7 @@ def _error(data: Data) -> list[Block]:
 
 def _states(data: Data, *, page: bool) -> list[Block]:
     """Return the two measurements mode by mode, in a page as arrows too."""
-    states = data.get("states")
+    states = data["states"]
     if not states or not states["modes"]:
         return []
     say = partial(figure, digits=6)
@@ -189,7 +189,7 @@ def _states(data: Data, *, page: bool) -> list[Block]:
 
 def _budget(data: Data, *, page: bool) -> list[Block]:
     """Return what the drawing lacks, by class and mode."""
-    modes = data.get("budget_modes") or []
+    modes = data["budget_modes"]
     if not modes:
         return []
     say = partial(format_signed, decimals=1)
@@ -227,7 +227,7 @@ def _cards(data: Data, *, faults: bool = False) -> list[Block]:
     cards = [
         _card(number, cause)
         for number, cause in enumerate(data["causes"], 1)
-        if (cause.get("side", "model") != "model") is faults
+        if (cause["side"] != "model") is faults
     ]
     return [Cards(cards)] if cards else []
 
@@ -244,7 +244,7 @@ def _card(number: int, cause: Data) -> FindingCard:
         sure,
         [line for line in (words.elsewhere(cause), cause["summary"]) if plain(line)],
         [
-            (item["name"], words.parameter(item), *([said] if item.get("textbook") else []))
+            (item["name"], words.parameter(item), *([said] if item["textbook"] else []))
             for item in cause["parameters"]
         ],
     )
@@ -266,7 +266,7 @@ def _advice(data: Data) -> list[Block]:
 
 def _errors(data: Data) -> dict[str, Data]:
     """Return the frequency errors by kind, those of a run first."""
-    kinds = {"rms": data.get("gain_rms") or {}, "median": data["gain"]}
+    kinds = {"rms": data["gain_rms"], "median": data["gain"]}
     return {kind: pairs for kind, pairs in kinds.items() if any(pairs.values())}
 
 

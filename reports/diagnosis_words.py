@@ -186,7 +186,7 @@ def adequacy(data: Data) -> tuple[str, str]:
     if p is None:
         return NOTHING, "whether it is noise was not tested"
     said = f"noise alone leaves as much with probability {chance(p)}"
-    if any(row["less_p"] < _LIMIT for row in data.get("scatter") or () if row["warning"]):
+    if any(row["less_p"] < _LIMIT for row in data["scatter"] if row["warning"]):
         return "less than noise", f"of the stated size; {said}"
     if p >= _NOISE:
         return "noise", said

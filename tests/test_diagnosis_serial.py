@@ -139,7 +139,7 @@ class TestTerminal:
         assert not any(line != line.rstrip() for line in lines)
 
     def test_order_and_content(self) -> None:
-        text = words(toys.made(gain_rms=Gain((5.5, 0.25), (3.6, 0.8))))
+        text = words(toys.made())
         parts = [
             "toy: named: one explanation stands alone",
             "joint-rotation at type:T: probability 94.2 %; the joints rotate; "

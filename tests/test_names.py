@@ -23,7 +23,7 @@ ALLOWED = {
     "hframe": r"\"hframe\": _hframe",  # a structure of the challenge; in its seeds
     # the model with handbook values, and where a value of a cause comes from
     "textbook": r"[nN]ominal|handbook|record|: \[|_CAUSE_COLUMNS|source =|start|yardstick|both"
-    r"|[mM]odels|item\.get",
+    r"|[mM]odels|item\.get|item\[",
     "physical": r"\"unphysical\"",  # a label next to its contrary
 }
 

@@ -14,7 +14,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from femubench.core.errors import InputError
+from femubench.core.errors import InputError, clipped
 
 KeyPath = tuple[str | int, ...]
 _LONGEST_VALUE = 60
@@ -83,12 +83,8 @@ def join_key_path(path: KeyPath) -> str:
     """Return ``model.members[2].ends`` for a key path."""
     text = ""
     for part in path:
-        text += f"[{part}]" if isinstance(part, int) else f".{_clipped(part)}"
+        text += f"[{part}]" if isinstance(part, int) else f".{clipped(part, _LONGEST_VALUE)}"
     return text.lstrip(".")
-
-
-def _clipped(text: str) -> str:
-    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 3] + "..."
 
 
 def shorten_value(value: object) -> str:
@@ -99,7 +95,7 @@ def shorten_value(value: object) -> str:
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) > 10**_LONGEST_VALUE:
         return "a very large number"
     text = str(value).lower() if isinstance(value, bool) else repr(value)
-    return _clipped(text)
+    return clipped(text, _LONGEST_VALUE)
 
 
 def first_fault(error: ValidationError, schema: type[BaseModel]) -> BadKey:
@@ -129,7 +125,7 @@ def first_fault(error: ValidationError, schema: type[BaseModel]) -> BadKey:
     if kind == "missing":
         return BadKey(path, "missing key", expected)
     if kind == "extra_forbidden":
-        near = get_close_matches(_clipped(str(path[-1])), owner.model_fields, n=1)
+        near = get_close_matches(clipped(str(path[-1]), _LONGEST_VALUE), owner.model_fields, n=1)
         hint = f"; is {near[0]!r} meant?" if near else ""
         return BadKey(path, f"unknown key{hint}", f"one of {', '.join(owner.model_fields)}")
     if kind.startswith("union_tag"):

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from femubench.core.case.faults import Misfit
 from femubench.core.case.files import LARGEST_TEXT
 from femubench.core.case.schema import LARGEST
-from femubench.core.errors import InputError
+from femubench.core.errors import InputError, clipped
 from femubench.core.fem.frame import Place, Vector
 from femubench.core.fem.sensors import DIRECTIONS, axis_of
 from femubench.core.files import read_text
@@ -130,7 +130,7 @@ def _refused(cell: str) -> str:
 
 
 def _shown(cell: str) -> str:
-    return repr(cell if len(cell) <= 40 else cell[:37] + "...")
+    return repr(clipped(cell, 40))
 
 
 def plain_number(cell: str) -> float | str:

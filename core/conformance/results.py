@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from femubench.core.conformance.fingerprints import fingerprint, first_difference
 from femubench.core.conformance.problems import UpdatingProblem
-from femubench.core.errors import FemubenchError
+from femubench.core.errors import FemubenchError, clipped
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import enough_modes, solve_modes, zero_tolerance
 from femubench.core.modal.rigid import rigid_modes_of
@@ -246,5 +246,4 @@ def _figures(result: UpdateResult) -> Iterator[tuple[str, object]]:
 
 
 def _short(value: object) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return clipped(" ".join(repr(value).split()), 60)

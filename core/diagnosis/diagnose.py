@@ -161,10 +161,9 @@ def _with_budget(case: Case, found: Diagnosis, budget: Budget) -> Diagnosis:
         found = first
     before, after = (score_model(case, model) for model in (case.model, budget.extended))
     gain = rms_gain_of(before, after, None)
-    known = found.gain_rms or gain
     pairs = (
-        (gain.held_out_percent, known.held_out_percent),
-        (gain.modified_percent, known.modified_percent),
+        (gain.held_out_percent, found.gain_rms.held_out_percent),
+        (gain.modified_percent, found.gain_rms.modified_percent),
     )
     unseen = [(*own, *other) for own, other in pairs if own is not None and other is not None]
     # Nearer than the drawing, and than the best guess, which may be all that a beam model lacks.

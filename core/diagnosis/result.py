@@ -57,10 +57,9 @@ class Diagnosis(DiagnosisReport, Shown):
                 for r in self.rivals[: max(0, settings.of_a_kind - len(self.causes))]
             ),
         ]
-        for name, pair in asdict(self.gain_rms or self.gain).items():
+        for name, pair in asdict(self.gain_rms).items():
             if isinstance(pair, tuple) and None not in pair:
-                measure = "median" if self.gain_rms is None else "rms"
-                label = f"{name.replace('_percent', '')}, {measure}"
+                label = f"{name.replace('_percent', '')}, rms"
                 found.append((label, f"{pair[0]:.2f} % -> {pair[1]:.2f} %"))
         return [*found, ("adequacy", f"p = {self.adequacy_p:.2g}")]
 

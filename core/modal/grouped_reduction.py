@@ -36,7 +36,7 @@ from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import DENSE_LIMIT, solve_modes
 from femubench.core.modal.factorisation import factorise_definite
 from femubench.core.modal.group_prior import GroupPriors
-from femubench.core.modal.rigid import rigid_body_vectors
+from femubench.core.modal.rigid import orthonormal, rigid_body_vectors
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 # What a joint or a clamp, of which little is known, may turn out to be; and any other part.
@@ -478,7 +478,7 @@ class _Reduced:
         factor = la.cho_factor(self.shifted)
         self.inverse = la.cho_solve(factor, np.eye(span.count))
         answers = np.hstack([self.inverse @ span.forces(forces), self.inverse[:, : len(span.kept)]])
-        self.base = _orthonormal(answers, answers.T @ self.shifted @ answers, _DEPENDENT)
+        self.base = orthonormal(answers, answers.T @ self.shifted @ answers, _DEPENDENT)
         # In answers to forces along the coordinates, the mass.
         self._half = self.inverse @ (self.mass @ self.base)
         self._heavy = self.inverse @ self.mass @ self.inverse
@@ -549,15 +549,7 @@ class _Reduced:
         values, turn = la.eigh(added.T @ (weight @ added))
         strong = np.flatnonzero(values > lost)[::-1][: most - base.shape[1]]
         found = np.hstack([base, added @ (turn[:, strong] / np.sqrt(values[strong]))])
-        return _orthonormal(found, found.T @ (self.shifted @ found), _DEPENDENT)
-
-
-def _orthonormal(vectors: FloatArray, gram: FloatArray, apart: float) -> FloatArray:
-    """Return an orthonormal basis of vectors by their products, (n, k)."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
-    values, turn = la.eigh(0.5 * scale[:, None] * (gram + gram.T) * scale)
-    some = values > apart * values[-1]
-    return np.asarray(vectors @ (scale[:, None] * turn[:, some] / np.sqrt(values[some])))
+        return orthonormal(found, found.T @ (self.shifted @ found), _DEPENDENT)
 
 
 def _ritz(

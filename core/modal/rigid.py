@@ -51,7 +51,7 @@ def rigid_modes_of(model: Model) -> FloatArray:
     motion, structure = _motions(model.dofs), model.structure
     if structure is None:
         basis = rigid_body_vectors(model.dofs)
-        basis = _orthonormal(basis, basis.T @ (model.mass @ basis))
+        basis = orthonormal(basis, basis.T @ (model.mass @ basis))
         candidates = basis
         if basis.shape[1] > 0:  # those without energy
             scale = np.abs(model.stiffness).sum(axis=0) @ np.square(basis)
@@ -79,15 +79,16 @@ def rigid_continuation(dofs: Dofs, rigid: FloatArray) -> _Motion:
 
 def mass_orthonormal(model: Model, vectors: FloatArray) -> FloatArray:
     """Return a mass-orthonormal basis of some motions, dependent ones left out, (n, r)."""
-    return _orthonormal(vectors, vectors.T @ model.mass_times(vectors))
+    return orthonormal(vectors, vectors.T @ model.mass_times(vectors))
 
 
-def _orthonormal(vectors: FloatArray, gram: FloatArray) -> FloatArray:
+def orthonormal(vectors: FloatArray, gram: FloatArray, apart: float = 1e-10) -> FloatArray:
+    """Return an orthonormal basis of vectors by their products, but for dependent ones, (n, r)."""
     if vectors.shape[1] == 0:
         return vectors
     scale = np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
     values, turn = la.eigh(gram / np.outer(scale, scale))
-    keep = values > 1e-10 * values[-1]
+    keep = values > apart * values[-1]
     return np.asarray((vectors / scale) @ (turn[:, keep] / np.sqrt(values[keep])))
 
 

@@ -353,8 +353,6 @@ class States:
 class DiagnosisReport:
     """What is missing in a model, where, how sure, and what it gains: all that JSON has of it.
 
-    What older versions did not write has a default.
-
     Arguments:
         case: name of the case.
         verdict: see the case for each in docs/diagnosis.md.
@@ -367,7 +365,7 @@ class DiagnosisReport:
         smallest_visible: one row an effect.
         residuals: every datum.
         gain: medians before and after.
-        gain_rms: the same as root mean squares, as `bench run` has them; None in older files.
+        gain_rms: the same as root mean squares, as `bench run` has them.
         chi2: before and after, in the metric of the noise model.
         data_count: number of data behind chi2.
         adequacy_p: probability of a chi-square as large as the one after.
@@ -402,6 +400,7 @@ class DiagnosisReport:
     smallest_visible: tuple[SmallestVisible, ...]
     residuals: tuple[ResidualRow, ...]
     gain: Gain
+    gain_rms: Gain
     chi2: tuple[Number, Number] = (math.nan, math.nan)
     data_count: int = 0
     adequacy_p: Number
@@ -414,7 +413,6 @@ class DiagnosisReport:
     evidence: tuple[Evidence, ...] = ()
     model_error: tuple[ErrorScale, ...] = ()
     like_a_beam: Number = 1.0
-    gain_rms: Gain | None = None
     scatter: tuple[Scatter, ...] = ()
     states: States | None = None
     left_out: tuple[LeftOut, ...] = ()

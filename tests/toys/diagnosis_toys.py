@@ -89,6 +89,7 @@ def made(verdict: Verdict = "named", **changes: Any) -> Diagnosis:
         smallest_visible=(SmallestVisible("added-mass", "J3", 0.0123, "kg"),),
         residuals=residuals(),
         gain=Gain((4.25, 0.125), (3.4, 0.75), None, None),
+        gain_rms=Gain((5.5, 0.25), (3.6, 0.8)),
         chi2=(9201.0, 55.25),
         data_count=61,
         adequacy_p=0.614,
