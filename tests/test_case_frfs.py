@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
@@ -124,6 +125,23 @@ def test_a_strategy_finds_no_response_that_is_held_out(with_frfs: Case) -> None:
         assert result.diagnostics["lines"] == len(given.frequencies)
 
 
+@pytest.mark.slow(10)
+def test_a_run_says_of_what_kind_responses_seem_to_be(with_frfs: Case) -> None:
+    """The file has accelerances: 128 dB above receptances at these lines, and a key takes them."""
+    said = {}
+    for kind in ("accelerance", "receptance"):
+        shutil.copytree(with_frfs.folder, with_frfs.folder.parent / kind)
+        copy = replace(with_frfs, folder=with_frfs.folder.parent / kind)
+        case = split_case(copy, f'{SPLIT}, quantity = "{kind}"')
+        assert case.frfs is not None
+        assert case.frfs.quantity == kind
+        run = femubench.rank([case.folder], ["unchanged"], twins=0, jobs=1, nominal="drawn")
+        said[kind] = [note for note in run.meta["notes"] if "dB" in note]
+    assert said["accelerance"] == []
+    (note,) = said["receptance"]
+    assert 'as if they were accelerance, not receptance: quantity = "accelerance" in' in note
+
+
 def test_noise_of_a_seed_has_the_stated_deviations(with_frfs: Case) -> None:
     case = split_case(with_frfs, SPLIT)
     plain, drawn = (case.used_measurement(seed).responses for seed in (0, 1))
@@ -169,6 +187,8 @@ def test_a_case_with_split_responses_is_written_and_read_back(
         ("used = [[170, 190]]", "the file has no deviations"),
         ("used = [[170, 190]], std = 0.01, held_out_sensors = ['q']", "no response of 'q'"),
         ("used = [[170, 190]], std = 0.01, lines = 3", "lines"),
+        ("used = [[170, 190]], std = 0.01, quantity = 'inertance'", "'inertance' is not allowed"),
+        ("used = [[170, 190]], std = 0.01, factor = 0", "a number > 0"),
     ],
 )
 def test_a_wrong_split_is_one_line(with_frfs: Case, keys: str, says: str) -> None:

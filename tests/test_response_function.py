@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import pickle
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
+from distributions import install_metadata
 from response_problems import DAMPING, simulate, simulated_case
 
 import femubench
 from femubench import NotApplicable, RunOptions
 from femubench.core.case.writing import write_case
+from femubench.core.cli.main import bench
 from femubench.core.library.rank import plan_run
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.run.jobs import Job, execute
@@ -179,3 +184,30 @@ def test_a_run_shows_responses_next_to_gains_that_are_as_without(tmp_path: Path)
     assert "resp." not in TerminalReporter().render(plain)
     again = run_from_json(run_to_json(run))
     assert [r.responses for r in again.results] == [r.responses for r in run.results]
+
+
+@pytest.mark.slow(20)
+def test_a_method_of_the_docs_passes_the_checks_and_is_ranked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As printed, in a package of its own; it finds the factors by another residual than ours."""
+    text = (Path(__file__).parents[1] / "docs" / "plugins.md").read_text(encoding="utf-8")
+    (source,) = re.findall(r"```python\n# my_responses\.py\n(.*?)```", text, re.DOTALL)
+    assert len(source.splitlines()) <= 60
+    (tmp_path / "my_responses.py").write_text(source, encoding="utf-8")
+    install_metadata(tmp_path, "my-responses", {"my-responses": "my_responses"})
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(bench, ["plugins", "check", "line-by-line"])
+    assert done.exit_code == 0, done.output
+    assert ", 0 failed, 0 warnings" in done.output
+    write_case(tmp_path / "case", simulated_case(FACTORS))
+    words = ["line-by-line", "unchanged"]
+    options = [word for name in words for word in ("-s", name)]
+    done = CliRunner().invoke(bench, ["run", "case", *options, "-q", "--json", "run.json"])
+    assert done.exit_code == 0, done.output
+    found = {r["strategy"]: r for r in json.loads(Path("run.json").read_text())["results"]}
+    after = [p["after"] for p in found["line-by-line"]["parameters"]]
+    assert after == pytest.approx(FACTORS, rel=0.04)
+    levels = [found[name]["responses"]["rms_db"] for name in words]
+    assert levels[0] < 0.3 * levels[1]

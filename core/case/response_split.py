@@ -36,6 +36,7 @@ def split_responses(
     if measured.quantity == "free decay" or measured.decay:
         what = "free decays" if measured.quantity == "free decay" else "an exponential window"
         raise BadKey(_KEY, f"the responses are those of {what}", "motions over force, no window")
+    measured = measured.taken_as(spec.quantity or measured.quantity, spec.factor)
     turned = len(measured.references) > len(measured.responses)
     found = _at_sensors(measured.transpose() if turned else measured, tested.sensors)
     split = ResponseSplit(spec.used, spec.held_out, spec.held_out_sensors)

@@ -13,6 +13,7 @@ from pydantic_core import PydanticCustomError
 
 from femubench.core.case.case import BEAM_SHARE, SCATTER, TOLERANCE
 from femubench.core.fem.frame import MADE, BeamTheory, BendingMass, Made, Place, Plane
+from femubench.core.modal.frf import Motion
 
 T = TypeVar("T")
 LengthUnit = Literal["m", "cm", "mm", "in", "ft"]
@@ -400,6 +401,8 @@ class ResponsesSpec(TomlTable):
     )
     std: Positive | None = Field(None, description="a number > 0, of the magnitude of a line")
     floor: NotNegative = Field(0.0, description="a number >= 0, in the unit of the responses")
+    quantity: Motion | None = Field(None, description=f"one of {', '.join(get_args(Motion))}")
+    factor: Positive = Field(1.0, description="a number > 0 that brings them to SI units")
 
 
 class MeasurementSpec(TomlTable):

@@ -22,7 +22,9 @@ from femubench.core.fem.model_parameters import (
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.slopes import JoinedSlopes, MatrixSlopes, TermSlopes
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.typing import BoolArray, FloatArray, SparseArray
+from femubench.core.modal.measurement import Measurement
+from femubench.core.modal.receptances import PredictedResponses
+from femubench.core.typing import AnyArray, BoolArray, FloatArray, SparseArray
 
 
 @dataclass(frozen=True)
@@ -209,6 +211,31 @@ class ParametricModel:
             bool(change.quantity) and not change.property.is_factor for change in self.owners
         ]
         return np.where(set_alone, self.growth(x), 1.0)
+
+    def responses(self, x: FloatArray, measured: Measurement) -> tuple[AnyArray, AnyArray]:
+        """Return receptances H where responses were measured, and dH/dx, complex.
+
+        They have the shapes (n_f, n_responses, n_references) and (..., p). Modes have the measured
+        damping ratios of their partners, the usual one without, and keep them as x moves.
+
+        Arguments:
+            x: coordinates, (p,).
+            measured: with responses, whose lines, sensors and forces hold.
+
+        Raises:
+            NotApplicable: when there are no responses.
+            ModelError: when there is no such model.
+
+        Examples:
+            >>> members = update.Changes(structure).parameterise("members")
+            >>> from dataclasses import replace
+            >>> held = replace(measurement, responses=responses)
+            >>> members.responses(np.zeros(len(members)), held)[1].shape
+            (401, 13, 1, 7)
+        """
+        model = self.at(x)
+        found = PredictedResponses.of(model, measured)
+        return found.receptances, found.slopes(self.slopes(x, model)) * self.steps(x)
 
     @cached_property
     def start(self) -> Model:

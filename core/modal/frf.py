@@ -14,7 +14,8 @@ from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import Modes
 from femubench.core.typing import AnyArray, BoolArray, FloatArray, SparseArray
 
-Quantity: TypeAlias = Literal["receptance", "mobility", "accelerance", "free decay"]
+Motion: TypeAlias = Literal["receptance", "mobility", "accelerance"]
+Quantity: TypeAlias = Literal[Motion, "free decay"]
 # How often displacement was derived with respect to time.
 DERIVATIVES: dict[str, int] = {"receptance": 0, "mobility": 1, "accelerance": 2, "free decay": 0}
 
@@ -100,6 +101,10 @@ class FrequencyResponses(Shown):
             return self
         real, imaginary = rng.standard_normal((2, *self.values.shape))
         return replace(self, values=self.values + self.deviations * (real + 1j * imaginary))
+
+    def taken_as(self, quantity: Quantity, factor: float) -> FrequencyResponses:
+        """Return the same numbers as those of another quantity, times a factor."""
+        return self._with_values(lambda values: factor * values, quantity=quantity)
 
     def transpose(self) -> FrequencyResponses:
         """Return the responses with forces and motions exchanged, as reciprocity allows."""

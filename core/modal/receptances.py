@@ -2,20 +2,64 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass
+from functools import cached_property
 
-from femubench.core.errors import ModelError
+import numpy as np
+import scipy.sparse as sp
+
+from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.model import Model
 from femubench.core.fem.slopes import MatrixSlopes
 from femubench.core.modal.eigen import DENSE_LIMIT, Modes, modes_of, modes_up_to
-from femubench.core.modal.frf import dynamic_stiffness
+from femubench.core.modal.frf import dynamic_stiffness, receptance
+from femubench.core.modal.measurement import Measurement
+from femubench.core.modal.pairing import pair_measured
 from femubench.core.modal.sparse_eigen import ShiftedModel
-from femubench.core.typing import AnyArray, FloatArray, SparseArray
+from femubench.core.typing import AnyArray, FloatArray, IntArray, SparseArray
 
 _ABOVE = 1.5  # times the highest line: modes up to there are exact, the rest responds statically
 _SHIFT = 0.5  # of the first elastic eigenvalue, below zero
 _APART = 1e-12  # squared sine below which a response lies in the span of the others
 _REPEATED = 1e-8  # of eigenvalues, relative
+
+
+@dataclass(frozen=True)
+class PredictedResponses:
+    """What a model answers where responses were measured.
+
+    Arguments:
+        modes: as of `response_modes`.
+        partner: which of them belongs to every measured mode; -1 where none does, (m,).
+        at: readings and forces from dofs, and lines in Hz.
+        damping: ratio of every mode, that of its measured partner.
+    """
+
+    modes: Modes
+    partner: IntArray
+    at: tuple[SparseArray, SparseArray, FloatArray]
+    damping: FloatArray
+
+    @classmethod
+    def of(cls, model: Model, measured: Measurement) -> PredictedResponses:
+        """Return the answer of a model; raises ModelError without modes, NotApplicable."""
+        if (at := measured.responses) is None:
+            raise NotApplicable("no frequency responses are given: frfs and responses in the case")
+        rows = model.observe(at.responses), model.observe(at.references)
+        modes = response_modes(model, sp.vstack(rows, format="csr"), float(at.frequencies[-1]))
+        readings = np.asarray(model.observe(measured.sensors) @ modes.shapes)
+        partner = pair_measured(measured, modes, readings).index
+        damping = measured.damping_of(partner, len(modes))
+        return cls(modes, partner, (*rows, at.frequencies), damping)
+
+    @cached_property
+    def receptances(self) -> AnyArray:
+        """Return displacement over force, complex, like the measured ones."""
+        return receptance(self.modes, *self.at, self.damping)
+
+    def slopes(self, slopes: MatrixSlopes) -> AnyArray:
+        """Return those of the receptances by parameters, of the slopes of the matrices."""
+        return receptance_slopes(self.modes, *self.at, slopes, self.damping)
 
 
 def response_modes(model: Model, rows: SparseArray, highest: float) -> Modes:

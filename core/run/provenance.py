@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cache, lru_cache
 from importlib import metadata
@@ -244,7 +245,8 @@ def run_meta(
 
 
 def _notes(case: Case) -> tuple[str, ...]:
-    return *case.notes, *question_measurement(case.model, case.measurement)
+    given = replace(case.measurement, responses=case.used_measurement().responses)
+    return *case.notes, *question_measurement(case.model, given)
 
 
 def versions(*more: str) -> dict[str, str]:

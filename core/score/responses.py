@@ -9,9 +9,9 @@ import numpy as np
 from femubench.core.case.case import Case
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
+from femubench.core.modal.receptances import PredictedResponses
 from femubench.core.schema.results import ResponseBlock
 from femubench.core.typing import FloatArray
-from femubench.core.update.response_residuals import ResponseTargets
 
 _RANGE = 1e-6  # of the largest response: no test resolves less than 120 dB below it
 _DECIBEL = 20.0 / np.log(10.0)
@@ -20,8 +20,9 @@ _DECIBEL = 20.0 / np.log(10.0)
 def score_responses(case: Case, model: Model) -> ResponseBlock | None:
     """Return the error of a model's log-magnitudes at held-out lines and sensors.
 
-    Its modes have the damping ratios of the measured modes, held-out ones among them, that they are
-    paired with: no strategy is asked for damping. A model that has no response has no block.
+    What noise exceeds is not counted. The model's modes have the damping ratios of the measured
+    modes, held-out ones among them, that they are paired with: no strategy is asked for damping.
+    A model that has no response has no block.
     """
     if case.frfs is None or case.split is None:
         return None
@@ -29,19 +30,18 @@ def score_responses(case: Case, model: Model) -> ResponseBlock | None:
     shown = np.asarray(hidden.any(axis=1))
     lines = case.frfs.at_lines(shown)
     size = np.abs(np.nan_to_num(lines.receptances))
-    counted = hidden[shown][:, :, None] & (size > 0.0)
+    std = lines.receptance_std
+    counted = hidden[shown][:, :, None] & (size > std)
     if not counted.any():
         return None
-    targets = ResponseTargets(replace(case.measurement, responses=lines))
+    measured = replace(case.measurement, responses=lines)
     try:
-        predicted = np.abs(targets.predict(model, None, 0.0).receptances)
+        predicted = np.abs(PredictedResponses.of(model, measured).receptances)
     except ModelError:
         return None
     least = _RANGE * float(size[counted].max())
     ratio = np.hypot(predicted[counted], least) / np.hypot(size[counted], least)
-    noise = lines.receptance_std[counted] / size[counted]
-    # Of more noise than signal a magnitude is off by about as much as the signal.
-    floor = _rms(_DECIBEL * np.minimum(noise, 1.0))
+    floor = _rms(_DECIBEL * std[counted] / size[counted])
     return ResponseBlock(_rms(_DECIBEL * np.log(ratio)), floor, int(counted.sum()))
 
 

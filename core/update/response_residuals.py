@@ -7,17 +7,15 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-import scipy.sparse as sp
 
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
 from femubench.core.fem.slopes import MatrixSlopes
 from femubench.core.modal.eigen import Modes
-from femubench.core.modal.frf import FrequencyResponses, receptance
+from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.modal.measurement import Measurement
-from femubench.core.modal.pairing import pair_measured
-from femubench.core.modal.receptances import receptance_slopes, response_modes
-from femubench.core.typing import AnyArray, FloatArray, IntArray, SparseArray
+from femubench.core.modal.receptances import PredictedResponses
+from femubench.core.typing import AnyArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -56,13 +54,7 @@ class ResponseTargets:
 
     def predict(self, model: Model, previous: object, mass: float) -> ResponsePrediction:
         """Return the answer of a model, as `Targets` do; raises ModelError without modes."""
-        at, measured = self.responses, self.measurement
-        rows = model.observe(at.responses), model.observe(at.references)
-        modes = response_modes(model, sp.vstack(rows, format="csr"), float(at.frequencies[-1]))
-        readings = np.asarray(model.observe(measured.sensors) @ modes.shapes)
-        partner = pair_measured(measured, modes, readings).index
-        damping = measured.damping_of(partner, len(modes))
-        return ResponsePrediction(self, model, modes, partner, (*rows, at.frequencies), damping)
+        return ResponsePrediction(self, model, PredictedResponses.of(model, self.measurement))
 
     def weigh(self, values: AnyArray) -> FloatArray:
         """Return real, then imaginary parts of complex data over their deviations, (n_rows, ...).
@@ -82,29 +74,28 @@ class ResponsePrediction:
     Arguments:
         data: what it is compared with.
         model: with its present parameter values.
-        modes: as of `response_modes`.
-        partner: which of them belongs to every measured mode; -1 where none does, (m,).
-        at: readings and forces from dofs, and lines in Hz.
-        damping: ratio of every mode, that of its measured partner.
+        answer: its receptances.
     """
 
     data: ResponseTargets
     model: Model
-    modes: Modes
-    partner: IntArray
-    at: tuple[SparseArray, SparseArray, FloatArray]
-    damping: FloatArray
+    answer: PredictedResponses
 
-    @cached_property
-    def receptances(self) -> AnyArray:
-        """Return displacement over force, complex, like the measured ones."""
-        return receptance(self.modes, *self.at, self.damping)
+    @property
+    def modes(self) -> Modes:
+        """Return its modes, as of `response_modes`."""
+        return self.answer.modes
+
+    @property
+    def partner(self) -> IntArray:
+        """Return which of its modes belongs to every measured mode; -1 where none does, (m,)."""
+        return self.answer.partner
 
     @cached_property
     def residual(self) -> FloatArray:
         """Return weighted measured minus predicted responses, (n_rows,)."""
-        return self.data.weigh(self.data.responses.receptances - self.receptances)
+        return self.data.weigh(self.data.responses.receptances - self.answer.receptances)
 
     def jacobian(self, slopes: MatrixSlopes, masses: object) -> FloatArray:
         """Return d (weighted prediction) / d parameter, (n_rows, p), as of `Prediction`."""
-        return self.data.weigh(receptance_slopes(self.modes, *self.at, slopes, self.damping))
+        return self.data.weigh(self.answer.slopes(slopes))
