@@ -7,13 +7,14 @@ import os
 import shutil
 import tomllib
 from functools import cache, partial
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from femubench import InputError, Scenario, hookimpl
 
 HERE = Path(__file__).parent
-SUITE, TESTS = HERE / "suite", HERE / "tests"
+SUITE, TESTS, RESPONSES = (HERE / name for name in ("suite", "tests", "suite-responses"))
 OWN_FILES = "FEMUBENCH_TESTS"  # the folder of files that are read where the user keeps them
 
 
@@ -84,5 +85,5 @@ def femubench_scenarios() -> list[Scenario]:
         ("bridge", "matrices", "soft supports", "published test"),
         default=False,
     )
-    groups = (*_listed(TESTS, "tests/"), *_listed(SUITE, "suite/"))
-    return [*_listed(HERE), *groups, footbridge]
+    groups = [_listed(folder, f"{folder.name}/") for folder in (TESTS, SUITE, RESPONSES)]
+    return [*_listed(HERE), *chain.from_iterable(groups), footbridge]

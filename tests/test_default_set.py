@@ -128,7 +128,7 @@ def test_without_a_list_there_is_no_suite(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(femubench.scenarios, "SUITE", tmp_path)
     plugins = load_plugins()
     assert plugins.broken == ()
-    assert not [name for name in plugins.scenarios if name.startswith("suite")]
+    assert not [name for name in plugins.scenarios if name.startswith("suite/")]
     with pytest.raises(InputError, match="no case 'suite'"):
         case_folders(["suite"], plugins.scenarios)
 

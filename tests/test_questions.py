@@ -83,12 +83,8 @@ def test_responses_of_another_kind_or_unit_are_said_and_no_wrong_model_is(draw: 
         if (unit == 1e3 and actual != stated) or (unit < 1.0 and actual != "accelerance"):
             continue
         turn = unit * (2j * np.pi * given.frequencies[:, None, None]) ** DERIVATIVES[actual]
-        read = replace(
-            given,
-            values=turn * given.values,
-            deviations=np.abs(turn) * given.deviations,
-            quantity=stated,
-        )
+        sizes = {"values": turn * given.values, "deviations": np.abs(turn) * given.deviations}
+        read = replace(given, **sizes, quantity=stated)
         keys = [f'quantity = "{actual}"'] if actual != stated else []
         keys += [f"factor = {1.0 / unit:.6g}"] if unit != 1.0 else []
         said = question_measurement(model, replace(test, responses=read))

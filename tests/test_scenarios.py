@@ -13,9 +13,10 @@ from femubench.core.case.reader import read_case
 from femubench.core.modal.eigen import solve_modes
 from femubench.scenarios import HERE, femubench_scenarios
 from femubench.scenarios.generate import FRAME_HZ, HFRAME_HZ, write_all
+from truths.responses import NAMES as DRIVEN
 
 # Those whose measured side is generated here.
-ELSEWHERE = ("suite/", "tests/", "garteur", "footbridge")
+ELSEWHERE = ("suite/", "suite-responses/", "tests/", "garteur", "footbridge")
 OWN = [s for s in femubench_scenarios() if not s.name.startswith(ELSEWHERE)]
 CASES = {name: scenario.folder(name) for scenario in OWN for name in scenario.cases}
 DATA = sorted(
@@ -97,5 +98,9 @@ def test_cases_of_one_structure_say_so() -> None:
         },
         "h-frame": {"hframe", "hframe-solid", "design-change/hframe-solid"},
         "suite/garteur": {"garteur", "suite/garteur"},
+        **{
+            f"suite/{name}": {f"suite{kind}/{name}" for kind in ("", "-responses")}
+            for name in DRIVEN
+        },
     }
     assert read_case(CASES["frame"], "frame").structure == "ladder"

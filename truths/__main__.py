@@ -1,6 +1,6 @@
 """Make the truths again: ``python -m truths [NAME ...] [--only STEP]``.
 
-The steps are suite, stretches, defects, faults and lacks.
+The steps are suite, stretches, responses, defects, faults and lacks.
 
 Structures that have not changed since the last run are left out, so that a run goes on where it
 was cut.
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 HERE = Path(__file__).parent
 STATE = HERE.parent / "build" / "truths.json"
 NEEDED = {"gmsh": "gmsh", "skfem": "scikit-fem", "matplotlib": "matplotlib"}
-STEPS = ("suite", "stretches", "defects", "faults", "lacks")
+STEPS = ("suite", "stretches", "responses", "defects", "faults", "lacks")
 # What a solid's figures follow from, in addition to the structure's own file.
 SOLVER = (
     "bricks",
@@ -136,6 +136,17 @@ def make_stretches(names: list[str], again: bool) -> bool:
     return sound
 
 
+def make_responses(names: list[str], again: bool) -> bool:
+    """Write the cases with frequency responses; tell whether all could be made."""
+    from truths.responses import NAMES, write, write_index
+
+    sound = make_each(
+        names, again, lambda item, _: write(item), " responses", ("responses",), NAMES
+    )
+    write_index()
+    return sound
+
+
 def make_lacks(names: list[str], again: bool) -> bool:
     """Write what drawings lack; tell whether all could be made."""
     from truths.lacks import TRIED
@@ -169,6 +180,11 @@ def main() -> int:
         sound = make_suite(options.names, options.again)
     if options.only in (None, "stretches"):
         sound = make_stretches(options.names, options.again) and sound
+    from truths.responses import NAMES
+
+    chosen = [name for name in options.names if name in NAMES]
+    if options.only in (None, "responses") and (chosen or not options.names):
+        sound = make_responses(chosen, options.again) and sound
     if options.only in (None, "defects"):
         sound = make_defects(options.names, options.again) and sound
     if options.only in (None, "faults") and not options.names:

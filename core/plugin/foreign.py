@@ -137,6 +137,11 @@ class ForeignStrategy(StatedOptions):
         return bool(self._description["cost_reference"])
 
     @property
+    def on_request(self) -> bool:
+        """Tell whether it runs only where it is named."""
+        return bool(self._description["on_request"])
+
+    @property
     def doc(self) -> str:
         """Return what it says of itself."""
         return str(self._description["doc"])
@@ -365,6 +370,7 @@ def strategy_of(handle: Handle, description: Mapping[str, Any]) -> ForeignStrate
         "open": check_texts(description.get("open"), "open options"),
         "baseline": description.get("baseline") is True,
         "cost_reference": description.get("cost_reference") is True,
+        "on_request": description.get("on_request") is True,
         "module": harmless(of_type(description.get("module"), str, "module")),
         "doc": _doc(description),
         "about": select_known(of_type(description.get("about"), dict, "what its package says")),

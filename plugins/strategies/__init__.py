@@ -27,6 +27,7 @@ CLASSES = {
     "eigensensitivity": "eigensensitivity:Eigensensitivity",
     "sparse": "sparse:Sparse",
     "cross-model": "cross_model:CrossModel",
+    "dynamic-residual": "dynamic_residual:DynamicResidual",
     "strain-energy": "strain_energy:StrainEnergy",
     "multi-start": "multi_start:MultiStart",
     "cma-es": "cma_es:CmaEs",
