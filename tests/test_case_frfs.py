@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
@@ -125,20 +124,12 @@ def test_a_strategy_finds_no_response_that_is_held_out(with_frfs: Case) -> None:
         assert result.diagnostics["lines"] == len(given.frequencies)
 
 
-@pytest.mark.slow(10)
+@pytest.mark.slow(5)
 def test_a_run_says_of_what_kind_responses_seem_to_be(with_frfs: Case) -> None:
-    """The file has accelerances: 128 dB above receptances at these lines, and a key takes them."""
-    said = {}
-    for kind in ("accelerance", "receptance"):
-        shutil.copytree(with_frfs.folder, with_frfs.folder.parent / kind)
-        copy = replace(with_frfs, folder=with_frfs.folder.parent / kind)
-        case = split_case(copy, f'{SPLIT}, quantity = "{kind}"')
-        assert case.frfs is not None
-        assert case.frfs.quantity == kind
-        run = femubench.rank([case.folder], ["unchanged"], twins=0, jobs=1, nominal="drawn")
-        said[kind] = [note for note in run.meta["notes"] if "dB" in note]
-    assert said["accelerance"] == []
-    (note,) = said["receptance"]
+    """The file has accelerances, at these lines 128 dB above receptances."""
+    case = split_case(with_frfs, f'{SPLIT}, quantity = "receptance"')
+    run = femubench.rank([case.folder], ["unchanged"], twins=0, jobs=1, nominal="drawn")
+    (note,) = (note for note in run.meta["notes"] if "dB" in note)
     assert 'as if they were accelerance, not receptance: quantity = "accelerance" in' in note
 
 

@@ -171,7 +171,7 @@ def test_modes_in_a_band_and_what_responds_statically(
     low = FREQUENCIES[FREQUENCIES < 450.0]
     every = receptance(solve_modes(model), rows, rows, low, 0.01)
     exact = receptance_slopes(solve_modes(model), rows, rows, low, changing.start_slopes, 0.01)
-    monkeypatch.setattr(receptances, "DENSE_LIMIT", 10)
+    monkeypatch.setattr(receptances, "_FEW", 10)
     monkeypatch.setattr(receptances, "modes_up_to", lambda m, hz: modes_below(m, hz))
     few = response_modes(model, rows, 450.0)
     assert len(few) < 20

@@ -10,14 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
-from distributions import install_metadata
+from distributions import install_module
 from response_problems import DAMPING, simulate, simulated_case
 
 import femubench
 from femubench import NotApplicable, RunOptions
 from femubench.core.case.writing import write_case
-from femubench.core.cli.main import bench
 from femubench.core.library.rank import plan_run
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.run.jobs import Job, execute
@@ -29,6 +27,7 @@ from femubench.fem import Place, PointMass
 from femubench.plugins.strategies.response_function import ResponseFunction
 from femubench.reports.runs import TerminalReporter
 from femubench.update import Changes
+from tests.command import call_bench
 
 FACTORS = np.array([1.12, 0.9, 1.05])
 RNG = np.random.default_rng(0)
@@ -194,18 +193,15 @@ def test_a_method_of_the_docs_passes_the_checks_and_is_ranked(
     text = (Path(__file__).parents[1] / "docs" / "plugins.md").read_text(encoding="utf-8")
     (source,) = re.findall(r"```python\n# my_responses\.py\n(.*?)```", text, re.DOTALL)
     assert len(source.splitlines()) <= 60
-    (tmp_path / "my_responses.py").write_text(source, encoding="utf-8")
-    install_metadata(tmp_path, "my-responses", {"my-responses": "my_responses"})
+    install_module(tmp_path, "my_responses", source)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(bench, ["plugins", "check", "line-by-line"])
-    assert done.exit_code == 0, done.output
+    done = call_bench("plugins", "check", "line-by-line")
     assert ", 0 failed, 0 warnings" in done.output
     write_case(tmp_path / "case", simulated_case(FACTORS))
     words = ["line-by-line", "unchanged"]
     options = [word for name in words for word in ("-s", name)]
-    done = CliRunner().invoke(bench, ["run", "case", *options, "-q", "--json", "run.json"])
-    assert done.exit_code == 0, done.output
+    call_bench("run", "case", *options, "-q", "--json", "run.json")
     found = {r["strategy"]: r for r in json.loads(Path("run.json").read_text())["results"]}
     after = [p["after"] for p in found["line-by-line"]["parameters"]]
     assert after == pytest.approx(FACTORS, rel=0.04)

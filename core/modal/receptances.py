@@ -11,13 +11,14 @@ import scipy.sparse as sp
 from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.model import Model
 from femubench.core.fem.slopes import MatrixSlopes
-from femubench.core.modal.eigen import DENSE_LIMIT, Modes, modes_of, modes_up_to
+from femubench.core.modal.eigen import Modes, modes_of, modes_up_to
 from femubench.core.modal.frf import dynamic_stiffness, receptance
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import pair_measured
 from femubench.core.modal.sparse_eigen import ShiftedModel
 from femubench.core.typing import AnyArray, FloatArray, IntArray, SparseArray
 
+_FEW = 100  # dofs of a model of which all modes are cheaper than what stands for most of them
 _ABOVE = 1.5  # times the highest line: modes up to there are exact, the rest responds statically
 _SHIFT = 0.5  # of the first elastic eigenvalue, below zero
 _APART = 1e-12  # squared sine below which a response lies in the span of the others
@@ -79,7 +80,7 @@ def response_modes(model: Model, rows: SparseArray, highest: float) -> Modes:
 
     Source: MacNeal (1971), A hybrid method of component mode synthesis: residual flexibility.
     """
-    if model.size <= DENSE_LIMIT:
+    if model.size <= _FEW:
         return modes_of(model)
     modes = modes_up_to(model, _ABOVE * highest)
     elastic = np.abs(modes.eigenvalues[~modes.rigid])

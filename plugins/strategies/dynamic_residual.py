@@ -90,7 +90,7 @@ class DynamicResidual(ParametricStrategy):
             jacobian = np.vstack([jacobian, np.diag(np.sqrt(parts.precision))])
             return float(residual @ residual), residual, jacobian
 
-        x, history, moved = np.zeros(len(parts)), [], np.inf
+        x, moved, history = np.zeros(len(parts)), np.inf, list[dict[str, float]]()
         found = linearised(x)
         while moved > self.tolerance and len(history) < self.max_iterations:
             history.append({"iteration": float(len(history)), "cost": found[0]})
