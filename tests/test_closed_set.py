@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import zipfile
 from collections.abc import Callable
@@ -29,6 +30,7 @@ class Set(NamedTuple):
     folder: Path
     answers: Path
     bench: Bench
+    said: str  # when it was closed
 
 
 @pytest.fixture(scope="module")
@@ -39,11 +41,11 @@ def closed(tmp_path_factory: pytest.TempPathFactory) -> Set:
     def run(*words: object, code: int = 0, key: str | None = key) -> str:
         return call_bench(*words, code=code, env={KEY: key}).output
 
-    run("challenge", "close", folder / "set", SUITE / "portal", SUITE / "arch")
+    said = run("challenge", "close", folder / "set", SUITE / "portal", SUITE / "arch")
     halves = sorted((folder / "set").iterdir())
     words = ("-s", "global", "-s", "shifted", "--twins", "0", "--jobs", "1", "-q")
     run("submit", *words, "--output", folder / "mine.json", *halves, key=None)
-    return Set(folder / "set", folder / "mine.answers", run)
+    return Set(folder / "set", folder / "mine.answers", run, said)
 
 
 def test_the_open_half_has_what_a_strategy_is_given_and_nothing_else(closed: Set) -> None:
@@ -88,6 +90,22 @@ def test_what_was_not_answered_counts_as_the_model_that_was_given(closed: Set) -
     lost = [one for one in femubench.read_run(out).results if one.case == "suite/arch"]
     assert [(one.status, one.reason) for one in lost] == [("failed", "no answer was handed in")] * 2
     assert [one.gain for one in lost] == [0.0, 0.0]
+
+
+def test_a_case_that_is_published_later_is_shown_to_be_the_one_closed(
+    closed: Set, tmp_path: Path
+) -> None:
+    said = dict(re.findall(r"/(\w+), sha256 of the whole case ([0-9a-f]{64})\n", closed.said))
+    closed.bench("challenge", "judge", closed.folder, closed.answers, "--json", tmp_path / "r.json")
+    judged = femubench.read_run(tmp_path / "r.json").meta["cases"]
+    for name in ("arch", "portal"):
+        published = shutil.copytree(SUITE / name, tmp_path / name)
+        digest = read_case(published).digest
+        assert said[name] == judged[f"suite/{name}"]["digest"] == digest
+        unseen = published / "change-1.csv"
+        text = unseen.read_text(encoding="utf-8").replace("\n1,", "\n1,1")  # a frequency
+        unseen.write_text(text, encoding="utf-8")
+        assert read_case(published).digest != digest
 
 
 @pytest.mark.parametrize("key", [None, "short", "A" * 43 + "="])

@@ -51,8 +51,10 @@ def _cipher() -> Fernet:
         raise InputError(what, expected="what `Fernet.generate_key()` gives") from None
 
 
-def close_cases(cases: Sequence[Path], target: Path) -> list[Path]:
-    """Write cases whose unseen data are encrypted, a folder each; return the folders.
+def close_cases(cases: Sequence[Path], target: Path) -> dict[Path, str]:
+    """Write cases whose unseen data are encrypted; return the digest of each whole case by folder.
+
+    A digest that is published now shows that a case which is published later is the one closed.
 
     Arguments:
         cases: folders, each with unseen data.
@@ -64,15 +66,16 @@ def close_cases(cases: Sequence[Path], target: Path) -> list[Path]:
     """
     cipher = _cipher()
     check_new(target)
-    parts = {target / folder.absolute().name: _open_part(read_case(folder)) for folder in cases}
-    if len(parts) < len(cases):
+    known = {target / folder.absolute().name: read_case(folder) for folder in cases}
+    if len(known) < len(cases):
         raise InputError("two cases in folders of one name", expected="a name for each")
-    for folder, whole in zip(parts, cases, strict=True):
+    parts = [_open_part(case) for case in known.values()]
+    for (folder, case), part in zip(known.items(), parts, strict=True):
         folder.mkdir(parents=True)
-        for name, content in parts[folder].items():
+        for name, content in part.items():
             (folder / name).write_bytes(content)
-        (folder / CLOSED).write_bytes(cipher.encrypt(_zipped(whole)))
-    return list(parts)
+        (folder / CLOSED).write_bytes(cipher.encrypt(_zipped(case.folder)))
+    return {folder: case.digest for folder, case in known.items()}
 
 
 def _open_part(case: Case) -> dict[str, bytes]:

@@ -122,8 +122,8 @@ def close(folder: Path, cases: tuple[Path, ...]) -> None:
     from femubench.core.library.challenge import close_cases
 
     written = close_cases(cases, folder)
-    for path in written:
-        click.echo(f"wrote {path}")
+    for path, digest in written.items():
+        click.echo(f"wrote {path}, sha256 of the whole case {digest}")
     click.echo(f"Now: bench submit -s STRATEGY -o FILE.json {folder}/*")
 
 

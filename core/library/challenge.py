@@ -233,7 +233,9 @@ def score_challenge(
     return Scored(hidden, falls, judge_answer(hidden, given, falls), commitment)
 
 
-def close_cases(cases: Iterable[str | PathLike[str]], target: str | PathLike[str]) -> list[Path]:
+def close_cases(
+    cases: Iterable[str | PathLike[str]], target: str | PathLike[str]
+) -> dict[Path, str]:
     """Write cases whose unseen data are encrypted; see `core.challenge.closed_set`."""
     return closed_set.close_cases([Path(case) for case in cases], Path(target))
 
