@@ -1,12 +1,14 @@
-"""How far the board of the suite rests on the numbers of the rule and on single structures.
+"""How far the boards rest on the numbers of the rule, on single structures and on noise.
 
-python benchmarks/board_checks.py    # board-rules, -families and -means.csv in docs/data; a minute
+python benchmarks/board_checks.py    # board-rules, -families and -means.csv in docs/data; minutes
+python benchmarks/board_checks.py --noise run.json    # board-noise.csv, of a run with several seeds
 
-All are of the run that docs/figures keeps: nothing is run.
+All are of runs that are there, the first of those that docs/figures keeps: nothing is run.
 """
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -23,7 +25,7 @@ from femubench.results import Rule
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data"
-RUN = ROOT / "docs" / "figures" / "board-suite.json"
+BOARDS = ("suite", "after")  # of the structures before and after the rule
 # One number of the rule at a time.
 VARIED = {
     "change_share": (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0),
@@ -143,10 +145,50 @@ def compare_means(run: Run) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def weigh_noise(gains: FloatArray) -> dict[str, float]:
+    """Return how far gains vary over draws of noise and, these taken off, over structures.
+
+    Arguments:
+        gains: (structures, draws).
+
+    Source: one-way analysis of variance with random effects (Searle, Casella & McCulloch 1992,
+    section 3.6).
+    """
+    means, noise = gains.mean(axis=1), float(gains.var(axis=1, ddof=1).mean())
+    others = max(float(means.var(ddof=1)) - noise / gains.shape[1], 0.0)
+    boards = gains.mean(axis=0)  # one for each draw
+    return {
+        "gain": means.mean(), "lowest": boards.min(), "highest": boards.max(),
+        "draws_std": np.sqrt(noise), "structures_std": np.sqrt(others),
+        "noise_share": noise / max(noise + others, 1e-12),
+    }  # fmt: skip
+
+
+def compare_noise(run: Run) -> pd.DataFrame:
+    """Return by strategy what noise and structures do to its gain."""
+    table = GainTable.of(run, run.ranked, run.nominals[0])
+    gains = {name: table.by_structure(table.values[name])[..., 0] for name in table.names}
+    rows = [{"strategy": name, **weigh_noise(own)} for name, own in gains.items()]
+    return pd.DataFrame(rows).sort_values("gain", ascending=False).round(4)
+
+
 def main() -> None:
     """Write the tables."""
-    run = femubench.read_run(RUN)
-    made = {"rules": vary(run), "families": families(run), "means": compare_means(run)}
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--noise", metavar="FILE", help="a run of `bench run --seeds N --json`")
+    file = parser.parse_args().noise
+    if file is not None:
+        made = {"noise": compare_noise(femubench.read_run(file))}
+    else:
+        figures = ROOT / "docs" / "figures"
+        runs = {name: femubench.read_run(figures / f"board-{name}.json") for name in BOARDS}
+        kinds = {"rules": vary, "families": families, "means": compare_means}
+        made = {
+            kind: pd.concat(
+                {name: make(run) for name, run in runs.items()}, names=["board"]
+            ).reset_index("board")
+            for kind, make in kinds.items()
+        }
     for name, table in made.items():
         print(table.to_string())
         file = DATA / f"board-{name}.csv"

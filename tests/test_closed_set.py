@@ -92,9 +92,7 @@ def test_what_was_not_answered_counts_as_the_model_that_was_given(closed: Set) -
     assert [one.gain for one in lost] == [0.0, 0.0]
 
 
-def test_a_case_that_is_published_later_is_shown_to_be_the_one_closed(
-    closed: Set, tmp_path: Path
-) -> None:
+def test_a_case_published_later_is_the_one_closed(closed: Set, tmp_path: Path) -> None:
     said = dict(re.findall(r"/(\w+), sha256 of the whole case ([0-9a-f]{64})\n", closed.said))
     closed.bench("challenge", "judge", closed.folder, closed.answers, "--json", tmp_path / "r.json")
     judged = femubench.read_run(tmp_path / "r.json").meta["cases"]
@@ -103,8 +101,7 @@ def test_a_case_that_is_published_later_is_shown_to_be_the_one_closed(
         digest = read_case(published).digest
         assert said[name] == judged[f"suite/{name}"]["digest"] == digest
         unseen = published / "change-1.csv"
-        text = unseen.read_text(encoding="utf-8").replace("\n1,", "\n1,1")  # a frequency
-        unseen.write_text(text, encoding="utf-8")
+        unseen.write_bytes(unseen.read_bytes().replace(b"\n1,", b"\n1,1"))  # a frequency
         assert read_case(published).digest != digest
 
 

@@ -6,11 +6,13 @@ import re
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from printed_boards import as_printed, assert_board_is_that_of, assert_same_errors, stored, text_of
 
 import femubench
+from benchmarks.board_checks import weigh_noise
 from femubench import Run, read_case
 from femubench.core.score.leaderboard import leaderboard, list_rows
 from femubench.core.score.scoring import reference_of
@@ -19,6 +21,7 @@ from femubench.results import PredictiveBoard
 from truths.published import write_garteur
 
 ROOT = Path(__file__).parents[1]
+DATA = ROOT / "docs" / "data"
 SUITE = ROOT / "scenarios" / "suite"
 LISTED = tomllib.loads((SUITE / "suite.toml").read_text(encoding="utf-8"))
 NAMES = sorted(LISTED)
@@ -124,29 +127,52 @@ def test_a_board_says_what_its_strategies_could_read_and_that_yardsticks_lead_no
     assert finding(run, lost) == ["No strategy gave a possible model."]
 
 
-def test_leave_one_out_and_varied_rules_are_those_of_the_run_kept() -> None:
-    table = pd.read_csv(ROOT / "docs" / "data" / "board-rules.csv", index_col=0)
-    board = leaderboard(stored("suite")).set_index("strategy")
+@pytest.mark.parametrize("name", ["suite", "after"])
+def test_leave_one_out_and_varied_rules_are_those_of_the_run_kept(name: str) -> None:
+    kept = pd.read_csv(DATA / "board-rules.csv", index_col=0), pd.read_csv(DATA / "board-means.csv")
+    table, means = (both[both["board"] == name].drop(columns="board") for both in kept)
+    board = leaderboard(stored(name)).set_index("strategy")
     board = board[board["rank"].notna()]
     assert list(table.index) == list(board.index)
     assert table["place"].tolist() == board["rank"].tolist()
     assert table["gain"].to_numpy() == pytest.approx(board["gain"].to_numpy(), abs=1e-4)
-    moves = (table["place"] - table["one_left_out_best"]).abs()
-    moves = moves.combine((table["one_left_out_worst"] - table["place"]).abs(), max)
-    means = pd.read_csv(ROOT / "docs" / "data" / "board-means.csv", index_col=0)
-    rules = text_of("docs/scoring.md").split("rules -->")[1]
-    said = re.findall(r"by (?:no )?more than (\d+)", rules)
+    moves = table.drop(columns=["gain", "place"]).sub(table["place"], axis=0).abs().max()
+    left = moves.filter(like="one_left").max()
+    rules = (ROOT / "docs" / "scoring.md").read_text(encoding="utf-8").split("rules -->")[1]
+    words = " ".join(rules.split("\n\n")[["suite", "after"].index(name)].split())
     mean, median, *others = means["largest_move"]
-    assert list(map(int, said)) == [moves.max(), 4, median, max(others)]
-    assert (mean, set(means["first"])) == (moves.max(), {"diagnosed"})
+    said = re.findall(r"by (?:no )?more than (\d+)", words)
+    assert [int(text) for text in said] == [left, median, max(others)]
+    assert (mean, set(means["first"])) == (left, {board.index[0]})
+    largest = moves.filter(like="=")
+    assert f"the largest move of a rank is {largest.max()}, with `{largest.idxmax()}`" in words
+
+
+def test_what_noise_does_to_gains_is_told_apart_from_what_structures_do() -> None:
+    random = np.random.default_rng(0)
+    drawn = 0.2 + 0.3 * random.standard_normal((4000, 1)) + 0.1 * random.standard_normal((4000, 5))
+    found = weigh_noise(drawn)
+    stds = found["draws_std"], found["structures_std"], found["noise_share"]
+    assert stds == pytest.approx((0.1, 0.3, 0.1), rel=0.05)
+
+
+def test_the_table_of_noise_is_that_which_is_kept() -> None:
+    kept = pd.read_csv(DATA / "board-noise.csv").set_index("strategy")
+    text = (ROOT / "docs" / "scoring.md").read_text(encoding="utf-8").split("noise -->")[1]
+    rows = re.findall(r"^\| `([a-z-]+)` \| (.*) \|$", text, re.MULTILINE)
+    assert [name for name, _ in rows] == list(kept.index)
+    for name, cells in rows:
+        own = kept.loc[name] * [1.0, 1.0, 1.0, 1.0, 1.0, 100.0]
+        assert [as_printed(cell) for cell in re.split(r" \| | to ", cells)] == list(own), name
 
 
 def test_the_error_rates_of_the_family_are_those_that_are_kept() -> None:
-    table = pd.read_csv(ROOT / "docs" / "data" / "board-families.csv")
-    rates = table["error_rate"]
-    assert len(table) == 2
-    said = re.findall(r"in (\S+) to (\S+) % of the trials", text_of("docs/reports.md"))
-    assert [as_printed(text) for text in said[0]] == [100.0 * rates.min(), 100.0 * rates.max()]
+    table = pd.read_csv(DATA / "board-families.csv")
+    assert list(table["board"]) == ["suite", "suite", "after", "after"]
+    rates = 100.0 * table["error_rate"]
+    pattern = r"in (\S+) to (\S+) % of the .*?: (\S+) and (\S+) on .*?, (\S+) and (\S+) where"
+    (said,) = re.findall(pattern, text_of("docs/reports.md"))
+    assert [as_printed(x) for x in said] == [rates.min(), rates.max(), *rates[[0, 2, 1, 3]]]
 
 
 @pytest.mark.nightly
