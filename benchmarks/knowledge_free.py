@@ -348,9 +348,16 @@ def main() -> None:
     words = parser.parse_args()
     if words.memory is not None:
         files = sorted(TABLE.parents[2].glob("scenarios/suite/*/stretch.npz"))
-        whole = [["suite"], [f"suite/{file.parent.name}" for file in files]]
-        asked = [words.memory] if words.memory else whole
-        table = pd.concat([remember(names) for names in asked])
+        names = {f"suite/{file.parent.name}" for file in files}
+        later = {case.name for case in read_cases(["suite:after the rule"], load_plugins())}
+        whole = {
+            "before the rule": ["suite:before the rule"],
+            "before the rule, stretched": sorted(names - later),
+            "after the rule, stretched": sorted(names & later),
+        }
+        asked = {"asked for": words.memory} if words.memory else whole
+        found = {name: remember(cases) for name, cases in asked.items()}
+        table = pd.concat(found, names=["set"]).reset_index("set")
         print(table.to_string(index=False))
         if not words.memory:
             table.to_csv(MEMORY, index=False, lineterminator="\n")

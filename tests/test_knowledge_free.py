@@ -13,6 +13,7 @@ from printed_boards import ROOT, as_printed, text_of
 from benchmarks.knowledge_free import (
     CENTRES,
     MAKERS,
+    MEMORY,
     Problem,
     mean_gain,
     problems_of,
@@ -64,3 +65,15 @@ def test_the_table_of_whole_sets_says_the_same_as_the_page() -> None:
 def test_what_an_optimiser_finds_on_some_structures_is_no_better_on_others() -> None:
     found = mean_gain(problems(*SOME), search(problems(*OTHERS)))["gain"]
     assert found <= mean_gain(problems(*SOME), MAKERS["shifted"])["gain"] + 0.02
+
+
+def test_who_knows_truths_is_below_shifted_on_twins_and_the_page_says_what_is_kept() -> None:
+    kept = pd.read_csv(MEMORY).query("strategy != 'meet'").set_index(["strategy", "set"])
+    text = (ROOT / "docs/scoring.md").read_text(encoding="utf-8").split("**Memory on purpose.**")[1]
+    rows = re.findall(r"^\| [^|]*(?:truths|ratios|shifted)[^|]* \| (.*) \|$", text, re.MULTILINE)
+    for name, row in zip(kept.index.unique("strategy"), rows, strict=True):
+        cells, own = row.split(" | "), kept.loc[name]
+        assert [as_printed(cell) for cell in cells[::3]] == list(own["cases"])
+        assert [as_printed(cell) for cell in cells[1::3]] == list(own["twins"])
+        assert [cell.startswith("yes") for cell in cells[2::3]] == list(own["marked"])
+        assert not name.startswith("truths") or (own["twins"] < kept.loc["shifted"]["twins"]).all()
