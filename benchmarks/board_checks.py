@@ -178,7 +178,10 @@ def main() -> None:
     parser.add_argument("--noise", metavar="FILE", help="a run of `bench run --seeds N --json`")
     file = parser.parse_args().noise
     if file is not None:
-        made = {"noise": compare_noise(femubench.read_run(file))}
+        run = femubench.read_run(file)
+        if len(run.meta["seeds"]) < 2:
+            parser.error(f"{file} has one seed, several expected: bench run --seeds 5 --json")
+        made = {"noise": compare_noise(run)}
     else:
         figures = ROOT / "docs" / "figures"
         runs = {name: femubench.read_run(figures / f"board-{name}.json") for name in BOARDS}

@@ -53,7 +53,7 @@ BUDGETS = {
     "femubench": 370,
     "tests": 47_310,
     "truths": 13_668,
-    "benchmarks": 7_387,
+    "benchmarks": 7_390,
 }
 ADVICE = (
     "shorten the room: take out what nothing calls, make one of what is there twice; where a "
