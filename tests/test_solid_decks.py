@@ -190,10 +190,66 @@ def test_a_part_of_abaqus_is_read_like_a_flat_file(tmp_path: Path) -> None:
     assert (model.mass - flat.mass).diagonal().sum() == pytest.approx(21.0)
 
 
+COUPLING = """*SURFACE, NAME=head, TYPE=NODE
+9
+10, 1.
+11,
+12,
+*COUPLING, CONSTRAINT NAME="tip@1", REF NODE=13, SURFACE=head
+*DISTRIBUTING
+1, 6
+*ELEMENT, TYPE=MASS, ELSET=load
+3, 13
+*MASS, ELSET=load
+20000.
+*ELEMENT, TYPE=SPRING1, ELSET=prop
+4, 13
+*SPRING, ELSET=prop
+6
+4e9
+"""
+TIPPED = (COLUMN + COUPLING + SECTION).replace("12,0,1,2\n", "12,0,1,2\n13,0.4,0.5,2.6\n")
+
+
+def test_a_reference_node_moves_as_the_body_that_fits_its_nodes_best(tmp_path: Path) -> None:
+    """The mass and the spring to ground there act on the nodes by that fit, by least squares."""
+    model, bare = read(tmp_path, TIPPED), read(tmp_path, COLUMN + SECTION)
+    assert set(model.groups) == {"upper", "rest", "prop"}
+    own = rows_of(bare)
+    top = [(node, d) for node in ("9", "10", "11", "12") for d in "xyz"]
+    arms = bare.dofs.xyz[[own.index(row) for row in top[::3]]] - [0.4, 0.5, 2.6]
+    # u = t + theta x arm
+    body = np.vstack([np.hstack([np.eye(3), -np.cross(np.eye(3), arm)]) for arm in arms])
+    fit = np.zeros((6, bare.size))
+    fit[:, [own.index(row) for row in top]] = np.linalg.lstsq(body, np.eye(len(body)))[0]
+    mass = bare.mass.toarray() + 20000.0 * fit[:3].T @ fit[:3]
+    stiffness = bare.stiffness.toarray() + 4e9 * np.outer(fit[5], fit[5])
+    expected = np.sqrt(la.eigvalsh(stiffness, mass)[:6]) / (2.0 * np.pi)
+    found = femubench.solve_modes(model)
+    np.testing.assert_allclose(found.natural_frequencies[:6], expected, rtol=3e-3)
+    at = [rows_of(model).index(("tip@1", d)) for d in ("x", "y", "z", "rx", "ry", "rz")]
+    moved = found.shapes[[rows_of(model).index(row) for row in own], :6]
+    np.testing.assert_allclose(found.shapes[at, :6], fit @ moved, atol=3e-3 * abs(moved).max())
+
+
+def test_an_updated_spring_is_written_into_its_deck(tmp_path: Path) -> None:
+    model, target = read(tmp_path, TIPPED), tmp_path / "new"
+    factors = [fem.Property(n, "E", (f"group:{n}",)) for n in ("prop", "upper")]
+    updated = fem.Groups(model).with_factors(factors, [0.25, 1.1])
+    target.mkdir()
+    femubench.write_model(updated, target, like=tmp_path / "job.inp")
+    again = femubench.read_model(target / "job.inp")
+    assert "6\n1000000000.0\n" in (target / "job.inp").read_text()
+    assert abs(again.stiffness - updated.stiffness).max() < 1e-9 * updated.stiffness.max()
+
+
 @pytest.mark.parametrize(
     ("old", "new", "match"),
     [
         ("TYPE=C3D8,", "TYPE=B31,", "elements of type B31.*C3D20R.*MATRIXSTORAGE"),
+        ("foot, 1, 3", "foot, 1, 3\n*COUPLING, REF NODE=1, SURFACE=head", "no surface HEAD"),
+        ("foot, 1, 3", f"foot, 1, 3\n{COUPLING}", "node 13 of an element has no place"),
+        ("foot, 1, 3", "foot, 1, 3\n*KINEMATIC\n1, 3", "KINEMATIC is not read"),
         ("*ELSET, ELSET=upper", "*TIE, NAME=glue\nupper, all\n*ELSET, ELSET=upper", "TIE is not"),
         ("*DENSITY\n7850.\n", "", "STEEL has no density"),
         ("2, 5,6,7,8,9,10,\n11,12", "2, 9,10,11,12,5,6,\n7,8", "element 2 is turned inside out"),

@@ -118,6 +118,7 @@ class Case(Shown):
         matches: where each sensor that came with coordinates was taken to sit.
         lines: that draw the structure of the test, in m along the axes of the model, (k, 2, 3).
         whole: the model as it came, where `model` is its reduction to groups; None elsewhere.
+        drawing: name of the drawing that the model is; empty for that of `case.toml`.
         frfs: measured frequency responses of the structure as tested; they hold the held-out modes
             too, and are drawn.
         split: which of them a strategy is given and which only the score sees; None for neither.
@@ -146,6 +147,7 @@ class Case(Shown):
     frfs: FrequencyResponses | None = None
     split: ResponseSplit | None = None
     whole: Model | None = None
+    drawing: str = ""
 
     def rows(self) -> list[tuple[str, str]]:
         """Return where the case is from, its model, and what was measured on it."""

@@ -32,7 +32,7 @@ from femubench.core.case.nodes import (
     read_dofs,
     read_nodes,
 )
-from femubench.core.case.schema import FileSpec, FrameSpec, LengthUnit
+from femubench.core.case.schema import DrawingSpec, FileSpec, FrameSpec, LengthUnit
 from femubench.core.case.tables import SUFFIXES, read_table
 from femubench.core.case.units import from_si, in_si
 from femubench.core.errors import InputError
@@ -281,10 +281,12 @@ def write_model(
     raise InputError("no such file is written", file=made, expected=expected)
 
 
-def files_of(folder: Path) -> tuple[ModelFiles, LengthUnit] | None:
+def files_of(folder: Path, drawing: str = "") -> tuple[ModelFiles, LengthUnit] | None:
     """Return the files of the model of a case, and their unit; None where it has no such files."""
-    data = tomllib.loads(read_text(folder / CASE_FILE, LARGEST_CASE))
-    spec = FrameTables(CaseFiles(folder)).spec(data).model
+    file = folder / (f"{drawing}.toml" if drawing else CASE_FILE)
+    data = tomllib.loads(read_text(file, LARGEST_CASE))
+    known = DrawingSpec.model_validate if drawing else FrameTables(CaseFiles(folder)).spec
+    spec = known(data).model
     if isinstance(spec, FrameSpec):
         return None
     parts = (spec.file, spec.mass) if isinstance(spec, FileSpec) else (spec.stiffness, spec.mass)

@@ -137,9 +137,9 @@ class MatrixGeometry:
 
     def node(self, place: Place) -> str:
         """Return the node of a place; raises Misfit."""
-        if place.joint is None or place.joint not in self.places:
+        if str(place) not in self.places:
             raise Misfit(f"there is no node {str(place)!r}", "the name of a node of the dofs file")
-        return place.joint
+        return str(place)
 
     def point(self, place: Place) -> Vector:
         """Return where a node lies in m; raises Misfit."""

@@ -15,7 +15,7 @@ from femubench.core.case.case import SCATTER, Case, Match, Modification
 from femubench.core.case.checks import FREE_YET_HELD, NOT_HELD, check_unique
 from femubench.core.case.deviations import with_floor
 from femubench.core.case.faults import BadKey, KeyPath, at_key
-from femubench.core.case.files import LARGEST_CASE, CaseFiles
+from femubench.core.case.files import DRAWN, LARGEST_CASE, CaseFiles, drawing_of
 from femubench.core.case.frame_tables import FrameTables
 from femubench.core.case.frames import (
     FrameSite,
@@ -44,6 +44,7 @@ from femubench.core.case.response_files import read_responses
 from femubench.core.case.response_split import split_responses
 from femubench.core.case.schema import (
     CaseSpec,
+    DrawingSpec,
     FileSpec,
     FrameSpec,
     ModificationSpec,
@@ -85,8 +86,9 @@ def read_case(
     """Read a case folder.
 
     Arguments:
-        folder: a folder with a `case.toml`.
-        name: the name to give to the case; None takes its own.
+        folder: a folder with a `case.toml`, or a file in one that holds another drawing: a
+            `[model]` in place of that of the case.
+        name: the name to give to the case; None takes its own, with that of the drawing.
         readers: reader plugins for files other than CSV and Matrix Market.
         installed: whether the folder came with an installed package; some installers make such
             a folder of links that lead out of it.
@@ -99,13 +101,20 @@ def read_case(
         >>> femubench.read_case(case.folder).used
         (1, 2, 3)
     """
-    files = CaseFiles(Path(folder), links=installed)
-    text, tables = read_text(files.case_file, LARGEST_CASE), FrameTables(files)
+    drawing = drawing_of(folder)
+    files = CaseFiles(Path(folder) if drawing is None else drawing.parent, links=installed)
+    drawn, text, tables = "", read_text(files.case_file, LARGEST_CASE), FrameTables(files)
     try:
         spec = spec_of(text, files.case_file, CaseSpec, tables.spec)
+        if drawing is not None:
+            drawn = read_text(files.path(drawing.name), LARGEST_CASE)
+            spec = _drawn_otherwise(spec, drawing, drawn, name)
         case = _Building(files, spec, readers).case(name)
+        case = case if drawing is None else replace(case, drawing=drawing.stem)
         return reduce_case(case) if reduced else case
     except BadKey as fault:
+        if drawing is not None and fault.path[:1] == ("model",):
+            raise locate_fault(fault, drawn, drawing) from None
         place = tables.place(fault.path)
         if place is None:
             raise locate_fault(fault, text, files.case_file) from None
@@ -113,6 +122,18 @@ def read_case(
         raise InputError(
             fault.what, file=file, line=line, key=key, expected=fault.expected
         ) from None
+
+
+def _drawn_otherwise(spec: CaseSpec, drawing: Path, text: str, name: str | None) -> CaseSpec:
+    """Return a case with the model of another drawing, as a case of the same structure."""
+    try:
+        model = spec_of(text, drawing, DrawingSpec).model
+    except BadKey as fault:
+        raise locate_fault(fault, text, drawing) from None
+    mark, info = f"{DRAWN}{drawing.stem}", spec.case
+    structure = info.structure or (info.name if name is None else name.removesuffix(mark))
+    about = info.model_copy(update={"name": info.name + mark, "structure": structure})
+    return spec.model_copy(update={"model": model, "case": about})
 
 
 @dataclass

@@ -504,13 +504,18 @@ class DiagnosisSpec(TomlTable):
     )
 
 
-class CaseSpec(TomlTable):
-    """The whole of `case.toml`."""
+class DrawingSpec(TomlTable):
+    """The whole of a file with another drawing of the structure of a case."""
 
-    case: CaseInfo = Field(description="the table [case]")
     model: Annotated[FrameSpec | MatricesSpec | FileSpec, Field(discriminator="kind")] = Field(
         description="the table [model]"
     )
+
+
+class CaseSpec(DrawingSpec):
+    """The whole of `case.toml`."""
+
+    case: CaseInfo = Field(description="the table [case]")
     measurement: MeasurementSpec = Field(description="the table [measurement]")
     reference: ReferenceSpec | None = Field(None, description="the table [reference]")
     modification: Many[ModificationSpec] = Field(

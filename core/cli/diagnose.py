@@ -15,6 +15,7 @@ from femubench.core.errors import FemubenchError, InputError
 from femubench.core.files import check_new, write_atomically
 from femubench.core.library.cases import one_case
 from femubench.core.plugin.validation import choose_names
+from femubench.core.schema.run_options import RunOptions
 
 if TYPE_CHECKING:
     from femubench.core.diagnosis.result import Diagnosis
@@ -46,6 +47,7 @@ def _check_seconds(value: float) -> float:
     "--tolerance", type=float, callback=options.read_with(_check_share), metavar="X",
     help="Ordinary relative scatter of every element; 0 for none. Default: the case's.",
 )  # fmt: skip
+@options.of_fields(RunOptions, "drawing", default="")
 @click.option("--no-pairs", is_flag=True, help="Look for single effects only, which is quicker.")
 @click.option("--no-faults", is_flag=True, help="Take data and input as they are.")
 @click.option(
@@ -78,6 +80,7 @@ def diagnose(
     json_file: Path | None,
     output: Path | None,
     tolerance: float | None,
+    drawing: str,
     no_pairs: bool,
     no_faults: bool,
     budget: float | None,
@@ -102,7 +105,7 @@ def diagnose(
     names = None if effects is None else [word.strip() for word in effects.split(",")]
     choose_names("effect", names or (), plugins.effects)
     choose_names("plugin", others, (plugin.plugin for plugin in plugins.loaded))
-    read = one_case(case, plugins)
+    read = one_case(case, plugins, drawing)
     from femubench.core.diagnosis.serial import diagnosis_to_json
     from femubench.core.inference.settings import decisions_from
     from femubench.core.library.diagnose import diagnosis_of, has_model

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # Words that would make a run another one.
 _FIXED = (
-    *("cases", "strategies", "seeds", "seed", "nominal", "twins"),
+    *("cases", "strategies", "seeds", "seed", "nominal", "drawing", "twins"),
     *("timeouts", "memory", "resume", "overwrite"),
 )
 
@@ -42,7 +42,9 @@ _FIXED = (
     "-s", "--strategy", "strategies", multiple=True, metavar="STRATEGY",
     help="Run this strategy, or STRATEGY:OPTION=VALUE,...; may be repeated. Default: all.",
 )  # fmt: skip
-@options.of_fields(RunOptions, "seeds", "seed", "nominal", "twins", "resume", "overwrite")
+@options.of_fields(
+    RunOptions, "seeds", "seed", "nominal", "drawing", "twins", "resume", "overwrite"
+)
 @click.option(
     "--locked", metavar="RUN",
     help="Repeat a stored run and report differences; exit 1 if a result differs.",
@@ -92,7 +94,7 @@ def _checked(ctx: click.Context, cases: Iterable[str], strategies: Iterable[str]
     choose_names("strategy", (word.partition(":")[0] for word in strategies), plugins.strategies)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        case_folders(cases, plugins.scenarios)
+        case_folders(cases, plugins.scenarios, ctx.params["drawing"])
     for note in said:
         click.echo(f"bench: {note.message}", err=True)
     warnings.filterwarnings("ignore", LEFT_OUT)  # said above
@@ -110,7 +112,7 @@ def _going_on(ctx: click.Context) -> tuple[Sequence[str], Sequence[str]]:
     alone = not ctx.params["cases"] and not ctx.params["strategies"]
     return ("--resume",), (
         "--overwrite",
-        *(("--seeds", "--seed", "--nominal", "--twins") if alone else ()),
+        *(("--seeds", "--seed", "--nominal", "--drawing", "--twins") if alone else ()),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
@@ -9,6 +10,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
+from femubench.core.case.files import DRAWN, drawing_of
 from femubench.core.display import clip_text
 from femubench.core.errors import InputError
 from femubench.core.plugin.loader import Plugins, load_plugins
@@ -169,18 +171,21 @@ def as_list(given: Any) -> list[Any]:  # noqa: ANN401 - one of anything, or seve
     return [given]
 
 
-def read_cases(given: CaseLike | Iterable[CaseLike], plugins: Plugins) -> list[Case]:
+def read_cases(
+    given: CaseLike | Iterable[CaseLike], plugins: Plugins, drawing: str = ""
+) -> list[Case]:
     """Read and validate cases, each once.
 
     Arguments:
         given: names of scenarios, of a group of them (`group`, or `group:class` for those of a
             class), of one case of a scenario, folders, or cases; none for the default set.
         plugins: where scenarios and readers come from.
+        drawing: whose model is taken in place of that of `case.toml`.
 
     Raises:
         InputError: for an unknown name or a faulty case, before anything is run.
     """
-    wanted = case_folders(given, plugins.scenarios)
+    wanted = case_folders(given, plugins.scenarios, drawing)
     # Words are known to be right before what reads cases is loaded.
     from femubench.core.case.reader import read_case
 
@@ -204,16 +209,17 @@ def read_cases(given: CaseLike | Iterable[CaseLike], plugins: Plugins) -> list[C
 
 
 def case_folders(
-    given: CaseLike | Iterable[CaseLike], scenarios: Mapping[str, Scenario]
+    given: CaseLike | Iterable[CaseLike], scenarios: Mapping[str, Scenario], drawing: str = ""
 ) -> list[tuple[str | None, Path] | Case]:
     """Return name and folder of every case that words stand for, and cases as they are, each once.
 
     Arguments:
         given: as in `read_cases`.
         scenarios: the known ones.
+        drawing: as in `read_cases`; of several cases, those without it are left out.
 
     Raises:
-        InputError: for an unknown name.
+        InputError: for an unknown name, and for a drawing that none has.
     """
     # By resolved folder, so that each runs once; messages name it as it was typed.
     wanted: dict[object, tuple[str | None, Path] | Case] = {}
@@ -221,20 +227,43 @@ def case_folders(
         if not isinstance(word, (str, PathLike)):
             wanted.setdefault(id(word), word)
             continue
-        for name, folder in _folders(str(word), scenarios):
+        found = list(_folders(str(word), scenarios))
+        lone = bool(as_list(given)) and len(found) == 1
+        for name, folder in _drawn(found, drawing, lone) if drawing else found:
             wanted.setdefault(folder.resolve(), (name, folder))
     if not wanted:
         raise InputError("there is no case to run", expected="a case folder or a scenario plugin")
     return list(wanted.values())
 
 
-def one_case(given: CaseLike, plugins: Plugins) -> Case:
-    """Return the only case that a word stands for.
+def _drawn(
+    found: Sequence[tuple[str | None, Path]], drawing: str, lone: bool = True
+) -> Iterator[tuple[str | None, Path]]:
+    """Yield name and file of a drawing of cases; warn of one that lacks it, refuse a lone one."""
+    for name, folder in found:
+        if drawing_of(folder) is not None and folder.stem == drawing:
+            yield name, folder
+            continue
+        file = folder / f"{drawing}.toml"
+        if re.fullmatch(r"[\w-]+", drawing) and drawing_of(file) is not None and file.is_file():
+            yield None if name is None else f"{name}{DRAWN}{drawing}", file
+            continue
+        case = name or str(folder)
+        if not lone:
+            warnings.warn(f"{LEFT_OUT}{case}, it has no drawing {drawing!r}", stacklevel=2)
+            continue
+        files = sorted(file.stem for file in folder.glob("*.toml") if drawing_of(file) is not None)
+        expected = f"one of {', '.join(files)}" if files else "a case that has it"
+        raise InputError(f"{case} has no drawing {drawing!r}", expected=expected)
+
+
+def one_case(given: CaseLike, plugins: Plugins, drawing: str = "") -> Case:
+    """Return the only case that a word stands for; see `read_cases`.
 
     Raises:
         InputError: when it stands for several.
     """
-    found = read_cases(given, plugins)
+    found = read_cases(given, plugins, drawing)
     if len(found) > 1:
         names = ", ".join(case.name for case in found)
         raise InputError(f"{given!r} stands for {len(found)} cases", expected=f"one of {names}")
@@ -275,7 +304,11 @@ def _folders(word: str, scenarios: Mapping[str, Scenario]) -> Iterable[tuple[str
         return [found for name in groups[word] for found in _at_hand(scenarios[name])]
     if word in owners:
         return [(word, owners[word].folder(word))]
-    path = Path(word)
+    path, (name, mark, drawing) = Path(word), word.rpartition(DRAWN)
+    if mark and name in owners:
+        return _drawn([(name, owners[name].folder(name))], drawing)
+    if drawing_of(path) is not None and path.is_file():
+        return [(None, path)]
     if path.name == "case.toml" and path.is_file():
         path = path.parent
     if path.is_dir():

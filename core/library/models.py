@@ -138,7 +138,7 @@ def write_updated(case: Case, model: Model, folder: Path, plugins: Plugins) -> N
     Raises:
         InputError: for a model that its format cannot hold.
     """
-    found = files_of(case.folder)
+    found = files_of(case.folder, case.drawing)
     if found is None:
         write_case(folder, case, model, name=f"{case.name[:60]}-updated")
         return

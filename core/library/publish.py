@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from functools import partial
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from femubench.core.case.case import Case
+from femubench.core.case.files import DRAWN
 from femubench.core.errors import InputError
 from femubench.core.files import check_can_make, resolve_path
 from femubench.core.library.cases import as_list, read_cases, scenarios_of, usable_plugins, way_of
@@ -98,9 +99,14 @@ class InstalledCases:
 
     def case(self, name: str) -> Case | None:
         """Return a case by its name; None where there is none."""
-        if name in self._owners and name not in self._found:
-            (self._found[name],) = read_cases([name], self._plugins)
+        if self._owner(name) in self._owners and name not in self._found:
+            with suppress(InputError) if name not in self._owners else nullcontext():
+                (self._found[name],) = read_cases([name], self._plugins)
         return self._found.get(name)
+
+    def _owner(self, name: str) -> str:
+        """Return the case of which a name may be that of a drawing."""
+        return name if name in self._owners else name.rpartition(DRAWN)[0]
 
     def strategy(self, name: str) -> Strategy | None:
         """Return a strategy by its name with its options; None where there is none."""
@@ -111,7 +117,7 @@ class InstalledCases:
 
     def classes(self, name: str) -> Sequence[str]:
         """Return the kinds of structure and of truth of a case."""
-        return self._classes.get(name, ())
+        return self._classes.get(self._owner(name), ())
 
     def twins(self, cases: Sequence[Case], number: int, seed: int) -> Sequence[Twin]:
         """Return the twins that a run of these cases draws from a seed."""

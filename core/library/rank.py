@@ -214,9 +214,10 @@ def rank(
         options, where: what is computed, and where; a keyword overrules them.
         store: folder that keeps the results.
         progress: called with (result, jobs done, jobs in all).
-        keywords: what `RunOptions` and `Where` have: ``seeds``, ``seed``, ``nominal``, ``twins``
-            (a number, or that and a seed), ``resume``, ``overwrite``, ``timeout``, ``timeouts``,
-            ``memory``; ``jobs``, ``scheduler``, ``cluster``, ``sandbox``.
+        keywords: what `RunOptions` and `Where` have: ``seeds``, ``seed``, ``nominal``,
+            ``drawing``, ``twins`` (a number, or that and a seed), ``resume``, ``overwrite``,
+            ``timeout``, ``timeouts``, ``memory``; ``jobs``, ``scheduler``, ``cluster``,
+            ``sandbox``.
 
     Raises:
         InputError: for an unknown name, an option that does not exist, or a faulty case.
@@ -257,7 +258,7 @@ def plan_run(
             _changed(request_of(results.Run(resumed.read_start(), ())), given), plugins
         )
     found = _strategies(wanted, plugins)
-    read = read_cases(cases, plugins)
+    read = read_cases(cases, plugins, given.get("drawing", ""))
     if not wanted:  # without responses, those that need them would be a line of refusals each
         missing = {"responses"} if all(case.split is None for case in read) else set()
         found = [s for s in found if not missing & set(list_declared(s, "needs"))]
@@ -279,7 +280,7 @@ def _changed(request: Request, given: Mapping[str, Any]) -> Request:
     Raises:
         InputError: for an option that would make it another run.
     """
-    for name in ("seeds", "seed", "nominal", "twins"):
+    for name in ("seeds", "seed", "nominal", "drawing", "twins"):
         if name in given and (name, given[name]) != ("twins", 0):
             raise InputError(
                 f"--resume alone goes on as before; {name} needs CASE or -s next to it"
@@ -292,7 +293,8 @@ def _changed(request: Request, given: Mapping[str, Any]) -> Request:
 
 def plan_again(request: Request, plugins: Plugins) -> Plan:
     """Return the plan of what was asked for before."""
-    cases, strategies = read_cases(request.cases, plugins), _strategies(request.strategies, plugins)
+    cases = read_cases(request.cases, plugins, request.drawing)
+    strategies = _strategies(request.strategies, plugins)
     return _plan(request, cases, strategies, plugins)
 
 
@@ -314,6 +316,7 @@ def _plan(
     """
     choose_names("strategy to limit", request.timeouts, [strategy.name for strategy in strategies])
     classes = classes_of(plugins)
+    classes |= {case.name: classes.get(case.structure, ()) for case in cases if case.drawing}
     drawn: Sequence[Twin] = ()
     others = Companions()
     if request.twins:

@@ -23,7 +23,7 @@ in which parameters stay affine.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as la
@@ -36,7 +36,7 @@ from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import DENSE_LIMIT, solve_modes
 from femubench.core.modal.factorisation import factorise_definite
 from femubench.core.modal.group_prior import GroupPriors
-from femubench.core.modal.rigid import orthonormal, rigid_body_vectors
+from femubench.core.modal.rigid import orthonormal, rigid_body_vectors, rigid_modes_of
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 # What a joint or a clamp, of which little is known, may turn out to be; and any other part.
@@ -146,6 +146,12 @@ def reduce_groups(
     body = span.forces(whole.energy(rigid))
     turn = _physical_coordinates(span.shapes[kept] @ vectors, vectors.T @ body)
     small = {name: turn.T @ part @ turn for name, part in small.items()}
+    # Rounding of large entries leaves halves that differ, of which solvers read one or both.
+    small = {name: 0.5 * (part + part.T) for name, part in small.items()}
+    for group in ("", *model.groups):
+        part = replace(model, stiffness=model.groups.get(group, model.stiffness))
+        key = ("stiffness", group)
+        small[key] = _loose(small[key], rigid_modes_of(part)[kept])
     stiffness, mass = (
         {name: small[kind, name] for name in own}
         for kind, own in (("stiffness", model.groups), ("mass", model.mass_groups))
@@ -571,6 +577,21 @@ def _hold_rigid(kept: IntArray, rigid: FloatArray) -> IntArray:
         return np.unique(kept)
     pivots = la.qr(rigid.T, mode="economic", pivoting=True)[2][: rigid.shape[1]]
     return np.unique(np.concatenate([kept, pivots]).astype(np.int64))
+
+
+def _loose(stiffness: FloatArray, free: FloatArray) -> FloatArray:
+    """Return a stiffness that does not hold motions of a body, not even by rounding, (N, N).
+
+    The entries of a large model are many times those of the small one, and so is what rounding
+    leaves of their sums.
+
+    Arguments:
+        free: these motions at the kept rows, the first ones; they move no others, (b, r).
+    """
+    apart = np.eye(len(stiffness))
+    apart[: len(free), : len(free)] -= free @ la.pinv(free)
+    found = apart.T @ stiffness @ apart
+    return np.asarray(0.5 * (found + found.T))
 
 
 def _physical_coordinates(kept: FloatArray, rigid: FloatArray) -> FloatArray:

@@ -78,6 +78,8 @@ class RunOptions:
         seed: The first seed.
         nominal: The model that all strategies start from: as drawn, or with what handbooks give
             for torsion, shear and rotary inertia, from which the ranks are.
+        drawing: Start from the model of this drawing, which DRAWING.toml in the folder of a case
+            holds, in place of that of case.toml; of several cases those without it are left out.
         twins: Draw N twins of every case whose truth was computed, other structures under other
             names, and say who is good on the cases but not on them; run one job of each strategy
             twice.
@@ -95,6 +97,7 @@ class RunOptions:
     seeds: Annotated[Count | tuple[Seed, ...] | None, Flag(metavar="N")] = None
     seed: Annotated[Seed, Flag(metavar="S", show_default=True)] = 0
     nominal: Annotated[StartModels, Flag(show_default=True)] = "both"
+    drawing: Annotated[str, Flag(metavar="DRAWING")] = ""
     twins: Annotated[int, Ge(0), Le(MOST_TWINS), Flag("", "N[:SEED]", parse_twins)] = 0
     twin_seed: Annotated[int, Ge(0)] | None = None
     resume: Annotated[bool, Flag()] = False
@@ -133,6 +136,7 @@ class RunKeywords(StudyKeywords, total=False):
     seeds: int | Sequence[int] | None
     seed: int | None
     nominal: StartModels | None
+    drawing: str | None
     twins: Twins
     resume: bool
 

@@ -24,13 +24,15 @@ REST = "rest"
 JOINT_SHARE = 0.02  # of the mass: a smaller set of elements is a weld, a bolt or glue
 # What changes neither stiffness nor mass, or is of a step, whose supports alone count.
 _IGNORED = re.compile(
-    "(END)?(ASSEMBLY|PART|STEP)|ENDINSTANCE|HEADING|INCLUDE|NODE|SURFACE|SYSTEM|PREPRINT|RESTART|"
-    "DAMPING|EXPANSION|CONDUCTIVITY|SPECIFICHEAT|INITIALCONDITIONS|PHYSICALCONSTANTS|TIMEPOINTS"
+    "(END)?(ASSEMBLY|PART|STEP)|ENDINSTANCE|HEADING|INCLUDE|NODE|SYSTEM|PREPRINT|RESTART|"
+    "DAMPING|DISTRIBUTING|EXPANSION|CONDUCTIVITY|SPECIFICHEAT|INITIALCONDITIONS|PHYSICALCONSTANTS|TIMEPOINTS"
 )
 KINDS: dict[str, solid_elements.Kind | shells.Shell] = {**solid_elements.KINDS, **shells.SHELLS}
 _BETTER = {**solid_elements.BETTER, **shells.BETTER}
+_TIED = 100.0  # times what holds the nodes of a coupling as a body: how its reference node is
 _SAME = 1e-9  # of the largest entry: what rounding leaves of a factor
 _SOLVED = 10_000  # degrees of freedom up to which better elements are tried: four times as many
+_POINTS = ("MASS", "SPRING1")
 _SECTIONS = ("SOLIDSECTION", "SHELLSECTION")
 _HELD = {
     "ENCASTRE": range(6), "PINNED": range(3),
@@ -50,6 +52,9 @@ class SolidDeck:
         materials: modulus, Poisson's ratio and density by name, nan where not given.
         sections: material and thickness, nan of solids, by set of elements; the last one counts.
         masses: mass of the elements of a set.
+        springs: direction, 0 to 5, and stiffness of the springs to ground of a set.
+        surfaces: nodes by name.
+        couplings: name and surface of distributing couplings, by reference node.
         held: node and direction of supports.
     """
 
@@ -61,6 +66,9 @@ class SolidDeck:
     materials: dict[str, list[float]] = field(default_factory=dict)
     sections: dict[str, tuple[str, float]] = field(default_factory=dict)
     masses: dict[str, float] = field(default_factory=dict)
+    springs: dict[str, tuple[int, float]] = field(default_factory=dict)
+    surfaces: dict[str, dict[int, None]] = field(default_factory=dict)
+    couplings: dict[int, tuple[str, str]] = field(default_factory=dict)
     held: set[tuple[int, int]] = field(default_factory=set)
 
     def solids(self) -> list[int]:
@@ -153,7 +161,7 @@ def read_solids(path: Path) -> Model:
     deck, places = read_deck(path), nodes.read_nodes(path)
     model = _model_of(deck, _materials(deck), places)
     kinds = {kind for kind, _ in deck.elements.values()}
-    if not kinds & {*_BETTER, *shells.SHELLS} or model.size > _SOLVED:
+    if not kinds & {*_BETTER, *shells.SHELLS} or model.size > _SOLVED or deck.couplings:
         return model
     return replace(model, finer=BetterElements(deck, places, model))
 
@@ -174,12 +182,13 @@ def _model_of(
     needs("skfem", "solids", path)
     early = shells.find_lines_of_three((before or deck).elements)
     used = list(early | shells.find_lines_of_three(deck.elements))
-    if lost := [n for n in used if str(n) not in places]:
+    if lost := [n for n in (*used, *deck.couplings) if str(n) not in places]:
         raise InputError(f"node {lost[0]} of an element has no place", file=path, expected="*NODE")
+    used = [n for n in used if n not in deck.couplings]
     own = {n: places[str(n)] for n in used}
     solid = _thicken(deck, material, own)
     ends = dict.fromkeys(
-        n for kind, nodes in solid.elements.values() if kind != "MASS" for n in nodes
+        n for kind, nodes in solid.elements.values() if kind not in _POINTS for n in nodes
     )
     row, xyz = {n: i for i, n in enumerate(ends)}, np.array([solid.places[n] for n in ends])
     motions = shells.Motions(row, deck.held, early)
@@ -190,6 +199,15 @@ def _model_of(
         elif n in row:
             motions.add_node(n, np.array(own[n]), {n})
     found, moved = motions.matrix()
+    for n in deck.couplings:
+        tip = (
+            shells.Motion(n, d, np.array(places[str(n)]), one) for d, one in enumerate(np.eye(6))
+        )
+        found += [motion for motion in tip if (n, motion.direction) not in deck.held]
+    moved = sp.csr_array(moved)
+    moved.resize(moved.shape[0], len(found))
+    names = {n: name for n, (name, _) in deck.couplings.items()}
+    labels = [names.get(motion.node, str(motion.node)) for motion in found]
     groups, heavy = deck.groups(), {}
     parts: dict[str, SparseArray] = {}
     mass = sp.csc_array(_point_masses(deck, found))
@@ -200,26 +218,85 @@ def _model_of(
         parts[name] = sp.csc_array(moved.T @ stiffness @ moved)
         mass += moved.T @ inertia @ moved
         heavy[name] = float(inertia.sum())
+    at = {(motion.node, motion.direction): i for i, motion in enumerate(found)}
+    axes = np.array([motion.axes for motion in found])
+    for n, (_, surface) in deck.couplings.items():
+        around = list(deck.surfaces[surface])
+        if loose := [node for node in around if node not in row]:
+            what = f"node {loose[0]} of a coupling is none of a solid element"
+            raise InputError(what, file=path, expected="nodes of solid elements")
+        own_rows = [3 * row[node] + d for node in around for d in range(3)]
+        _tie(n, around, parts, at, places, moved[own_rows], axes[:, :3])
+    for name, (direction, stiffness) in deck.springs.items():
+        sprung = [(deck.elements[n][1][0], direction) for n in deck.sets.get(name, ())]
+        own_rows = [at[key] for key in sprung if key in at]
+        values = np.full(len(own_rows), stiffness)
+        parts[deck.named[name]] = sp.csc_array((values, (own_rows, own_rows)), shape=mass.shape)
     model = matrix_model(
         sp.csc_array(mass),
         sp.csc_array(sum(parts.values())),
-        [str(motion.node) for motion in found],
+        labels,
         [DIRECTIONS[motion.direction] for motion in found],
         np.array([motion.xyz for motion in found]),
-        parts if groups else {},
+        parts if len(parts) > 1 else {},
     )
-    dofs = replace(model.dofs, axes=np.array([motion.axes for motion in found]))
-    names = tuple(dict.fromkeys(str(motion.node) for motion in found))
+    dofs = replace(model.dofs, axes=axes)
     if solid.lines:
-        model = replace(model, dofs=dofs, geometry=MatrixGeometry(names, dofs))
+        geometry = MatrixGeometry(tuple(dict.fromkeys(labels)), dofs)
+        model = replace(model, dofs=dofs, geometry=geometry)
     drawn = {
         name if groups else "": _outline(deck, numbers, own)
         for name, numbers in (groups or {REST: list(material)}).items()
     }
     assert isinstance(model.geometry, MatrixGeometry)
     model = replace(model, geometry=replace(model.geometry, outlines=drawn))
-    small = [name for name in model.groups if heavy[name] < JOINT_SHARE * sum(heavy.values())]
+    light = JOINT_SHARE * sum(heavy.values())
+    small = [name for name in model.groups if heavy.get(name, np.inf) < light]
     return replace(model, group_kinds=dict.fromkeys(small, "joint"))
+
+
+def _tie(
+    node: int,
+    around: list[int],
+    parts: dict[str, SparseArray],
+    at: Mapping[tuple[int, int], int],
+    places: Mapping[str, Point],
+    moved: SparseArray,
+    axes: FloatArray,
+) -> None:
+    """Make a reference node move as the motion of a body that fits those of some nodes best.
+
+    It is held to that motion by springs, stiff against what holds the nodes, in the group that
+    holds them most: the elements stay as soft as they are.
+
+    Arguments:
+        node, around: the reference node, and those it is tied to.
+        parts: the stiffness by group, (n, n) each.
+        at: degree of freedom by node and direction.
+        moved: what degrees of freedom do to the translations of the nodes, (3 k, n).
+        axes: directions of the degrees of freedom, (n, 3).
+    """
+    arms = np.array([places[str(n)] for n in around]) - np.array(places[str(node)])
+    size = float(np.abs(arms).max())
+    body = np.zeros((len(around), 3, 6))
+    body[:, range(3), range(3)] = 1.0
+    for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):  # u = t + theta x arm
+        body[:, a, 3 + b], body[:, a, 3 + c] = arms[:, c] / size, -arms[:, b] / size
+    fit = np.linalg.pinv(body.reshape(-1, 6), rcond=1e-6)
+    apart = sp.lil_array(-fit @ moved)
+    for d in range(6):
+        if (node, d) in at:
+            apart[d, at[node, d]] = 1.0 if d < 3 else size
+    inner = np.unique(moved.indices)
+    held = {
+        name: float(
+            np.einsum("ij,ij", axes[inner], sp.csr_array(part)[inner][:, inner] @ axes[inner])
+        )
+        for name, part in parts.items()
+    }
+    name = max(held, key=held.__getitem__)
+    apart = sp.csr_array(apart)
+    parts[name] = sp.csc_array(parts[name] + _TIED / 3.0 * held[name] * (apart.T @ apart))
 
 
 def _outline(deck: SolidDeck, numbers: Sequence[int], places: Mapping[int, Point]) -> FloatArray:
@@ -347,12 +424,19 @@ def write_factors(model: Model, path: Path, original: Path) -> bool:
                 f"*{kind} SECTION, ELSET={label}, MATERIAL={label}",
             ]
             sections += [repr(thickness)] if of_shells else []
-    path.write_text("\n".join([*_other_lines(original, sections), ""]), encoding="latin-1")
+    springs = {
+        name: [str(direction + 1), repr(stiffness * factors[deck.named[name]])]
+        for name, (direction, stiffness) in deck.springs.items()
+    }
+    lines = _other_lines(original, sections, springs)
+    path.write_text("\n".join([*lines, ""]), encoding="latin-1")
     return True
 
 
-def _other_lines(path: Path, sections: Sequence[str]) -> Iterator[str]:
-    """Return the lines of a deck and of what it includes with other materials and sections."""
+def _other_lines(
+    path: Path, sections: Sequence[str], springs: Mapping[str, Sequence[str]]
+) -> Iterator[str]:
+    """Return the lines of a deck and of what it includes with other materials and springs."""
     left_out, inside, last = ("MATERIAL", "ELASTIC", "DENSITY", *_SECTIONS), False, ""
     for _, _, line in nodes.read_lines(path):
         if line.startswith("*"):
@@ -361,6 +445,10 @@ def _other_lines(path: Path, sections: Sequence[str]) -> Iterator[str]:
                 yield from sections
                 sections = ()
             inside, last = keyword in (*left_out, "INCLUDE"), keyword
+            if keyword == "SPRING":
+                name = re.search('ELSET *= *"?([^,"]+)', line, re.IGNORECASE)
+                yield from (line, *springs[name[1].strip().upper() if name else ""])
+                inside = True
         if not inside:
             yield line
     yield from sections
@@ -438,8 +526,10 @@ def _instance(deck: SolidDeck, block: _Block) -> None:
 
 def _element(deck: SolidDeck, block: _Block) -> None:
     kind, known = block.option("TYPE"), KINDS
-    if kind not in known and kind != "MASS":
-        expected = f"{', '.join(known)}, MASS; of others {INSTEAD.partition(', or ')[2]}"
+    if kind not in known and kind not in _POINTS:
+        expected = (
+            f"{', '.join(known)}, {', '.join(_POINTS)}; of others {INSTEAD.partition(', or ')[2]}"
+        )
         raise block.refuse(f"elements of type {kind}", expected)
     size = len(known[kind].places) if kind in known else 1
     own: dict[int, None] = {}
@@ -525,6 +615,29 @@ def _mass(deck: SolidDeck, block: _Block) -> None:
     deck.masses[block.option("ELSET")] = block.first_numbers(1)[0]
 
 
+def _spring(deck: SolidDeck, block: _Block) -> None:
+    (stiffness,) = replace(block, lines=block.lines[1:]).first_numbers(1)
+    direction = next(block.whole_numbers(), (0, [0]))[1][0]
+    if not (1 <= direction <= 6 and stiffness > 0.0):
+        raise block.refuse("*SPRING", "a direction from 1 to 6, below it a stiffness above zero")
+    deck.springs[block.option("ELSET")] = direction - 1, stiffness
+
+
+def _surface(deck: SolidDeck, block: _Block) -> None:
+    if block.options.get("TYPE", "").upper() == "NODE":
+        own = deck.surfaces.setdefault(block.option("NAME"), {})
+        for number, cells in block.lines:
+            own.update(_members(deck.node_sets, cells[0], block, number))
+
+
+def _coupling(deck: SolidDeck, block: _Block) -> None:
+    name, surface = block.option("REF NODE"), block.option("SURFACE")
+    if not name.isdecimal() or surface not in deck.surfaces:
+        what = f"no surface {surface}" if name.isdecimal() else f"reference node {name}"
+        raise block.refuse(what, "a number, and a *SURFACE, TYPE=NODE above it")
+    deck.couplings[int(name)] = block.options.get("CONSTRAINT NAME") or name, surface
+
+
 def _boundary(deck: SolidDeck, block: _Block) -> None:
     for number, cells in block.lines:
         found = _members(deck.node_sets, cells[0], block, number)
@@ -542,7 +655,8 @@ def _boundary(deck: SolidDeck, block: _Block) -> None:
 _READ = {
     "ELEMENT": _element, "ELSET": _set, "NSET": _set, "MATERIAL": _material, "ELASTIC": _elastic,
     "DENSITY": _density, "SOLIDSECTION": _section, "SHELLSECTION": _section, "MASS": _mass,
-    "BOUNDARY": _boundary, "INSTANCE": _instance,
+    "BOUNDARY": _boundary, "INSTANCE": _instance, "SPRING": _spring, "SURFACE": _surface,
+    "COUPLING": _coupling,
 }  # fmt: skip
 
 
