@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import ast
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from femubench import read_case, solve_modes
+from femubench import read_case, read_model, solve_modes
+from femubench.core.score.scoring import score_model
 from truths.__main__ import main
-from truths.bricks import brick_mesh
+from truths.bricks import CORNERS, brick_mesh
 from truths.defect_cases import visible
 from truths.defects import KINDS, OUTSIDE
 from truths.drawing import case_text
@@ -22,6 +24,8 @@ from truths.modes_of import assembled, mesh_of, modes_of
 from truths.prestress import with_misfit
 from truths.seats import rigid_fit
 from truths.sections import Section, angle, bar, channel, i_beam, rectangular_tube, tee
+from truths.solid import Solid
+from truths.solid_drawing import DRAWN, deck_of, drawing_of
 from truths.structure import STEEL, Change, Clamp, Lump, Member, Oscillator, Spring, Structure
 
 pytestmark = pytest.mark.slow(20)
@@ -125,6 +129,56 @@ def test_a_lump_at_the_tip_meets_rayleigh_s_quotient() -> None:
     stiffness = 3 * STEEL.E * depth**4 / 12
     expected = np.sqrt(stiffness / (mass + 33 / 140 * own)) / (2 * np.pi)
     np.testing.assert_allclose(frequencies(structure, 0.02, 4)[:2], expected, rtol=3e-3)
+
+
+def tetrahedra(bricks: Solid) -> Solid:
+    """Return the bricks, each cut into six tetrahedra along a diagonal (Kuhn)."""
+    at = {tuple(corner): i for i, corner in enumerate(CORNERS.tolist())}
+    paths = [
+        np.cumsum([[0, 0, 0], *np.eye(3, dtype=int)[list(p)]], 0) for p in permutations(range(3))
+    ]
+    cells = [bricks.cells[[at[tuple(corner)] for corner in path.tolist()]] for path in paths]
+    turned = [cell[[0, 2, 1, 3]] if i in (1, 2, 5) else cell for i, cell in enumerate(cells)]
+    repeated = {
+        k: np.tile(getattr(bricks, k), 6) for k in ("part", "modulus", "poisson", "density")
+    }
+    return replace(bricks, cells=np.hstack(turned), **repeated)
+
+
+def test_a_solid_drawing_is_a_deck_with_places_springs_and_lumps(tmp_path: Path) -> None:
+    """A clamped bar with a drawn mass and a prop at its tip, f by Euler-Bernoulli (Blevins)."""
+    depth, mass, prop = 0.05, 4.0, 2e5
+    end = Lump("B", mass), Lump("B", 90.0, drawn=False)
+    springs = Spring("B", "z", prop), Spring("B", "y", 1e9, drawn=False)
+    structure = beam(bar(depth, depth), 1.0, True, lumps=end, springs=springs)
+    drawing = drawing_of(structure, tetrahedra(brick_mesh(structure, 0.05)))
+    assert deck_of(drawing) == deck_of(drawing)
+    (tmp_path / "solid.inp").write_text(deck_of(drawing))
+    model = read_model(tmp_path / "solid.inp")
+    assert {"A", "B", "m@0.25", "m@0.5"} & set(model.geometry.names) == {"B", "m@0.25", "m@0.5"}
+    assert set(model.groups) >= {"spring-B-z"}
+    stiff, loaded = 3 * STEEL.E * depth**4 / 12, mass + 33 / 140 * STEEL.rho * depth**2
+    expected = np.sqrt(np.array([stiff, stiff + prop]) / loaded) / (2 * np.pi)
+    np.testing.assert_allclose(solve_modes(model, 2).natural_frequencies, expected, rtol=1e-2)
+
+
+def test_the_solid_drawings_are_those_that_are_listed() -> None:
+    suite = TRUTHS.parent / "scenarios" / "suite"
+    assert sorted(file.parent.name for file in suite.glob("*/solid.toml")) == sorted(DRAWN)
+    assert sum(file.stat().st_size for file in suite.glob("*/solid.inp")) < 4_000_000
+
+
+@pytest.mark.parametrize(("name", "off"), [("c-press", 12.0), ("tuning-fork", 3.0)])
+def test_a_solid_drawing_of_the_suite_misses_the_truth_by_what_is_not_drawn(
+    name: str, off: float
+) -> None:
+    """Steps in corners, a fillet and a notch; each mode has its partner."""
+    case = read_case(TRUTHS.parent / "scenarios" / "suite" / name / "solid.toml")
+    found = score_model(case, case.model)
+    modes = [mode for block in ("used", "higher") for mode in found[block].modes]
+    assert max(abs(mode.predicted_hz / mode.measured_hz - 1.0) for mode in modes) < off / 100.0
+    assert min(mode.mac for mode in modes) > 0.95
+    assert len(case.model.groups) > 5
 
 
 def test_a_spring_and_an_oscillator_act_as_in_theory() -> None:

@@ -1,6 +1,6 @@
 """Make the truths again: ``python -m truths [NAME ...] [--only STEP]``.
 
-The steps are suite, stretches, responses, defects, faults and lacks.
+The steps are suite, drawings, stretches, responses, defects, faults and lacks.
 
 Structures that have not changed since the last run are left out, so that a run goes on where it
 was cut.
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 HERE = Path(__file__).parent
 STATE = HERE.parent / "build" / "truths.json"
 NEEDED = {"gmsh": "gmsh", "skfem": "scikit-fem", "matplotlib": "matplotlib"}
-STEPS = ("suite", "stretches", "responses", "defects", "faults", "lacks")
+STEPS = ("suite", "drawings", "stretches", "responses", "defects", "faults", "lacks")
 # What a solid's figures follow from, in addition to the structure's own file.
 SOLVER = (
     "bricks",
@@ -127,6 +127,13 @@ def make_suite(names: list[str], again: bool) -> bool:
     return sound
 
 
+def make_drawings(names: list[str], again: bool) -> bool:
+    """Write the solids that engineers draw; tell whether all could be made."""
+    from truths.solid_drawing import DRAWN, write
+
+    return make_each(names, again, write, " drawing", ("solid_drawing",), DRAWN)
+
+
 def make_stretches(names: list[str], again: bool) -> bool:
     """Write the files that twins have their truth from; tell whether all could be made."""
     from truths.stretch_file import write, write_table
@@ -178,6 +185,11 @@ def main() -> int:
     sound = True
     if options.only in (None, "suite"):
         sound = make_suite(options.names, options.again)
+    from truths.solid_drawing import DRAWN
+
+    drawn = [name for name in options.names if name in DRAWN or options.only == "drawings"]
+    if options.only in (None, "drawings") and (drawn or not options.names):
+        sound = make_drawings(drawn, options.again) and sound
     if options.only in (None, "stretches"):
         sound = make_stretches(options.names, options.again) and sound
     from truths.responses import NAMES
