@@ -86,8 +86,7 @@ def _times() -> tuple[float, float, float]:
 
 def start_server() -> None:
     """Start the process from which workers fork: it is started once a session."""
-    plan = plan_run("frame", "unchanged", usable_plugins(), {"nominal": "drawn"})
-    plan.run(LocalProcesses(1))
+    null_plan(1).run(LocalProcesses(1))
 
 
 @dataclass
@@ -134,10 +133,14 @@ def solutions(plan: Plan) -> Solutions:
     return found
 
 
+def null_plan(jobs: int) -> Plan:
+    """Return a run whose strategy does nothing, without pictures: seeds on `frame`."""
+    return plan_run("frame", "unchanged", usable_plugins(), {"seeds": jobs, "nominal": "drawn"})
+
+
 def null_job(jobs: int = NULL_JOBS, workers: int = 1, sandbox: Sandbox = "auto") -> Cost:
-    """Return what a run costs whose strategy does nothing, without pictures: seeds on `frame`."""
-    plan = plan_run("frame", "unchanged", usable_plugins(), {"seeds": jobs, "nominal": "drawn"})
-    return run_cost(plan, workers, sandbox)
+    """Return what a run of null jobs costs."""
+    return run_cost(null_plan(jobs), workers, sandbox)
 
 
 def main(words: Sequence[str] | None = None) -> None:

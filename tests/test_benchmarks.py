@@ -26,6 +26,7 @@ SHORT = {
     "boards": ("default --from docs/figures/board-default.json", 0),
     "budget_score": ("portal", 0),
     "clean_sweep": ("1 --results clean.jsonl", 60),
+    "cluster_cost": ("--jobs 4 --workers 1", 20),
     "diagnosis_cost": ("frame", 10),
     "diagnosis_sweep": ("run --cases 1 --jobs 1 --groups pairs --results blind.jsonl", 20),
     "identify_sweep": ("--sets 1 --references 3 --jobs 1", 0),

@@ -61,14 +61,18 @@ class Workers(Generic[Key]):
             try:
                 yield self
             finally:
-                for _, child in self._running:
-                    self._end(child)
-                self._running = []
-                self._bury(wait=True)
+                self.stop()
                 for within in self._servers.values():
                     within.end()
                 self._servers.clear()
                 self._end_strays()
+
+    def stop(self) -> None:
+        """End what runs."""
+        for _, child in self._running:
+            self._end(child)
+        self._running = []
+        self._bury(wait=True)
 
     def start(
         self, key: Key, function: Callable[[Any], bytes], argument: object, limits: Limits

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
-from itertools import islice
+from itertools import count, islice
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -52,6 +52,8 @@ _SLURM_JOBS = 10
 _DASHBOARD = "127.0.0.1:0"
 _LEAST_AHEAD = 4  # jobs on their way while nobody works
 _MOST_CASES = 100  # that are kept on the cluster
+# Else each of its processes looks at itself a hundred times a second, which nobody reads here.
+_UNWATCHED = {"distributed.worker.profile.enabled": False, "distributed.admin.tick.interval": "1s"}
 
 
 class DaskWorkers:
@@ -151,7 +153,7 @@ class _Flight:
 
         self._client, self._demand, self._load = client, demand, workload
         self._name = f"femubench-{secrets.token_hex(4)}"
-        self._number = 0
+        self._numbers = count()
         self._places: dict[str, int] = {}
         # What did not come back is tried once more, last and one at a time.
         self._again: set[int] = set()
@@ -184,8 +186,7 @@ class _Flight:
             return
         limits, shown = self._load.limits[slot.strategy], self._load.is_shown(slot)
         errand = Errand(slot.strategy, slot.seed, slot.code, limits, shown)
-        self._number += 1
-        key = f"{self._name}-{self._number}"
+        key = f"{self._name}-{next(self._numbers)}"
         case = self._case(slot.start)
         future = self._client.submit(run_errand, case, errand, self._demand, key=key, pure=False)
         self._places[key] = index
@@ -197,13 +198,11 @@ class _Flight:
         It is the result of a task, not scattered data: what a worker takes along as it dies can
         be made again. Jobs go seed after seed, so that every case comes up again and again.
         """
-        gone = ("error", "cancelled", "lost")
         known = self._yardsticks.pop(start, None)
-        if known is None or known.status in gone:
-            self._number += 1
+        if known is None or known.status in ("error", "cancelled", "lost"):
             pair = start, self._load.references[start.case.name]
             data = pickle.dumps(pair, protocol=pickle.HIGHEST_PROTOCOL)
-            key = f"{self._name}-case-{self._number}"
+            key = f"{self._name}-case-{next(self._numbers)}"
             known = self._client.submit(pickle.loads, data, key=key, pure=False)
         self._yardsticks[start] = known  # the last one used stands last
         if len(self._yardsticks) > _MOST_CASES:
@@ -422,6 +421,7 @@ def _client(address: str | Cluster) -> Iterator[Client]:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep what Dask mutters of lost workers to itself: a run tells of its jobs, whole or not."""
+    import dask
     import distributed  # noqa: F401 - sets the levels that are changed here
 
     # The second has a level of its own.
@@ -430,7 +430,7 @@ def _quiet() -> Iterator[None]:
     for logger in loggers:
         logger.setLevel(logging.CRITICAL)
     try:
-        with warnings.catch_warnings():
+        with dask.config.set(_UNWATCHED), warnings.catch_warnings():
             # Versions are compared here, where a difference is an error.
             warnings.filterwarnings("ignore", module="distributed")
             yield

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import threading
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any
 
 from threadpoolctl import threadpool_limits
 
 from femubench.core.child.limits import LEAST, Limits, format_bytes, memory_share
 from femubench.core.child.sandbox import enclosure, missing
-from femubench.core.child.workers import adopt_orphans
 from femubench.core.errors import FemubenchError
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.provenance import blas_name, cpu_name, package_version, versions
-from femubench.core.run.schedule import Workload, compute_jobs
+from femubench.core.run.schedule import Processes, Workload, compute_jobs, open_processes
 from femubench.core.run.slots import Slot, Start
-from femubench.core.run.standing_judge import Judges
 from femubench.core.schema.results import JobResult
 from femubench.core.schema.run_options import Sandbox
 from femubench.core.score.scoring import Reference
@@ -116,10 +114,7 @@ def run_errand(yardstick: Yardstick, errand: Errand, demand: Demand) -> Arrived:
     from distributed.worker import thread_state
 
     worker, key = get_worker(), thread_state.key
-    _prepare()
-    reason = _unfit(demand)
-    if reason is not None:
-        raise UnfitWorker(f"worker {worker.address}: {reason}")
+    processes = _THREAD.processes_for(demand, worker)
 
     def wanted() -> None:
         """End a job that nobody waits for any more."""
@@ -135,33 +130,30 @@ def run_errand(yardstick: Yardstick, errand: Errand, demand: Demand) -> Arrived:
     slots, references = [Slot(start, name, errand.seed, errand.code)], {start.case.name: reference}
     exhibits: list[Mapping[str, Any]] = []
     show = (lambda _, exhibit: exhibits.append(exhibit)) if errand.shown else None
-    if not hasattr(_OF_THREAD, "judges"):
-        _OF_THREAD.judges = Judges[Any]()
-    judges: Judges[Any] = _OF_THREAD.judges
     workload = Workload(slots, references, {name: limits}, show)
-    ((_, result),) = compute_jobs(workload, [0], 1, wanted, judges)
-    how = {"cpu": cpu_name(), "blas": _blas(), "sandbox": enclosure(limits.sandbox).sandbox}
+    ((_, result),) = compute_jobs(workload, [0], 1, wanted, processes)
+    how = {"cpu": cpu_name(), "blas": blas_name(), "sandbox": enclosure(limits.sandbox).sandbox}
     result = replace(result, provenance=how)
     return result, exhibits[0] if exhibits else None
 
 
-_OPEN, _OF_THREAD = ExitStack(), threading.local()
+class _Thread(threading.local):
+    """The processes of a thread, in which one job after the other of a run is done."""
+
+    def __init__(self) -> None:
+        self._open, self._demand = ExitStack(), None
+        atexit.register(self._open.close)
+
+    def processes_for(self, demand: Demand, worker: Any) -> Processes:  # noqa: ANN401
+        """Return them, started anew for another run: that may have other sources."""
+        if demand != self._demand:
+            reason = unfit(demand, worker)
+            if reason is not None:
+                raise UnfitWorker(f"worker {worker.address}: {reason}")
+            threadpool_limits(1)
+            self._open.close()
+            self._demand, self._processes = demand, self._open.enter_context(open_processes(1))
+        return self._processes
 
 
-@cache
-def _prepare() -> None:
-    """Let this process start processes, and become the parent of what jobs leave behind."""
-    _OPEN.enter_context(adopt_orphans())
-    threadpool_limits(1)
-
-
-@cache
-def _unfit(demand: Demand) -> str | None:
-    from distributed import get_worker
-
-    return unfit(demand, get_worker())
-
-
-@cache
-def _blas() -> str:
-    return blas_name()
+_THREAD = _Thread()

@@ -173,6 +173,7 @@ def cpu_name() -> str:
     return platform.processor() or platform.machine()
 
 
+@cache
 def blas_name() -> str:
     """Return the linear algebra libraries that are loaded, with version and kernel."""
     from threadpoolctl import threadpool_info

@@ -7,6 +7,7 @@ import json
 import pickle
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from itertools import islice
@@ -26,6 +27,7 @@ from femubench.core.schema.validation import read_plain
 from femubench.core.score.scoring import Reference
 
 _Task = tuple[int, bytes]  # place of a job, and its answer once it is there to be judged
+Processes = tuple[Workers[_Task], Judges[_Task]]
 Show = Callable[[Slot, Mapping[str, Any]], None]
 Answers = Mapping[JobName, bytes]
 _LEAST_JUDGING = 300.0  # s
@@ -72,12 +74,19 @@ class Workload:
         return judge_outcome(slot.case, self.references[slot.case.name], names, outcome)
 
 
+@contextmanager
+def open_processes(count: int) -> Iterator[Processes]:
+    """Give so many workers, and judges."""
+    with Workers[_Task](count).open() as workers, Judges[_Task]() as judges:
+        yield workers, judges
+
+
 def compute_jobs(
     workload: Workload,
     wanted: Iterable[int],
     count: int,
     pulse: Callable[[], None] = lambda: None,
-    judges: Judges[_Task] | None = None,
+    processes: Processes | None = None,
 ) -> Iterator[tuple[int, JobResult]]:
     """Yield the result of every wanted job as it comes, from processes of this machine.
 
@@ -85,25 +94,27 @@ def compute_jobs(
         wanted: places of jobs; the next is asked for when there is a process for it.
         count: number of processes.
         pulse: called twice a second and more; what it raises ends the jobs that run.
-        judges: that are there already, and stay; else there are some for this time.
+        processes: that are there already, and stay; else there are some for this time.
     """
-    if judges is None:
-        with Judges[_Task]() as judges:
-            yield from compute_jobs(workload, wanted, count, pulse, judges)
-        return
-
     bench = _Bench(workload, iter(wanted))
     if not bench.has_work(0):
         return
-    with Workers[_Task](count).open() as workers, judges.at_hand():
-        while True:
-            pulse()
-            while (busy := workers.running + judges.busy) < workers.count and bench.has_work(busy):
-                yield from bench.start(workers, judges)
-            if not (workers.running or judges.busy):
-                return
-            for task, ending in (*workers.wait(judges.at_work), *judges.take_ended()):
-                yield from bench.take(task, ending)
+    opened = open_processes(count) if processes is None else nullcontext(processes)
+    with opened as (workers, judges):
+        try:
+            while True:
+                pulse()
+                while (busy := workers.running + judges.busy) < workers.count:
+                    if not bench.has_work(busy):
+                        break
+                    yield from bench.start(workers, judges)
+                if not (workers.running or judges.busy):
+                    return
+                for task, ending in (*workers.wait(judges.at_work), *judges.take_ended()):
+                    yield from bench.take(task, ending)
+        finally:
+            workers.stop()
+            judges.stop()
 
 
 class _Bench:

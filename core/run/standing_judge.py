@@ -140,21 +140,17 @@ class Judges(Generic[Key]):
     def __exit__(self, *_: object) -> None:
         self.end()
 
-    @contextmanager
-    def at_hand(self) -> Iterator[None]:
-        """Let no work go on after the block."""
-        try:
-            yield
-        finally:
-            for _, judge in self._at_work:
-                judge.end()
-            self._at_work = []
+    def stop(self) -> None:
+        """End those that are at work."""
+        for _, judge in self._at_work:
+            judge.end()
+        self._at_work = []
 
     def end(self) -> None:
         """End all judges."""
-        for judge in (*self._idle, *(judge for _, judge in self._at_work)):
-            judge.end()
-        self._idle, self._at_work = [], []
+        self.stop()
+        while self._idle:
+            self._idle.pop().end()
 
     @property
     def busy(self) -> int:
