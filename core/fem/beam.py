@@ -350,15 +350,15 @@ def shape_functions(p: BeamProperties, element: int, xi: float) -> FloatArray:
     Source: cubic Hermite functions; Friedman & Kosmatka (1993), (20)-(21), where `shear_shape`
     is 1.
     """
-    one = p.take(np.array([element]))
-    L = float(_flexible(one)[0])
-    first, second = float(one.rigid_1[0]), float(one.rigid_2[0])
-    x = (xi * float(one.length[0]) - first) / L
+    length, first, second = (float(v[element]) for v in (p.length, p.rigid_1, p.rigid_2))
+    L = length - first - second
+    x = (xi * length - first) / L
     rows = np.zeros((6, 12))
     clear = min(max(x, 0.0), 1.0)
     rows[0, AXIAL] = rows[3, TWIST] = [1.0 - clear, clear]
-    phi_y = one.shear_shape[0] * 12 * one.EIz[0] * one.flex_y[0] / L**2
-    phi_z = one.shear_shape[0] * 12 * one.EIy[0] * one.flex_z[0] / L**2
+    shape = p.shear_shape[element] * 12
+    phi_y = shape * p.EIz[element] * p.flex_y[element] / L**2
+    phi_z = shape * p.EIy[element] * p.flex_z[element] / L**2
     inside = 0.0 <= x <= 1.0
     across = bending_functions(x, L, phi_y) if inside else rigid_part(x, L)
     rows[1, BEND_XY], rows[5, BEND_XY] = across
