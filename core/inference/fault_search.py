@@ -138,7 +138,7 @@ def _definite(now: _Drawn, ranked: Weighed, terms: Terms) -> Repaired | None:
         return None
     single = terms.single()
     seen = single.examine(now.model, now.measurement)
-    without = _with_causes(seen, now.log_density, now.measurement)
+    without = float(np.logaddexp(log_density(seen, now.measurement), now.log_density))
     sound = seen.adequacy > settings.adequate_p and len(seen.best.parts) < 2
     least = without - now.log_density - (0.0 if sound else settings.lag)
     promising = [(c, gain) for c, gain in pairs if gain > least]
@@ -194,18 +194,9 @@ def _density(now: _Drawn, charge: Charge, gain: float, repaired: Examination) ->
         repaired: the examination without the fault.
     """
     prior = now.prior(charge)
-    return _with_causes(repaired, now.log_density + gain - prior, now.measurement) + prior
-
-
-def _with_causes(seen: Examination, plain: float, measured: Measurement) -> float:
-    """Return ln of the density of data with physical causes, or with model error alone.
-
-    Arguments:
-        seen: the examination.
-        plain: ln of the density under model error, without causes.
-        measured: the data as they were measured.
-    """
-    return float(np.logaddexp(log_density(seen, measured), plain))
+    # With physical causes, or with model error alone.
+    plain = now.log_density + gain - prior
+    return float(np.logaddexp(log_density(repaired, now.measurement), plain)) + prior
 
 
 class _Drawn:

@@ -106,6 +106,7 @@ class Search:
         self.names = len(places)
         self.places = sum(places.values()) / max(self.names, 1)
         self.coarse: dict[int, int] = {}  # from hypotheses with more values to those with one
+        self.highest = floor + settings.lag  # ln weight so far
 
     def run(self) -> tuple[list[Explanation], list[Found]]:
         """Return all explanations and the atlas of every base that was searched."""
@@ -182,9 +183,20 @@ class Search:
                 parts = list(explanation.parts)
                 parts[i] = Basis.of(model, problem.data.measurement).projector(own)
                 fitted = _fit_from_grid(problem, parts, i, explanation.fit)
-                if fitted is not None:
-                    self.coarse[id(own)] = id(part.hypothesis)
-                    result.append(Explanation(explanation.base, fitted, self.names))
+                self.coarse[id(own)] = id(part.hypothesis)
+                result += self.bear_out(explanation.base, fitted)
+        return result
+
+    def bear_out(self, base: Base, found: Fit | None) -> list[Explanation]:
+        """Return the explanation by a joint fit that its own model bears out, if it is any.
+
+        Far behind it counts for nothing either way, and of a large model the best alone is solved.
+        """
+        if found is not None and not isinstance(found.state.problem, LargeProblem):
+            weight = Explanation(base, found, self.names).log_weight
+            found = check_joint_fit(found) if weight > self.highest - settings.lag else found
+        result = [] if found is None else [Explanation(base, found, self.names)]
+        self.highest = max([self.highest, *(e.log_weight for e in result)])
         return result
 
     def borne_out(self, explanations: list[Explanation]) -> list[Explanation]:
@@ -219,6 +231,7 @@ class Search:
             atlas = screen_hypotheses(problem, start.state, problem.space.projections, self.effort)
             fits = self.refine(problem, start, atlas)
             explanations = [Explanation(base, item, self.names) for item in (start, *fits)]
+            self.highest = max(self.highest, _best(explanations).log_weight)
             ranked = by_weight(explanations[1:])
             # What tells more may carry most of it: the best of what it refines count anywhere.
             refined = {getattr(effect, "refines", None) for effect in self.effects}
@@ -342,8 +355,7 @@ class Search:
                 break
             partner = originals.get(id(item.projection.hypothesis), item.projection)
             joint = self.joint(problem, (*seed.parts, partner), state.x, item.x, tried)
-            if joint is not None:
-                result.append(Explanation(found.base, joint, self.names))
+            result += self.bear_out(found.base, joint)
         return result
 
     def joint(
@@ -360,10 +372,7 @@ class Search:
         if key in tried:
             return None
         tried.add(key)
-        own, parts = enrich_problem(problem, parts)
-        found = fit(own, parts, np.concatenate([first, last]))
-        # A large model is solved anew for the best explanation alone.
-        return found if found is None or isinstance(own, LargeProblem) else check_joint_fit(found)
+        return fit(*enrich_problem(problem, parts), np.concatenate([first, last]))
 
     def swap(
         self, found: Found, pair: Explanation, tried: set[tuple[object, ...]]
@@ -414,8 +423,7 @@ def _fit_from_grid(
     if not len(grid):
         return None
     cost = np.square(own.noise.residual(raw + own.offset)).sum(axis=1) + np.square(grid).sum(axis=1)
-    found = fit(own, parts, np.concatenate([before, grid[least(cost)], after]))
-    return found if found is None or isinstance(own, LargeProblem) else check_joint_fit(found)
+    return fit(own, parts, np.concatenate([before, grid[least(cost)], after]))
 
 
 def _best(explanations: Sequence[Explanation]) -> Explanation:

@@ -19,11 +19,11 @@ class SupportMissing:
     side: ClassVar[Literal["input"]] = "input"
 
     def suspects(self, model: Model, measurement: Measurement) -> Sequence[Suspect]:
-        """Return every joint, held as others are or in one direction, and every support."""
+        """Return every support, and unless it hangs free every joint, held as others or one way."""
         if model.structure is None:
             return []
         frame = model.structure.frame
-        return [*_too_many(frame), *_forgotten(frame)]
+        return [*_too_many(frame), *(() if frame.free else _forgotten(frame))]
 
 
 def _forgotten(frame: Frame) -> Iterator[Suspect]:
