@@ -359,3 +359,11 @@ def test_suspects_weighed_at_once_are_as_each_by_itself() -> None:
         assert charge.suspect is own.suspect
         assert gain == pytest.approx(now.screen(own)[1], rel=1e-9, abs=1e-9), own.suspect.place
     assert len({c.fault.name for c in charges}) > 4
+
+
+def test_what_is_known_to_hang_free_has_no_forgotten_support() -> None:
+    case = clean("ladder", 0)
+    hung = Model.of(replace(case.model.frame_structure.frame, free=True))
+    fault = next(fault for fault in list_faults() if fault.name == "support-missing")
+    assert fault.suspects(case.model, case.measurement)
+    assert not fault.suspects(hung, case.measurement)

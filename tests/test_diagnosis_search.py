@@ -269,6 +269,10 @@ def test_causes_that_do_not_go_together_are_no_explanation() -> None:
     found = fit(problem, parts, high, steps=0)
     assert found is not None
     assert check_joint_fit(found) is None
+    search, (drawn, *_) = Search(problem, ()), textbook_bases(problem.space.projections)
+    assert search.bear_out(drawn, found) == []
+    search.highest = np.inf  # far behind they count for nothing either way, and are not solved
+    assert [e.fit for e in search.bear_out(drawn, found)] == [found]
 
 
 def test_causes_found_on_one_textbook_set_are_tried_on_the_others() -> None:

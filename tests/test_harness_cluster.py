@@ -127,6 +127,23 @@ def test_jobs_end_as_they_end_here(two: DaskWorkers) -> None:
     assert stable(there.results) == stable(here.results)
 
 
+def test_the_walls_of_a_worker_stay_for_the_jobs_that_follow(two: DaskWorkers) -> None:
+    def servers(at: str) -> list[int]:
+        from femubench.core.run.cluster_worker import _THREAD
+
+        workers, _ = _THREAD._processes
+        return [id(server) for server in workers._servers.values() if server.alive]
+
+    found = []
+    for seeds in (range(4), range(4, 8)):
+        run_jobs([toys.tiny_case()], [toys.Unchanged()], executor=two, seeds=seeds)
+        there = list(two._client.nthreads())
+        asked = [two._client.submit(servers, at, workers=[at], pure=False) for at in there]
+        found.append(two._client.gather(asked))
+    assert found[0] == found[1]
+    assert all(len(own) == 1 for own in found[0])
+
+
 def test_a_worker_that_is_not_like_this_machine_is_said_in_one_line(
     two: DaskWorkers, monkeypatch: pytest.MonkeyPatch
 ) -> None:

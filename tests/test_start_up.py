@@ -143,3 +143,9 @@ def test_without_modules_of_unix_all_but_runs_works_and_that_is_one_line(tmp_pat
         assert done.returncode == code, done.stderr
         assert len(done.stderr.splitlines()) == (code > 0), done.stderr
         assert code == 0 or "takes Linux or macOS (on Windows WSL)" in done.stderr
+
+
+def test_a_run_and_a_diagnosis_load_no_statistics() -> None:
+    code = "import sys, femubench.core.run.runner, femubench.core.diagnosis.diagnose\n"
+    code += "sys.exit('scipy.stats' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

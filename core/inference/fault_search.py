@@ -194,8 +194,7 @@ def _density(now: _Drawn, charge: Charge, gain: float, repaired: Examination) ->
         repaired: the examination without the fault.
     """
     prior = now.prior(charge)
-    # With physical causes, or with model error alone.
-    plain = now.log_density + gain - prior
+    plain = now.log_density + gain - prior  # under model error alone
     return float(np.logaddexp(log_density(repaired, now.measurement), plain)) + prior
 
 

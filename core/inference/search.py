@@ -188,13 +188,14 @@ class Search:
         return result
 
     def bear_out(self, base: Base, found: Fit | None) -> list[Explanation]:
-        """Return the explanation by a joint fit that its own model bears out, if it is any.
+        """Return the explanation by a fit that its own model bears out, if it is any.
 
-        Far behind it counts for nothing either way, and of a large model the best alone is solved.
+        Several causes far behind count for nothing either way; one may have scales of its own.
+        Of a large model the best explanation alone is solved anew.
         """
         if found is not None and not isinstance(found.state.problem, LargeProblem):
-            weight = Explanation(base, found, self.names).log_weight
-            found = check_joint_fit(found) if weight > self.highest - settings.lag else found
+            ahead = Explanation(base, found, self.names).log_weight > self.highest - settings.lag
+            found = check_joint_fit(found) if ahead or len(found.parts) < 2 else found
         result = [] if found is None else [Explanation(base, found, self.names)]
         self.highest = max([self.highest, *(e.log_weight for e in result)])
         return result

@@ -133,15 +133,15 @@ def run_errand(yardstick: Yardstick, errand: Errand, demand: Demand) -> Arrived:
     workload = Workload(slots, references, {name: limits}, show)
     ((_, result),) = compute_jobs(workload, [0], 1, wanted, processes)
     how = {"cpu": cpu_name(), "blas": blas_name(), "sandbox": enclosure(limits.sandbox).sandbox}
-    result = replace(result, provenance=how)
-    return result, exhibits[0] if exhibits else None
+    return replace(result, provenance=how), exhibits[0] if exhibits else None
 
 
 class _Thread(threading.local):
     """The processes of a thread, in which one job after the other of a run is done."""
 
     def __init__(self) -> None:
-        self._open, self._demand = ExitStack(), None
+        self._open = ExitStack()
+        self._demand: Demand | None = None
         atexit.register(self._open.close)
 
     def processes_for(self, demand: Demand, worker: Any) -> Processes:  # noqa: ANN401
