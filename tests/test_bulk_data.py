@@ -333,7 +333,7 @@ def test_files_are_included_from_their_folder_alone(tmp_path: Path) -> None:
 
 
 BROKEN = {
-    "CQUAD4,5,1,1,2,3,4": "CQUAD4 5: this card is not read",
+    "CSHEAR,5,1,1,2,3,4": "CSHEAR 5: this card is not read",
     "GRID,1,,1.,0.,0.": "GRID 1: GRID 1 is there already",
     "CBAR,2,11,1,2,0.,1.,0.": "CBAR 2, PID: there is no PBAR or PBARL 11",
     "CBAR,2,10,1,3,0.,1.,0.": "CBAR 2, GB: there is no GRID 3",

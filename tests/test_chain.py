@@ -9,9 +9,10 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise, product
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -45,8 +46,18 @@ SHEETS: Boxes = {  # mm, sheets of 3 mm with their corners
 }
 
 
-def write_deck(file: Path, kind: str, cell: float, soft: float = 1.0, boxes: Boxes = BOXES) -> Path:
-    """Write boxes in mm, N and tonnes, the weld or the rib as stiff as stated."""
+def write_deck(
+    file: Path,
+    kind: str,
+    cell: float,
+    soft: float = 1.0,
+    boxes: Boxes = BOXES,
+    feet: Mapping[str, float] = MappingProxyType({}),
+) -> Path:
+    """Write boxes in mm, N and tonnes, the weld or the rib as stiff as stated.
+
+    Feet are boxes of a modulus of their own, held from below.
+    """
     cuts = [sorted({end[a] for box in boxes.values() for end in box}) for a in range(3)]
     lines = [
         np.unique(np.concatenate([np.linspace(a, b, 1 + int(np.ceil((b - a) / cell)))
@@ -70,10 +81,14 @@ def write_deck(file: Path, kind: str, cell: float, soft: float = 1.0, boxes: Box
             rows = [cells[i : i + 11] for i in range(0, len(cells), 11)]
             sets.append(",\n".join(", ".join(map(str, row)) for row in rows))
     for name in boxes:
-        modulus = 210e3 * (soft if name in {"WELD", "RIB"} else 1.0)
-        sets += [f"*MATERIAL, NAME={name}", "*ELASTIC", f"{modulus}, 0.3"]
-        sets += ["*DENSITY", "7.85e-9", f"*SOLID SECTION, ELSET={name}, MATERIAL={name}"]
+        modulus = feet.get(name, 210e3 * (soft if name in {"WELD", "RIB"} else 1.0))
+        poisson, density = (0.0, "1e-9") if name in feet else (0.3, "7.85e-9")
+        sets += [f"*MATERIAL, NAME={name}", "*ELASTIC", f"{modulus}, {poisson}"]
+        sets += ["*DENSITY", density, f"*SOLID SECTION, ELSET={name}, MATERIAL={name}"]
     places = [f"{n}, {x!r}, {y!r}, {z!r}" for (x, y, z), n in nodes.items()]
+    ground = min(z for _, _, z in nodes)
+    held = [f"{n}, 1, 3" for (_, _, z), n in nodes.items() if feet and z == ground]
+    sets += ["*BOUNDARY", *held] if held else []
     file.write_text("\n".join(["*NODE", *places, *sets, ""]))
     return file
 
@@ -105,8 +120,14 @@ def write_shells(file: Path) -> Path:
     return file
 
 
-def write_responses(file: Path, deck: Path, points: Sequence[Point] = FACES) -> None:
-    """Write accelerances of a deck at points, x, y, z and direction, with 1 % of noise."""
+def write_responses(
+    file: Path, deck: Path, points: Sequence[Point] = FACES, first: int = 6
+) -> None:
+    """Write accelerances of a deck at points, x, y, z and direction, with 1 % of noise.
+
+    Arguments:
+        first: of the ten modes that the lines cover.
+    """
     model = with_mesh(femubench.read_model(deck, unit="mm"))
     rng = np.random.default_rng(4)
     modes = femubench.solve_modes(model, 40)
@@ -116,7 +137,7 @@ def write_responses(file: Path, deck: Path, points: Sequence[Point] = FACES) -> 
     hit = [0, 1] if points is FACES else [0, 17]
     two = Sensors(tuple(sensors.labels[k] for k in hit), xyz[hit], tuple(along[k] for k in hit))
     hertz = modes.natural_frequencies
-    lines = np.linspace(0.5 * hertz[6], 0.5 * (hertz[15] + hertz[16]), 3000)
+    lines = np.linspace(0.5 * hertz[first], 0.5 * (hertz[first + 9] + hertz[first + 10]), 3000)
     readings = model.observe(sensors)
     values = receptance(modes, readings, readings[hit], lines, 0.004)
     values = -np.square(2.0 * np.pi * lines)[:, None, None] * values

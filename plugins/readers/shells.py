@@ -148,9 +148,9 @@ class Motions:
     def matrix(self) -> tuple[list[Motion], SparseArray]:
         """Return the degrees of freedom and what they do to all rows of solids, (3 N, n)."""
         order = np.argsort(self.order, kind="stable")
-        rows, columns, values = zip(*self.entries, strict=True)
+        rows, columns, values = np.array(self.entries).reshape(-1, 3).T
         shape = (3 * len(self.row), len(order))
-        whole = sp.csc_array((values, (rows, columns)), shape=shape)
+        whole = sp.csc_array((values, (rows.astype(int), columns.astype(int))), shape=shape)
         return [self.found[i] for i in order], sp.csc_array(whole[:, order])
 
 
@@ -190,18 +190,18 @@ def _quarters(kind: str) -> list[tuple[FloatArray, float]]:
 
 
 def split_shells(
-    elements: Mapping[int, Element], places: Mapping[int, Point], held: Set[tuple[int, int]]
-) -> tuple[dict[int, list[Element]], dict[int, Point], set[tuple[int, int]]]:
-    """Return the four parts of every shell with nodes amid its edges, all nodes, and supports.
+    elements: Mapping[int, Element], places: Mapping[int, Point]
+) -> tuple[dict[int, list[Element]], dict[int, Point], dict[int, tuple[int, ...]]]:
+    """Return the four parts of every shell with nodes amid its edges, all nodes, and their edges.
 
-    New nodes lie on the surface of the element, and are held as all of their edge is.
+    New nodes lie on the surface of the element; of those on an edge the nodes of it are returned.
 
     Arguments:
         elements: kind and nodes by number.
         places: of the nodes.
-        held: node and direction of supports.
     """
-    found, own_places, own_held = {}, dict(places), set(held)
+    found, own_places = {}, dict(places)
+    edges: dict[int, tuple[int, ...]] = {}
     known: dict[tuple[object, ...], int] = {}
     for number, (kind, own) in elements.items():
         if kind not in SHELLS or not SHELLS[kind].edges:
@@ -223,13 +223,11 @@ def split_shells(
                 known[key] = max(own_places) + 1
                 x, y, z = where
                 own_places[known[key]] = float(x), float(y), float(z)
-                own_held |= {
-                    (known[key], d) for d in range(6) if ends and {(e, d) for e in ends} <= held
-                }
+                edges |= {known[key]: ends} if ends else {}
             nodes.append(known[key])
         n = len(own)
         found[number] = [(kind, tuple(nodes[i : i + n])) for i in range(0, 4 * n, n)]
-    return found, own_places, own_held
+    return found, own_places, edges
 
 
 def find_normals(kind: str, xyz: FloatArray) -> FloatArray:
@@ -241,8 +239,11 @@ def find_normals(kind: str, xyz: FloatArray) -> FloatArray:
     along = np.einsum("na,nkq->kqa", xyz, _slopes(kind))
     across = np.cross(*along)
     length = np.linalg.norm(across, axis=1)
-    if not (length > _STRAIGHT * np.ptp(xyz) ** 2).all():
-        raise ValueError("an element has no area")
+    if (
+        not (length > _STRAIGHT * np.ptp(xyz) ** 2).all()
+        or (across @ across.sum(axis=0) <= 0).any()
+    ):
+        raise ValueError("an element has no area, or edges that cross")
     return np.asarray(across / length[:, None])
 
 
@@ -265,7 +266,7 @@ class Thickened:
         lines, held, xyz = self.lines[node], motions.held, np.array(self.places[node])
         arms = {own: arm for line in lines for own, arm in line.arms}
         first = lines[0]
-        if all(abs(line.normal @ first.normal) > 1.0 - _STRAIGHT for line in lines):
+        if self.straight(node):
             self._add_line(node, xyz, arms, motions)
         else:
             motions.add_node(node, xyz, {node, *arms})
@@ -279,6 +280,38 @@ class Thickened:
             if middle and (node, d) not in held and len(lines) == 1:
                 motions.add(Motion(first.nodes[1], d, xyz, np.zeros(6)), middle, inner=True)
 
+    def straight(self, node: int) -> tuple[int, FloatArray] | None:
+        """Return the lowest node of the straight line that a node became, and its arm."""
+        lines = self.lines.get(node, ())
+        if not lines or any(abs(e.normal @ lines[0].normal) <= 1.0 - _STRAIGHT for e in lines):
+            return None
+        return next(lines[0].arms)
+
+    def follow(self, node: int, held: Set[tuple[int, int]]) -> Iterator[tuple[int, FloatArray]]:
+        """Return the nodes of solids, and how they move with a motion that a node is given, (3, 6).
+
+        As in `_add_line`, u = (1 - B B^T) (w + r x a) + B z.
+        """
+        arms = {own: arm for line in self.lines.get(node, ()) for own, arm in line.arms}
+        straight = self.straight(node)
+        yield node, np.eye(3, 6)
+        if straight is None:
+            for own, arm in arms.items():
+                yield own, np.hstack([np.eye(3), -cross_matrix(arm)])
+            return
+        _, least = straight
+        free = _free_of(self._across(node, least / np.linalg.norm(least), held))
+        kept = np.eye(3) - free @ free.T
+        given = kept @ np.hstack([np.eye(3), -cross_matrix(least)])
+        for own, arm in arms.items():
+            share = float(arm @ least / (least @ least))
+            yield own, np.eye(3, 6) + share * (given - np.eye(3, 6))
+
+    def _across(self, node: int, normal: FloatArray, held: Set[tuple[int, int]]) -> FloatArray:
+        """Return what the held rotations of a line of nodes stop at its ends, (k, 3)."""
+        axes = [np.cross(np.eye(3)[d], normal) for d in range(3) if (node, 3 + d) in held]
+        return np.array(axes).reshape(-1, 3)
+
     def _add_line(
         self, node: int, xyz: FloatArray, arms: Mapping[int, FloatArray], motions: Motions
     ) -> None:
@@ -291,8 +324,7 @@ class Thickened:
         lowest, normal, _ = self.lines[node][0]
         least = arms[lowest[0]] @ normal
         share = {own: float(arm @ normal / least) for own, arm in arms.items()}
-        axes = [np.cross(np.eye(3)[d], normal) for d in range(3) if (node, 3 + d) in motions.held]
-        free = _free_of(np.array(axes).reshape(-1, 3))
+        free = _free_of(self._across(node, normal, motions.held))
         kept = np.eye(3) - free @ free.T
         for d in range(3):
             if (node, d) not in motions.held:
@@ -306,6 +338,12 @@ class Thickened:
             left.remove(d)
             moved = {own: s * column for own, s in share.items()}
             motions.add(Motion(lowest[0], d, below, np.r_[column, np.zeros(3)]), moved)
+
+
+def cross_matrix(vector: FloatArray) -> FloatArray:
+    """Return the matrix that multiplies as a vector crosses, (3, 3)."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _free_of(held: FloatArray) -> FloatArray:

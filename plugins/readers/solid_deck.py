@@ -14,7 +14,9 @@ import scipy.sparse as sp
 
 from femubench import InputError, Model
 from femubench.fem import FloatArray, MatrixGeometry, SparseArray, matrix_model
+from femubench.modal import GroupPriors
 from femubench.plugins.readers import nodes, shells, solid_elements
+from femubench.plugins.readers.attachments import Attachments, NodeMotions
 from femubench.plugins.readers.nodes import Point
 from femubench.plugins.readers.outline import find_outline
 from femubench.plugins.readers.reading import DIRECTIONS, needs
@@ -56,6 +58,7 @@ class SolidDeck:
         surfaces: nodes by name.
         couplings: name and surface of distributing couplings, by reference node.
         held: node and direction of supports.
+        attached: springs, masses and rigid elements at nodes.
     """
 
     path: Path
@@ -70,6 +73,7 @@ class SolidDeck:
     surfaces: dict[str, dict[int, None]] = field(default_factory=dict)
     couplings: dict[int, tuple[str, str]] = field(default_factory=dict)
     held: set[tuple[int, int]] = field(default_factory=set)
+    attached: Attachments = field(default_factory=Attachments)
 
     def solids(self) -> list[int]:
         """Return the elements that are no point masses."""
@@ -84,7 +88,7 @@ class SolidDeck:
                 found[self.named[name]] = list(own)
                 left = {number: None for number in left if number not in own}
         found |= {REST: list(left)} if left else {}
-        return found if len(found) > 1 else {}
+        return found if len(found) + len(self.attached.groups()) > 1 else {}
 
 
 @dataclass(frozen=True)
@@ -111,9 +115,8 @@ class BetterElements:
     def _better(self) -> Model:
         deck = self.deck
         own_places = {int(node): at for node, at in self.places.items()}
-        quarters, own_places, held = shells.split_shells(deck.elements, own_places, deck.held)
-        places = {str(node): at for node, at in own_places.items()}
-        better = replace(deck, elements={}, held=held)
+        quarters, own_places, edge_of = shells.split_shells(deck.elements, own_places)
+        better = replace(deck, elements={}, held=set(deck.held))
         better.sets = {name: dict(own) for name, own in deck.sets.items()}
         amid: dict[tuple[int, ...], int] = {}
         next_node, next_element = max(own_places) + 1, max(deck.elements) + 1
@@ -133,10 +136,13 @@ class BetterElements:
             edges = [tuple(sorted((own[a], own[b]))) for a, b in pairs]
             new = [amid.setdefault(edge, next_node + len(amid)) for edge in edges]
             better.elements[number] = found, (*own, *new)
-        for (a, b), node in amid.items():
-            x, y, z = 0.5 * (np.array(places[str(a)]) + np.array(places[str(b)]))
-            places[str(node)] = float(x), float(y), float(z)
-            better.held.update((node, d) for d in range(6) if {(a, d), (b, d)} <= deck.held)
+        for pair, node in amid.items():
+            x, y, z = 0.5 * np.sum([own_places[end] for end in pair], axis=0)
+            own_places[node], edge_of[node] = (float(x), float(y), float(z)), pair
+        for node, ends in edge_of.items():
+            better.held |= {(node, d) for d in range(6) if {(e, d) for e in ends} <= deck.held}
+        better.attached = deck.attached.with_edges(edge_of, own_places)
+        places = {str(node): at for node, at in own_places.items()}
         return _model_of(better, _materials(better), places, deck)
 
 
@@ -158,7 +164,15 @@ def read_solids(path: Path) -> Model:
     Raises:
         InputError: as `read_deck`, and for elements without material, density or volume.
     """
-    deck, places = read_deck(path), nodes.read_nodes(path)
+    return solid_model(read_deck(path), nodes.read_nodes(path))
+
+
+def solid_model(deck: SolidDeck, places: Mapping[str, Point]) -> Model:
+    """Return the model of a deck, which knows itself with better elements where it is small.
+
+    Raises:
+        InputError: for elements without material, density or volume.
+    """
     model = _model_of(deck, _materials(deck), places)
     kinds = {kind for kind, _ in deck.elements.values()}
     if not kinds & {*_BETTER, *shells.SHELLS} or model.size > _SOLVED or deck.couplings:
@@ -186,37 +200,27 @@ def _model_of(
         raise InputError(f"node {lost[0]} of an element has no place", file=path, expected="*NODE")
     used = [n for n in used if n not in deck.couplings]
     own = {n: places[str(n)] for n in used}
-    solid = _thicken(deck, material, own)
+    alone = {n: places[str(n)] for n in (*deck.attached.nodes(), *deck.couplings) if n not in own}
+    solid = _thicken(deck, material, {**own, **alone})
     ends = dict.fromkeys(
         n for kind, nodes in solid.elements.values() if kind not in _POINTS for n in nodes
     )
     row, xyz = {n: i for i, n in enumerate(ends)}, np.array([solid.places[n] for n in ends])
-    motions = shells.Motions(row, deck.held, early)
-    for n in used:
-        motions.owner = n
-        if n in solid.lines:
-            solid.add_motions(n, motions)
-        elif n in row:
-            motions.add_node(n, np.array(own[n]), {n})
-    found, moved = motions.matrix()
-    for n in deck.couplings:
-        tip = (
-            shells.Motion(n, d, np.array(places[str(n)]), one) for d, one in enumerate(np.eye(6))
-        )
-        found += [motion for motion in tip if (n, motion.direction) not in deck.held]
-    moved = sp.csr_array(moved)
-    moved.resize(moved.shape[0], len(found))
+    motions = shells.Motions(
+        row, deck.held | deck.attached.led(), {**early, **dict.fromkeys(alone, False)}
+    )
+    hung = NodeMotions(deck.attached, solid, motions, used, alone, path)
+    found, moved = hung.found, hung.moved
     names = {n: name for n, (name, _) in deck.couplings.items()}
-    labels = [names.get(motion.node, str(motion.node)) for motion in found]
     groups, heavy = deck.groups(), {}
     parts: dict[str, SparseArray] = {}
-    mass = sp.csc_array(_point_masses(deck, found))
+    mass = sp.csc_array(_point_masses(deck, found) + hung.mass(deck.attached.masses))
     for name, numbers in (groups or {REST: list(material)}).items():
         stiffness, inertia = _assemble(
             replace(deck, elements=solid.elements), numbers, row, xyz, material
         )
-        parts[name] = sp.csc_array(moved.T @ stiffness @ moved)
-        mass += moved.T @ inertia @ moved
+        parts[name] = hung.reduced(stiffness)
+        mass += hung.reduced(inertia)
         heavy[name] = float(inertia.sum())
     at = {(motion.node, motion.direction): i for i, motion in enumerate(found)}
     axes = np.array([motion.axes for motion in found])
@@ -227,14 +231,23 @@ def _model_of(
             raise InputError(what, file=path, expected="nodes of solid elements")
         own_rows = [3 * row[node] + d for node in around for d in range(3)]
         _tie(n, around, parts, at, places, moved[own_rows], axes[:, :3])
-    for name, (direction, stiffness) in deck.springs.items():
+    for name, (direction, value) in deck.springs.items():
         sprung = [(deck.elements[n][1][0], direction) for n in deck.sets.get(name, ())]
         own_rows = [at[key] for key in sprung if key in at]
-        values = np.full(len(own_rows), stiffness)
+        values = np.full(len(own_rows), value)
         parts[deck.named[name]] = sp.csc_array((values, (own_rows, own_rows)), shape=mass.shape)
+    for name in deck.attached.groups():
+        parts[name] = hung.stiffness([s for s in deck.attached.springs if s.group == name])
+    stiffness = sp.csc_array(sum(parts.values()))
+    if len(left := hung.kept(stiffness + mass)) < len(found):
+        stiffness, mass = stiffness[left][:, left], mass[left][:, left]
+        parts = {name: part[left][:, left] for name, part in parts.items()}
+        found, axes = [found[i] for i in left], axes[left]
+    labels = [names.get(motion.node, str(motion.node)) for motion in found]
+    parts = {name: part for name, part in parts.items() if part.count_nonzero()}
     model = matrix_model(
         sp.csc_array(mass),
-        sp.csc_array(sum(parts.values())),
+        sp.csc_array(stiffness),
         labels,
         [DIRECTIONS[motion.direction] for motion in found],
         np.array([motion.xyz for motion in found]),
@@ -250,9 +263,10 @@ def _model_of(
     }
     assert isinstance(model.geometry, MatrixGeometry)
     model = replace(model, geometry=replace(model.geometry, outlines=drawn))
-    light = JOINT_SHARE * sum(heavy.values())
-    small = [name for name in model.groups if heavy.get(name, np.inf) < light]
-    return replace(model, group_kinds=dict.fromkeys(small, "joint"))
+    least = JOINT_SHARE * sum(heavy.values())
+    small = {name for name in model.groups if heavy.get(name, 0.0) < least}
+    grounds = GroupPriors(model).supports - heavy.keys()
+    return replace(model, group_kinds=dict.fromkeys(small - grounds, "joint"))
 
 
 def _tie(
@@ -332,7 +346,7 @@ def _thicken(
         return shells.thicken(deck.elements, places, thickness)
     except ValueError as error:
         what = f"element {error.args[0]} has no area"
-        raise InputError(what, file=deck.path, expected="corners that no line joins") from None
+        raise InputError(what, file=deck.path, expected="corners around an area") from None
 
 
 def _point_masses(deck: SolidDeck, found: Sequence[shells.Motion]) -> SparseArray:
@@ -392,17 +406,10 @@ def write_factors(model: Model, path: Path, original: Path) -> bool:
     material = _materials(deck)
     before = _model_of(deck, material, nodes.read_nodes(original))
     groups = deck.groups() or {REST: list(material)}
-    parts = before.groups or {REST: before.stiffness}
-    whole = model.groups if before.groups else {REST: model.stiffness}
-    heavier = float(model.mass.diagonal().sum() / before.mass.diagonal().sum())
-    heavier = 1.0 if abs(heavier - 1.0) < _SAME else heavier
-    if "instances" in deck.named or set(whole) != set(parts) or (deck.masses and heavier != 1.0):
+    found = factors_of(before, model)
+    if "instances" in deck.named or found is None or (deck.masses and found[1] != 1.0):
         return False
-    factors = {n: float(whole[n].diagonal().sum() / k.diagonal().sum()) for n, k in parts.items()}
-    made = sp.csc_array(sum(factors[name] * part for name, part in parts.items()))
-    for own, other in ((made, model.stiffness), (heavier * before.mass, model.mass)):
-        if abs(own - other).max() > _SAME * abs(other).max():
-            return False
+    factors, heavier = found
     section = {
         n: pair for name, pair in deck.sections.items() for n in deck.sets[name] if n in material
     }
@@ -431,6 +438,22 @@ def write_factors(model: Model, path: Path, original: Path) -> bool:
     lines = _other_lines(original, sections, springs)
     path.write_text("\n".join([*lines, ""]), encoding="latin-1")
     return True
+
+
+def factors_of(before: Model, model: Model) -> tuple[dict[str, float], float] | None:
+    """Return factors of the groups and of the mass that make a model; None where there are none."""
+    parts = before.groups or {REST: before.stiffness}
+    whole = model.groups if before.groups else {REST: model.stiffness}
+    heavier = float(model.mass.diagonal().sum() / before.mass.diagonal().sum())
+    heavier = 1.0 if abs(heavier - 1.0) < _SAME else heavier
+    if set(whole) != set(parts) or model.mass.shape != before.mass.shape:
+        return None
+    factors = {n: float(whole[n].diagonal().sum() / k.diagonal().sum()) for n, k in parts.items()}
+    made = sp.csc_array(sum(factors[name] * part for name, part in parts.items()))
+    for own, other in ((made, model.stiffness), (heavier * before.mass, model.mass)):
+        if abs(own - other).max() > _SAME * abs(other).max():
+            return None
+    return factors, heavier
 
 
 def _other_lines(

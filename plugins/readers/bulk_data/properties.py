@@ -93,6 +93,21 @@ def bar_of(card: Card, materials: Mapping[int, Card]) -> Bar:
     """
     material = card.pick(materials, card.id(2, "MID"), "MAT1", "MID")
     read = {"PBAR": _pbar, "PBARL": _pbarl, "PBEAM": _pbeam, "PROD": _prod}[card.name]
+    E, G, nu = moduli_of(material)
+    of = read(card, nu)
+    bar = Bar(E, G, nu, at_least_0(material, 5, "RHO"), of, card, material)
+    if bar.has_shear and not G > 0.0:
+        raise material.error("no shear modulus for bars with shear", "G or NU", "G")
+    if of.nsm and not bar.rho * of.A + of.nsm > 0.0:
+        raise card.error("the bar has no mass", "RHO A + NSM > 0", "NSM")
+    if of.shape is not None and abs(G / (E / (2.0 * (1.0 + nu))) - 1.0) > _SAME:
+        expected = "G = E / 2(1 + NU) with a shape"
+        raise material.error("G does not belong to E and NU", expected, "G")
+    return bar
+
+
+def moduli_of(material: Card) -> tuple[float, float, float]:
+    """Return E, G and Poisson's ratio of a MAT1, of which two are enough; raises InputError."""
     E, G, nu = (material.real(i, key, 0.0) for i, key in ((2, "E"), (3, "G"), (4, "NU")))
     if not material.text(2):
         E = 2.0 * (1.0 + nu) * G
@@ -105,19 +120,11 @@ def bar_of(card: Card, materials: Mapping[int, Card]) -> Bar:
         nu = own if -1.0 < own <= 0.5 else 0.0
     if not material.text(3) and material.text(4):
         G = E / (2.0 * (1.0 + nu))
-    of = read(card, nu)
-    bar = Bar(E, G, nu, _at_least_0(material, 5, "RHO"), of, card, material)
-    if bar.has_shear and not G > 0.0:
-        raise material.error("no shear modulus for bars with shear", "G or NU", "G")
-    if of.nsm and not bar.rho * of.A + of.nsm > 0.0:
-        raise card.error("the bar has no mass", "RHO A + NSM > 0", "NSM")
-    if of.shape is not None and abs(G / (E / (2.0 * (1.0 + nu))) - 1.0) > _SAME:
-        expected = "G = E / 2(1 + NU) with a shape"
-        raise material.error("G does not belong to E and NU", expected, "G")
-    return bar
+    return E, G, nu
 
 
-def _at_least_0(card: Card, number: int, key: str) -> float:
+def at_least_0(card: Card, number: int, key: str) -> float:
+    """Return a number that is not negative, 0 where blank; raises InputError."""
     value = card.real(number, key, 0.0)
     if value < 0.0:
         raise card.error(f"{value:g}", "a number >= 0", key)
@@ -129,15 +136,15 @@ def _pbar(card: Card, nu: float) -> Constants:
         expected = "0: the principal axes, to which the orientation of the bars can be turned"
         raise card.error(card.text(19), expected, "I12")
     keys = ("A", "I1", "I2", "J")
-    A, I1, I2, J = (_at_least_0(card, 3 + i, key) for i, key in enumerate(keys))
+    A, I1, I2, J = (at_least_0(card, 3 + i, key) for i, key in enumerate(keys))
     nsm = card.real(7, "NSM", 0.0)
-    K1, K2 = _at_least_0(card, 17, "K1"), _at_least_0(card, 18, "K2")
+    K1, K2 = at_least_0(card, 17, "K1"), at_least_0(card, 18, "K2")
     return Constants(_not_0(card, A), I1, I2, J, nsm, K1, K2)
 
 
 def _prod(card: Card, nu: float) -> Constants:
-    J, nsm = _at_least_0(card, 4, "J"), card.real(6, "NSM", 0.0)
-    return Constants(_not_0(card, _at_least_0(card, 3, "A")), 0.0, 0.0, J, nsm)
+    J, nsm = at_least_0(card, 4, "J"), card.real(6, "NSM", 0.0)
+    return Constants(_not_0(card, at_least_0(card, 3, "A")), 0.0, 0.0, J, nsm)
 
 
 def _not_0(card: Card, area: float) -> float:
@@ -155,7 +162,7 @@ def _pbarl(card: Card, nu: float) -> Constants:
     if kind not in SHAPES:
         expected = f"{', '.join(SHAPES)}, or a PBAR with numbers"
         raise card.error(f"shape {kind[:20]!r}", expected, "TYPE")
-    sizes = [_at_least_0(card, 9 + i, f"DIM{i + 1}") for i in range(SHAPES[kind])]
+    sizes = [at_least_0(card, 9 + i, f"DIM{i + 1}") for i in range(SHAPES[kind])]
     across, along, wall, other = (*sizes, *(0.0,) * 4)[:4]
     if kind == "BOX" and abs(wall - other) > _SAME * wall:
         raise card.error("walls that differ", "DIM3 = DIM4, or a PBAR with numbers", "DIM4")

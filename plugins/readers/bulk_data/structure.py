@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -150,30 +150,34 @@ class Parts:
         self.of[id(part)] = card
 
 
-def _unread(card: Card) -> InputError:
+def _unread(card: Card, instead: str) -> InputError:
     if _SUPERELEMENT.fullmatch(card.name):
         return card.error("superelements are not read", "all of the structure in one section")
-    expected = "a frame of CBAR, CBEAM, CROD, CONM2, CELAS2, RBE2, SPC; see the docs"
-    return card.error("this card is not read", expected)
+    return card.error("this card is not read", instead)
 
 
-class BulkFrame:
-    """Bulk data as a frame.
+class BulkData:
+    """What every reading of bulk data needs: grids, constraints, springs, masses, rigid links.
+
+    Arguments:
+        deck: all cards.
+        read: names of the cards that are read.
+        instead: what is expected in place of any other card.
 
     Raises:
         InputError: for a card that is not read and may carry stiffness or mass, and all that is
             wrong in those that are.
     """
 
-    def __init__(self, deck: Deck) -> None:
+    def __init__(self, deck: Deck, read: frozenset[str], instead: str) -> None:
         self.deck = deck
         self.named: dict[str, list[Card]] = {}
         for card in deck.cards:
-            if card.name not in _READ | IGNORED:
-                raise _unread(card)
+            if card.name not in read | IGNORED:
+                raise _unread(card, instead)
             self.named.setdefault(card.name, []).append(card)
         weight = 1.0
-        for i, card in enumerate(c for c in self._cards("PARAM") if c.text(1) == "WTMASS"):
+        for i, card in enumerate(c for c in self.cards("PARAM") if c.text(1) == "WTMASS"):
             value = card.real(2, "WTMASS")
             if not value > 0.0 or (i and value != weight):
                 raise card.error(f"{value:g}", "one number > 0", "WTMASS")
@@ -183,8 +187,181 @@ class BulkFrame:
         self.grids = grids_of(deck)
         self.sorted = sorted(self.grids)
         self.listed = 0  # grids in lists so far
-        pairs = [(card, i) for card in self._cards("PELAS") for i in (1, 5) if card.text(i)]
+        pairs = [(card, i) for card in self.cards("PELAS") for i in (1, 5) if card.text(i)]
         self.stiffnesses = {card.id(i, "PID"): card.real(i + 1, "K") for card, i in pairs}
+
+    def cards(self, *names: str) -> Iterator[Card]:
+        """Return the cards of some names."""
+        for name in names:
+            yield from self.named.get(name, ())
+
+    def grid(self, card: Card, number: int, key: str) -> GridPoint:
+        """Return the grid that a field names; raises InputError."""
+        return self.known(card, card.id(number, key), key)
+
+    def known(self, card: Card, number: int, key: str) -> GridPoint:
+        """Return the grid of a number that a card names; raises InputError."""
+        return card.pick(self.grids, number, "GRID", key)
+
+    def motions(self, grid: GridPoint, components: str, card: Card, key: str) -> list[str]:
+        """Return the global directions that components at a grid are.
+
+        Raises:
+            InputError: where they are single directions of axes that are turned.
+        """
+        found: list[str] = []
+        for block, shift in (("123", 0), ("456", 3)):
+            chosen = [int(digit) - 1 - shift for digit in components if digit in block]
+            if len(chosen) == 3:
+                found += DIRECTIONS[shift : shift + 3]
+                continue
+            for row in chosen:
+                axis = np.abs(grid.axes[row])
+                if axis.max() < 1.0 - _SAME:
+                    expected = "123, 456, or a grid whose axes are along x, y and z"
+                    what = f"component {row + 1 + shift} of grid {grid.name} is turned"
+                    raise card.error(what, expected, key)
+                found.append(DIRECTIONS[shift + int(axis.argmax())])
+        return found
+
+    def spring(self, card: Card) -> tuple[float, list[tuple[GridPoint, str]]]:
+        """Return stiffness, and grid and direction of each end, of a CELAS; raises InputError."""
+        if card.name == "CELAS2":
+            stiffness = card.real(2, "K")
+        else:
+            number = card.id(2, "PID", card.id(1, "EID"))
+            stiffness = card.pick(self.stiffnesses, number, "PELAS", "PID")
+        if stiffness < 0.0:
+            raise card.error(f"{stiffness:g}", "a stiffness >= 0", "K")
+        ends = []
+        for i in (3, 5):
+            if card.integer(i, "G", 0):
+                grid = self.grid(card, i, f"G{i // 2}")
+                component = card.components(i + 1, f"C{i // 2}")
+                motions = self.motions(grid, component, card, f"C{i // 2}")
+                if len(component) != 1:
+                    raise card.error(f"component {component!r}", "one of 1 to 6", f"C{i // 2}")
+                ends.append((grid, motions[0]))
+        if stiffness and not ends:
+            raise card.error("no grid", "one grid or two", "G1")
+        return stiffness, ends
+
+    def lumps(self, card: Card) -> tuple[GridPoint, list[tuple[float, FloatArray]]]:
+        """Return the grid of a CONM2, and point masses with their arms; raises InputError."""
+        grid = self.grid(card, 2, "G")
+        mass = self.weight * card.real(4, "M")
+        if mass < 0.0:
+            raise card.error(f"{mass:g}", "a mass >= 0", "M")
+        offset = np.array(card.vector(5, "X"))
+        axes = np.eye(3)
+        if card.text(3) == "-1":
+            offset = offset - grid.xyz
+        else:
+            system = self.systems.find(card.id(3, "CID", 0), card, "CID")
+            axes = system.axes_at(grid.xyz)
+            offset = offset @ axes
+        keys = ("I11", "I21", "I22", "I31", "I32", "I33")
+        values = [self.weight * card.real(9 + i, key, 0.0) for i, key in enumerate(keys)]
+        return grid, [(m, offset + arm) for m, arm in lumps(mass, values, axes, card)]
+
+    def links(self, card: Card) -> tuple[GridPoint, list[tuple[GridPoint, tuple[str, ...]]]]:
+        """Return the grid that an RBE2 leads by, and the others with their motions that follow."""
+        leader = self.grid(card, 2, "GN")
+        components = card.components(3, "CM")
+        last = len(card.fields)
+        if last > 4 and not card.is_integer(last) and card.text(last) != "THRU":
+            last -= 1  # the coefficient of thermal expansion
+        listed = Card(card.name, card.fields[:last], card.file, card.first, card.last)
+        follow = [self.known(card, number, "GM") for number in self.list(listed, 4, "GM")]
+        if not components or not follow:
+            raise card.error("nothing follows", "components in CM and grids in GM", "CM")
+        return leader, [(g, tuple(self.motions(g, components, card, "CM"))) for g in follow]
+
+    def left_out(self, read: frozenset[str] = frozenset()) -> tuple[str, ...]:
+        """Return which cards count for nothing, apart from some that are read."""
+        counts = Counter(card.name for card in self.deck.cards if card.name not in read)
+        design = {"DVPREL1", "DVPREL2", "DVMREL1", "DVMREL2"} & set(counts)
+        found = (
+            _listed("cards left out: {}", counts, IGNORED - _REDUCING),
+            _listed("nothing is reduced or held by {}: all directions stay", counts, _REDUCING),
+            "properties are those of their cards, not of the design variables" * bool(design),
+        )
+        return tuple(filter(None, found))
+
+    def other_masses(self) -> tuple[str, ...]:
+        """Return that masses are consistent where the file does not ask for such."""
+        cards = [card for card in self.cards("PARAM") if card.text(1) == "COUPMASS"]
+        if any(card.text(2) == "YES" or card.text(2).strip("+0") == "1" for card in cards):
+            return ()
+        return ("masses are consistent; the file asks for lumped ones (COUPMASS)",)
+
+    def list(self, card: Card, first: int, key: str) -> list[int]:
+        """Return the grids of a list; raises InputError for more than any structure needs."""
+        found = card.numbers(first, key, self.sorted)
+        self.listed += len(found)
+        if self.listed > _MOST_CARDS:
+            raise card.error("the lists name too many grids", f"at most {_MOST_CARDS}", key)
+        return found
+
+    def held(self, used: Container[str]) -> dict[str, set[str]]:
+        """Return the directions held of some grids, by SPC of the chosen set and PS of GRID."""
+        held: dict[str, set[str]] = {}
+        for grid, components, card in self._constraints():
+            if grid.name in used:
+                motions = self.motions(grid, components, card, "C")
+                held.setdefault(grid.name, set()).update(motions)
+        usual = next(self.cards("GRDSET"), None)
+        for grid in self.grids.values():
+            own = grid.card if grid.card.text(7) or usual is None else usual
+            if grid.name in used and own.text(7):
+                motions = self.motions(grid, own.components(7, "PS"), own, "PS")
+                held.setdefault(grid.name, set()).update(motions)
+        return held
+
+    def _constraints(self) -> Iterator[tuple[GridPoint, str, Card]]:
+        cards = list(self.cards("SPC", "SPC1"))
+        sets = {card.id(1, "SID") for card in cards}
+        if "MPC" in self.deck.chosen:
+            what = "a set of MPC is chosen"
+            raise InputError(what, file=self.deck.file, expected="RBE2 instead")
+        if not self.deck.controlled:
+            for card in self.cards("MPC", "MPCADD"):
+                raise card.error("this card is not read", "RBE2, or case control without MPC")
+        if self.deck.controlled:
+            chosen = {self.deck.chosen["SPC"]} if "SPC" in self.deck.chosen else set()
+            for card in self.cards("SPCADD"):
+                if card.id(1, "SID") in chosen:
+                    chosen |= {card.id(i, "S") for i in range(2, len(card.fields) + 1)}
+            if chosen and not chosen & sets:
+                what = f"there is no SPC or SPC1 of set {min(chosen)}"
+                raise InputError(what, file=self.deck.file, expected="the set of case control")
+        elif len(sets) > 1:
+            what = f"{len(sets)} sets, and no case control that chooses one"
+            raise cards[-1].error(what, "one set, or SPC = n before BEGIN BULK", "SID")
+        else:
+            chosen = sets
+        for card in cards:
+            if card.id(1, "SID") in chosen:
+                if card.name == "SPC1":
+                    components = card.components(2, "C")
+                    numbers = self.list(card, 3, "G")
+                    pairs = [(number, components) for number in numbers]
+                else:
+                    rows = [i for i in (2, 5) if card.text(i)]
+                    if any(card.real(i + 2, "D", 0.0) for i in rows):
+                        raise card.error("a displacement that is not 0", "a grid that is held", "D")
+                    pairs = [(card.id(i, "G"), card.components(i + 1, "C")) for i in rows]
+                for number, components in pairs:
+                    yield card.pick(self.grids, number, "GRID", "G"), components, card
+
+
+class BulkFrame(BulkData):
+    """Bulk data as a frame; arguments and errors are those of `BulkData`."""
+
+    def __init__(self, deck: Deck) -> None:
+        super().__init__(
+            deck, _READ, "a frame of CBAR, CBEAM, CROD, CONM2, CELAS2, RBE2, SPC; see the docs"
+        )
         materials = number_cards(deck, "MAT1")
         properties = number_cards(deck, *PROPERTIES).items()
         self.bars = {number: bar_of(card, materials) for number, card in properties}
@@ -240,16 +417,9 @@ class BulkFrame:
             raise InputError("nothing can move", file=self.deck.file, expected="a free direction")
         return model
 
-    def _cards(self, *names: str) -> Iterator[Card]:
-        for name in names:
-            yield from self.named.get(name, ())
-
-    def grid(self, card: Card, number: int, key: str) -> GridPoint:
-        """Return the grid that a field names, and make a joint of it; raises InputError."""
-        return self._known(card, card.id(number, key), key)
-
-    def _known(self, card: Card, number: int, key: str) -> GridPoint:
-        grid = card.pick(self.grids, number, "GRID", key)
+    def known(self, card: Card, number: int, key: str) -> GridPoint:
+        """Return the grid of a number that a card names, and make a joint of it."""
+        grid = super().known(card, number, key)
         self._joint(grid.name, grid.xyz)
         return grid
 
@@ -258,29 +428,8 @@ class BulkFrame:
         self.parts.joints.setdefault(name, Joint(name, (x, y, z)))
         return name
 
-    def _motions(self, grid: GridPoint, components: str, card: Card, key: str) -> list[str]:
-        """Return the global directions that components at a grid are.
-
-        Raises:
-            InputError: where they are single directions of axes that are turned.
-        """
-        found: list[str] = []
-        for block, shift in (("123", 0), ("456", 3)):
-            chosen = [int(digit) - 1 - shift for digit in components if digit in block]
-            if len(chosen) == 3:
-                found += DIRECTIONS[shift : shift + 3]
-                continue
-            for row in chosen:
-                axis = np.abs(grid.axes[row])
-                if axis.max() < 1.0 - _SAME:
-                    expected = "123, 456, or a grid whose axes are along x, y and z"
-                    what = f"component {row + 1 + shift} of grid {grid.name} is turned"
-                    raise card.error(what, expected, key)
-                found.append(DIRECTIONS[shift + int(axis.argmax())])
-        return found
-
     def _bar(self, card: Card) -> None:
-        usual = next(self._cards("BAROR"), None) if card.name == "CBAR" else None
+        usual = next(self.cards("BAROR"), None) if card.name == "CBAR" else None
         own = card.id(1, "EID")
         number = card.id(2, "PID", own if usual is None else usual.id(2, "PID", own))
         kinds = ("PBAR", "PBARL") if card.name == "CBAR" else ("PBEAM",)
@@ -387,26 +536,9 @@ class BulkFrame:
         return member
 
     def _spring(self, card: Card) -> None:
-        if card.name == "CELAS2":
-            stiffness = card.real(2, "K")
-        else:
-            number = card.id(2, "PID", card.id(1, "EID"))
-            stiffness = card.pick(self.stiffnesses, number, "PELAS", "PID")
-        if stiffness < 0.0:
-            raise card.error(f"{stiffness:g}", "a stiffness >= 0", "K")
-        ends = []
-        for i in (3, 5):
-            if card.integer(i, "G", 0):
-                grid = self.grid(card, i, f"G{i // 2}")
-                component = card.components(i + 1, f"C{i // 2}")
-                motions = self._motions(grid, component, card, f"C{i // 2}")
-                if len(component) != 1:
-                    raise card.error(f"component {component!r}", "one of 1 to 6", f"C{i // 2}")
-                ends.append((grid, motions[0]))
+        stiffness, ends = self.spring(card)
         if stiffness == 0.0:
             return
-        if not ends:
-            raise card.error("no grid", "one grid or two", "G1")
         if len(ends) == 1:
             spring = GroundSpring(Place(joint=ends[0][0].name), ends[0][1], stiffness)
             self.parts.add("springs", spring, card)
@@ -419,105 +551,28 @@ class BulkFrame:
             raise card.error("a spring between two grids across their line", expected)
         self.parts.add("braces", Brace((first.name, second.name), stiffness), card)
 
-    def _list(self, card: Card, first: int, key: str) -> list[int]:
-        """Return the grids of a list; raises InputError for more than any structure needs."""
-        found = card.numbers(first, key, self.sorted)
-        self.listed += len(found)
-        if self.listed > _MOST_CARDS:
-            raise card.error("the lists name too many grids", f"at most {_MOST_CARDS}", key)
-        return found
-
     def _mass(self, card: Card) -> None:
-        grid = self.grid(card, 2, "G")
-        mass = self.weight * card.real(4, "M")
-        if mass < 0.0:
-            raise card.error(f"{mass:g}", "a mass >= 0", "M")
-        offset = np.array(card.vector(5, "X"))
-        axes = np.eye(3)
-        if card.text(3) == "-1":
-            offset = offset - grid.xyz
-        else:
-            system = self.systems.find(card.id(3, "CID", 0), card, "CID")
-            axes = system.axes_at(grid.xyz)
-            offset = offset @ axes
-        keys = ("I11", "I21", "I22", "I31", "I32", "I33")
-        values = [self.weight * card.real(9 + i, key, 0.0) for i, key in enumerate(keys)]
-        for m, shift in lumps(mass, values, axes, card):
-            x, y, z = (float(v) for v in offset + shift)
+        grid, found = self.lumps(card)
+        for m, arm in found:
+            x, y, z = (float(v) for v in arm)
             self.parts.add("masses", PointMass(Place(joint=grid.name), m, (x, y, z)), card)
 
     def _link(self, card: Card) -> None:
         """Add the rigid links of an RBE2; grids that follow in the same motions share one."""
-        leader = self.grid(card, 2, "GN")
-        components = card.components(3, "CM")
-        last = len(card.fields)
-        if last > 4 and not card.is_integer(last) and card.text(last) != "THRU":
-            last -= 1  # the coefficient of thermal expansion
-        listed = Card(card.name, card.fields[:last], card.file, card.first, card.last)
+        leader, found = self.links(card)
         follows: dict[tuple[str, ...], list[str]] = {}
-        for number in self._list(listed, 4, "GM"):
-            grid = self._known(card, number, "GM")
-            motions = tuple(self._motions(grid, components, card, "CM"))
+        for grid, motions in found:
             follows.setdefault(motions, []).append(grid.name)
-        if not components or not follows:
-            raise card.error("nothing follows", "components in CM and grids in GM", "CM")
         for motions, names in follows.items():
             link = Link(leader.name, tuple(names), () if len(motions) == 6 else motions)
             self.parts.add("links", link, card)
 
     def _supports(self) -> None:
         """Hold what the constraints hold that case control chooses, or all where there is none."""
-        held: dict[str, set[str]] = {}
-        for grid, components, card in self._constraints():
-            if grid.name in self.parts.joints:
-                motions = self._motions(grid, components, card, "C")
-                held.setdefault(grid.name, set()).update(motions)
-        usual = next(self._cards("GRDSET"), None)
-        for grid in self.grids.values():
-            own = grid.card if grid.card.text(7) or usual is None else usual
-            if grid.name in self.parts.joints and own.text(7):
-                motions = self._motions(grid, own.components(7, "PS"), own, "PS")
-                held.setdefault(grid.name, set()).update(motions)
-        for name, stopped in held.items():
+        for name, stopped in self.held(self.parts.joints).items():
             fixed = tuple(d for d in DIRECTIONS if d in stopped)
             if fixed:
                 self.parts.supports.append(Support(Place(joint=name), fixed))
-
-    def _constraints(self) -> Iterator[tuple[GridPoint, str, Card]]:
-        cards = list(self._cards("SPC", "SPC1"))
-        sets = {card.id(1, "SID") for card in cards}
-        if "MPC" in self.deck.chosen:
-            what = "a set of MPC is chosen"
-            raise InputError(what, file=self.deck.file, expected="RBE2 instead")
-        if not self.deck.controlled:
-            for card in self._cards("MPC", "MPCADD"):
-                raise card.error("this card is not read", "RBE2, or case control without MPC")
-        if self.deck.controlled:
-            chosen = {self.deck.chosen["SPC"]} if "SPC" in self.deck.chosen else set()
-            for card in self._cards("SPCADD"):
-                if card.id(1, "SID") in chosen:
-                    chosen |= {card.id(i, "S") for i in range(2, len(card.fields) + 1)}
-            if chosen and not chosen & sets:
-                what = f"there is no SPC or SPC1 of set {min(chosen)}"
-                raise InputError(what, file=self.deck.file, expected="the set of case control")
-        elif len(sets) > 1:
-            what = f"{len(sets)} sets, and no case control that chooses one"
-            raise cards[-1].error(what, "one set, or SPC = n before BEGIN BULK", "SID")
-        else:
-            chosen = sets
-        for card in cards:
-            if card.id(1, "SID") in chosen:
-                if card.name == "SPC1":
-                    components = card.components(2, "C")
-                    numbers = self._list(card, 3, "G")
-                    pairs = [(number, components) for number in numbers]
-                else:
-                    rows = [i for i in (2, 5) if card.text(i)]
-                    if any(card.real(i + 2, "D", 0.0) for i in rows):
-                        raise card.error("a displacement that is not 0", "a grid that is held", "D")
-                    pairs = [(card.id(i, "G"), card.components(i + 1, "C")) for i in rows]
-                for number, components in pairs:
-                    yield card.pick(self.grids, number, "GRID", "G"), components, card
 
     def _check_held(self) -> None:
         """Check that every joint is part of the structure; hold rotations that nothing resists."""
@@ -540,27 +595,17 @@ class BulkFrame:
 
     def remarks(self) -> tuple[str, ...]:
         """Return what the frame leaves out or takes otherwise than the file says."""
-        counts = Counter(card.name for card in self.deck.cards)
         rods = [name for name, card in self.card_of.items() if card.name == "CROD"]
         lumped = [name for name in rods if not self.bar_of[name].rho > 0.0]
         twisting = [n for n in rods if self.bar_of[n].card.real(4, "J", 0.0) > self.bar_of[n].of.J]
-        found = [
-            _listed("cards left out: {}", counts, IGNORED - _REDUCING),
-            _listed("nothing is reduced or held by {}: all directions stay", counts, _REDUCING),
-        ]
-        if any(name in counts for name in ("DVPREL1", "DVPREL2", "DVMREL1", "DVMREL2")):
-            found.append("properties are those of their cards, not of the design variables")
+        found = []
         if lumped:
             what = "half of their mass at either end, which no factor on density changes"
             found.append(f"{len(lumped)} CROD parallel to bars: {what}")
         if twisting:
             found.append("J of PROD is left out: a joint of rods alone takes up no twist")
-        cards = [card for card in self._cards("PARAM") if card.text(1) == "COUPMASS"]
-        if not any(
-            card.text(2) == "YES" or card.text(2).strip("+0") == "1" for card in cards
-        ) and any(m.material.rho > 0.0 for m in self.parts.members):
-            found.append("masses are consistent; the file asks for lumped ones (COUPMASS)")
-        return tuple(filter(None, found))
+        consistent = any(m.material.rho > 0.0 for m in self.parts.members)
+        return (*self.left_out(), *found, *self.other_masses() * consistent)
 
     def _assembled(self) -> Frame:
         parts = self.parts

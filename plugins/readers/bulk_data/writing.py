@@ -23,14 +23,17 @@ from femubench.fem import (
     Structure,
 )
 from femubench.plugins.readers.bulk_data.cards import Card, Deck
+from femubench.plugins.readers.bulk_data.plates import BulkPlates, has_plates
 from femubench.plugins.readers.bulk_data.properties import SHAPES, Bar
 from femubench.plugins.readers.bulk_data.structure import (
     ELEMENTS,
     PROPERTIES,
     BulkFrame,
     GridPoint,
+    number_cards,
 )
 from femubench.plugins.readers.reading import DIRECTIONS
+from femubench.plugins.readers.solid_deck import REST, factors_of
 
 _SAME = 1e-12  # far below any update, above the rounding of a change of units
 _KEPT = 1e-9  # to which the matrices must be those of bars with other properties
@@ -60,6 +63,8 @@ def write_cards(model: Model, path: Path, original: Path) -> None:
         InputError: for what cards of properties cannot say.
     """
     deck = Deck(original)
+    if has_plates(deck):
+        return _write(deck, _scaled(BulkPlates(deck), model, path), path, original)
     reading = BulkFrame(deck)
     nominal = reading.model().frame_structure
     if model.structure is None or model.mass_change or model.stiffness_change:
@@ -71,7 +76,28 @@ def write_cards(model: Model, path: Path, original: Path) -> None:
     cards = _Cards(reading)
     cards.assign(changed)
     cards.attach(masses, springs, path)
-    _write(deck, cards.edits, path, original)
+    return _write(deck, cards.edits, path, original)
+
+
+def _scaled(reading: BulkPlates, model: Model, path: Path) -> _Changes:
+    """Return the cards of factors on groups of plates, solids and springs; raises InputError."""
+    found = factors_of(reading.model(), model)
+    expected = ".op4 or .mtx, which hold any"
+    if found is None or (found[1] != 1.0 and reading.attached.masses):
+        what = "the update is no factor on properties"
+        raise InputError(what, file=path, expected=expected)
+    factors, heavier = found
+    edits = _Factors(reading.deck)
+    for name in [*reading.solid.sets, *reading.attached.groups()]:
+        factor = factors.get(name, factors.get(REST, 1.0))
+        word, number = name.split()
+        card = number_cards(reading.deck, word).get(int(number))
+        if card is None:  # the second PELAS of a card
+            raise InputError(f"{name} is not the first of its card", file=path, expected=expected)
+        material = reading.materials[card.id(2, "MID")] if name in reading.solid.sets else None
+        if factor != 1.0 or (heavier != 1.0 and material):
+            edits.scale(card, factor, heavier, material)
+    return edits.edits
 
 
 def _refusal(path: Path) -> InputError:
@@ -150,20 +176,79 @@ def _parted(bar: Bar, ratio: Mapping[str, float], e: float) -> tuple[Numbers, Nu
     return tuple(numbers), tuple(material)
 
 
-class _Cards:
-    """Gives every bar a property card, and every property a material card, with its numbers."""
+class _Edits:
+    """Cards in place of others, and the highest numbers so far."""
 
-    def __init__(self, reading: BulkFrame) -> None:
-        self.reading, self.lines = reading, reading.deck.lines
+    def __init__(self, deck: Deck) -> None:
+        self.lines = deck.lines
         self.edits: _Changes = {}
         self.highest = {
-            key: max(c.id(1, key) for c in reading.deck.cards if c.name in names)
+            key: max((c.id(1, key) for c in deck.cards if c.name in names), default=0)
             for key, names in (
                 ("PID", PROPERTIES),
                 ("MID", ("MAT1",)),
                 ("EID", (*ELEMENTS, "PLOTEL")),
             )
         }
+
+    def _next(self, kind: str, card: Card) -> str:
+        self.highest[kind] += 1
+        if self.highest[kind] > 99_999_999:
+            raise card.error("no number is left for a new card", "numbers below 99999999")
+        return str(self.highest[kind])
+
+    def _put(self, card: Card, lines: list[bytes]) -> None:
+        self.edits.setdefault(card.file, {})[card.first] = (card.last, lines)
+
+    def _old(self, card: Card) -> list[bytes]:
+        return self.lines[card.file][card.first : card.last + 1]
+
+    def _card(self, old: Card, name: str, texts: Sequence[str]) -> list[bytes]:
+        """Return a card in large fields, with the end of line of the old one."""
+        end = b"\r\n" if self.lines[old.file][old.first].endswith(b"\r\n") else b"\n"
+        rows = [texts[i : i + 4] for i in range(0, len(texts), 4)]
+        heads = [f"{name}*", *["*"] * len(rows)]
+        return [
+            f"{head:<8}{''.join(f'{text:<{_WIDTH}}' for text in row)}".rstrip().encode() + end
+            for head, row in zip(heads, rows, strict=False)
+        ]
+
+
+class _Factors(_Edits):
+    """Scales properties of plates, solids and springs: a plate or solid gets a MAT1 of its own."""
+
+    def scale(self, card: Card, factor: float, heavier: float, material: Card | None) -> None:
+        """Write a property, or a CELAS2, as much stiffer and heavier as stated.
+
+        Arguments:
+            material: of a plate or solid.
+        """
+        texts = [*card.fields, *[""] * 8]
+        if material is None:
+            row = texts.index("K") + 1 if card.name == "PBUSH" else 1
+            for i in range(row, row + 6 if card.name == "PBUSH" else row + 1):
+                texts[i] = real(factor * card.real(i + 1, "K")) if texts[i] else ""
+            self._put(card, self._card(card, card.name, _fitting(card, texts)))
+            return
+        number = self._next("MID", material)
+        for i in (1, 3, 5) if card.name == "PSHELL" else (1,):
+            texts[i] = number if texts[i] else ""
+        if card.name == "PSHELL" and texts[7]:
+            texts[7] = real(heavier * card.real(8, "NSM"))
+        own = [number, *material.fields[1:]]
+        for i, times in ((1, factor), (2, factor), (4, heavier)):
+            if material.text(i + 1):
+                own[i] = real(times * material.real(i + 1, "a number"))
+        cards = self._card(card, card.name, _fitting(card, texts))
+        self._put(card, cards + self._card(card, "MAT1", _fitting(material, own)))
+
+
+class _Cards(_Edits):
+    """Gives every bar a property card, and every property a material card, with its numbers."""
+
+    def __init__(self, reading: BulkFrame) -> None:
+        super().__init__(reading.deck)
+        self.reading = reading
 
     def assign(self, changed: Mapping[str, tuple[Numbers, Numbers]]) -> None:
         """Find cards for the new numbers of every bar."""
@@ -260,28 +345,6 @@ class _Cards:
                 new += self._card(card, "MAT1", texts)
             self._put(card, new)
         return found
-
-    def _next(self, kind: str, card: Card) -> str:
-        self.highest[kind] += 1
-        if self.highest[kind] > 99_999_999:
-            raise card.error("no number is left for a new card", "numbers below 99999999")
-        return str(self.highest[kind])
-
-    def _put(self, card: Card, lines: list[bytes]) -> None:
-        self.edits.setdefault(card.file, {})[card.first] = (card.last, lines)
-
-    def _old(self, card: Card) -> list[bytes]:
-        return self.lines[card.file][card.first : card.last + 1]
-
-    def _card(self, old: Card, name: str, texts: Sequence[str]) -> list[bytes]:
-        """Return a card in large fields, with the end of line of the old one."""
-        end = b"\r\n" if self.lines[old.file][old.first].endswith(b"\r\n") else b"\n"
-        rows = [texts[i : i + 4] for i in range(0, len(texts), 4)]
-        heads = [f"{name}*", *["*"] * len(rows)]
-        return [
-            f"{head:<8}{''.join(f'{text:<{_WIDTH}}' for text in row)}".rstrip().encode() + end
-            for head, row in zip(heads, rows, strict=False)
-        ]
 
 
 def _material_of(bar: Bar) -> str:
