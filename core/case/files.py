@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import os
 import posixpath
-from os import PathLike
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from femubench.core import files as reading
+from femubench.core.case.drawn import CASE_FILE
 from femubench.core.case.faults import Misfit
 from femubench.core.errors import InputError
 from femubench.core.files import MIB
@@ -16,15 +16,7 @@ from femubench.core.files import MIB
 LARGEST_CASE = 16 * MIB  # bytes of case.toml
 LARGEST_TEXT = 64 * MIB  # of a table
 LARGEST_FILE = 1024 * MIB  # of a matrix, or what a reader plugin reads
-CASE_FILE = "case.toml"
-DRAWN = ":"  # between the name of a case and that of the drawing that its model is
 _CHUNK = MIB
-
-
-def drawing_of(path: str | PathLike[str]) -> Path | None:
-    """Return the file of another drawing that stands for a case; None for a case folder."""
-    found = Path(path)
-    return found if found.suffix == ".toml" and found.name != CASE_FILE else None
 
 
 class CaseFiles:

@@ -14,8 +14,9 @@ import scipy.sparse as sp
 from femubench.core.case.case import SCATTER, Case, Match, Modification
 from femubench.core.case.checks import FREE_YET_HELD, NOT_HELD, check_unique
 from femubench.core.case.deviations import with_floor
+from femubench.core.case.drawn import DRAWN, drawing_of
 from femubench.core.case.faults import BadKey, KeyPath, at_key
-from femubench.core.case.files import DRAWN, LARGEST_CASE, CaseFiles, drawing_of
+from femubench.core.case.files import LARGEST_CASE, CaseFiles
 from femubench.core.case.frame_tables import FrameTables
 from femubench.core.case.frames import (
     FrameSite,

@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
-from femubench.core.case.files import DRAWN, drawing_of
+from femubench.core.case.drawn import DRAWN, drawing_of
 from femubench.core.display import clip_text
 from femubench.core.errors import InputError
 from femubench.core.plugin.loader import Plugins, load_plugins

@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from femubench.core.case.case import Case
-from femubench.core.case.files import DRAWN
+from femubench.core.case.drawn import DRAWN
 from femubench.core.errors import InputError
 from femubench.core.files import check_can_make, resolve_path
 from femubench.core.library.cases import as_list, read_cases, scenarios_of, usable_plugins, way_of
