@@ -75,7 +75,11 @@ def pieces_of(structure: Structure) -> list[Piece]:
         reach *= min(1.0, 0.8 * length / max(reach.sum(), 1e-9))
         ends = (-member.extend[0], length + member.extend[1])
         cuts = [*ends, reach[0], length - reach[1]]
-        wanted = [at[1] * length for at in places(structure) if at[0] == member.name]
+        wanted = [
+            at[1] * length
+            for at in places(structure)
+            if not isinstance(at, str) and at[0] == member.name
+        ]
         wanted += [x for x, zone in zip((0.0, length), zones, strict=True) if zone is None]
         for at in wanted:
             if ends[0] < at < ends[1] and np.abs(np.array(cuts) - at).min() > APART * depth:
@@ -101,8 +105,9 @@ def places(structure: Structure) -> list[Place]:
     """Return the places where something is measured, attached, or hangs."""
     found = [at for at, _ in structure.sensors]
     for change in structure.changes:
-        found += [item.at for item in (*change.lumps, *change.springs)]
-    found += [item.at for item in (*structure.lumps, *structure.springs) if item.drawn]
+        found += [lump.at for lump in change.lumps] + [spring.at for spring in change.springs]
+    found += [lump.at for lump in structure.lumps if lump.drawn]
+    found += [spring.at for spring in structure.springs if spring.drawn]
     return list(dict.fromkeys(found))
 
 

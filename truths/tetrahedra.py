@@ -112,7 +112,7 @@ def mesh_volumes(
         owner: dict[int, int] = {}
         for number, own in enumerate(pieces):
             owner |= {tag: number for _, tag in own}
-        local = {}
+        local: dict[tuple[int, int], float] = {}
         for tag, number in owner.items():
             if size := (finer or {}).get(volumes[number][0]):
                 sides = gmsh.model.getBoundary([(3, tag)], oriented=False, recursive=False)
@@ -124,10 +124,10 @@ def mesh_volumes(
             )
         points, cells, which = _mesh(sizes[0], owner, len(sizes) == 1, not local)
         for size in sizes[1:]:
-            finer = _mesh(size, owner, False, not local)
-            if finer[1].shape[1] > most:
+            smaller = _mesh(size, owner, False, not local)
+            if smaller[1].shape[1] > most:
                 break
-            points, cells, which = finer
+            points, cells, which = smaller
     finally:
         gmsh.finalize()
     names = tuple(dict.fromkeys(name for name, *_ in volumes))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from femubench.core.case.files import CASE_FILE
+from femubench.core.case.drawn import CASE_FILE
 from femubench.core.errors import InputError
 
 _FILES = Path(__file__).with_name("example_files")

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from femubench.core.case.drawn import CASE_FILE
 from femubench.core.case.faults import BadKey, at_key
-from femubench.core.case.files import CASE_FILE, LARGEST_CASE, CaseFiles
+from femubench.core.case.files import LARGEST_CASE, CaseFiles
 from femubench.core.case.frame_tables import FrameTables
 from femubench.core.case.matrices import (
     check_symmetric,

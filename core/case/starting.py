@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from femubench.core.case.case import SCATTER, Case
+from femubench.core.case.drawn import CASE_FILE
 from femubench.core.case.faults import Remedy
-from femubench.core.case.files import CASE_FILE, LARGEST_FILE
+from femubench.core.case.files import LARGEST_FILE
 from femubench.core.case.matrices import reader_of, reading_with
 from femubench.core.case.model_files import ModelFiles, further_files, read_model
 from femubench.core.case.modes import FIT_STD

@@ -15,8 +15,8 @@ import numpy as np
 
 from femubench.core.case.case import BEAM_SHARE, TOLERANCE, Case, Modification
 from femubench.core.case.deviations import with_floor
+from femubench.core.case.drawn import CASE_FILE
 from femubench.core.case.faults import BadKey, join_key_path
-from femubench.core.case.files import CASE_FILE
 from femubench.core.case.frame_keys import (
     Keys,
     Known,

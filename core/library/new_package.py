@@ -12,8 +12,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from femubench.core.case.drawn import CASE_FILE
 from femubench.core.case.example import write_example
-from femubench.core.case.files import CASE_FILE
 from femubench.core.case.writing import new_folder
 from femubench.core.errors import InputError
 from femubench.core.plugin import validation
