@@ -21,6 +21,7 @@ import scipy.sparse as sp
 
 from femubench.fem import FloatArray, SparseArray
 from femubench.plugins.readers.nodes import Point
+from femubench.plugins.readers.solid_elements import evaluate
 
 Element = tuple[str, tuple[int, ...]]
 
@@ -167,26 +168,39 @@ def find_lines_of_three(elements: Mapping[int, Element]) -> dict[int, bool]:
 @cache
 def _slopes(kind: str) -> FloatArray:
     """Return the slopes of the functions (n) at the nodes (q), (n, 2, q)."""
-    import skfem
+    places = SHELLS[kind].places
+    return evaluate(SHELLS[kind].functions, places, places.T)[1]
 
-    element, places = getattr(skfem, SHELLS[kind].functions)(), SHELLS[kind].places
-    far = np.linalg.norm(element.doflocs[None] - places[:, None], axis=-1)
-    return np.array([element.lbasis(places.T, i)[1] for i in far.argmin(axis=1)])
+
+class _QuarterNode(NamedTuple):
+    """A node of a quarter of a shell.
+
+    Arguments:
+        old: the node of the whole that it is; None for a new one.
+        edge: the nodes of the edge that it is on, if any.
+        near: the nearest corner.
+        point: its place in the reference element.
+    """
+
+    old: int | None
+    edge: tuple[int, int, int] | None
+    near: int
+    point: tuple[float, ...]
 
 
 @cache
-def _values(kind: str) -> FloatArray:
-    """Return the functions (n) at the nodes of all quarters (4 n), (n, 4 n)."""
-    import skfem
-
-    element, places = getattr(skfem, SHELLS[kind].functions)(), SHELLS[kind].places
-    far = np.linalg.norm(element.doflocs[None] - places[:, None], axis=-1)
-    at = np.vstack([start + turn * places for start, turn in _quarters(kind)])
-    return np.array([element.lbasis(at.T, i)[0] for i in far.argmin(axis=1)])
-
-
-def _quarters(kind: str) -> list[tuple[FloatArray, float]]:
-    return [(np.array(start), turn) for start, turn in _QUARTERS[SHELLS[kind].corners]]
+def _quarters(kind: str) -> tuple[list[_QuarterNode], FloatArray]:
+    """Return the nodes of all quarters (4 n), and the functions (n) there, (n, 4 n)."""
+    shell, found = SHELLS[kind], []
+    places = shell.places
+    at = np.vstack([start + turn * places for start, turn in _QUARTERS[shell.corners]])
+    for point in at:
+        same = np.flatnonzero(np.abs(places - point).max(axis=1) < _STRAIGHT)
+        near = int(np.abs(places[: shell.corners] - point).sum(axis=1).argmin())
+        old = int(same[0]) if len(same) else None
+        label = tuple(np.round(point, 6).tolist())
+        found.append(_QuarterNode(old, shell.edge_of(point), near, label))
+    return found, evaluate(shell.functions, places, at.T)[0]
 
 
 def split_shells(
@@ -203,24 +217,21 @@ def split_shells(
     found, own_places = {}, dict(places)
     edges: dict[int, tuple[int, ...]] = {}
     known: dict[tuple[object, ...], int] = {}
+    first = max(places) + 1
     for number, (kind, own) in elements.items():
         if kind not in SHELLS or not SHELLS[kind].edges:
             continue
-        shell, xyz = SHELLS[kind], np.array([places[node] for node in own])
-        at = np.vstack([start + turn * shell.places for start, turn in _quarters(kind)])
+        parts, functions = _quarters(kind)
         nodes = []
-        for point, where in zip(at, _values(kind).T @ xyz, strict=True):
-            old = np.abs(shell.places - point).max(axis=1) < _STRAIGHT
-            if old.any():
-                nodes.append(own[int(old.argmax())])
+        for part, where in zip(parts, functions.T @ [places[n] for n in own], strict=True):
+            if part.old is not None:
+                nodes.append(own[part.old])
                 continue
-            edge = shell.edge_of(point)
-            ends = () if edge is None else tuple(own[i] for i in edge)
+            ends = () if part.edge is None else tuple(own[i] for i in part.edge)
             # Two elements share a node of an edge by its ends and the nearer of these.
-            near = own[int(np.abs(shell.places[: shell.corners] - point).sum(axis=1).argmin())]
-            key = (*sorted(ends[:2]), near) if ends else (-number, *np.round(point, 6).tolist())
+            key = (*sorted(ends[:2]), own[part.near]) if ends else (-number, *part.point)
             if key not in known:
-                known[key] = max(own_places) + 1
+                known[key] = first + len(known)
                 x, y, z = where
                 own_places[known[key]] = float(x), float(y), float(z)
                 edges |= {known[key]: ends} if ends else {}

@@ -76,13 +76,28 @@ def _tabulate(kind: str) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray
     import skfem
     from skfem.quadrature import get_quadrature
 
-    element, places = getattr(skfem, KINDS[kind].functions)(), KINDS[kind].places
-    points, weights = get_quadrature(element.refdom, KINDS[kind].order)
+    functions, places = KINDS[kind].functions, KINDS[kind].places
+    points, weights = get_quadrature(getattr(skfem, functions)().refdom, KINDS[kind].order)
     if KINDS[kind].corners is _WEDGE:
         return _tabulate_wedge(places, points, weights)
+    return *evaluate(functions, places, points), points, weights
+
+
+def evaluate(
+    functions: str, places: FloatArray, points: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return values (n, q) and slopes (n, d, q) of functions of scikit-fem at points (d, q).
+
+    Arguments:
+        functions: the class of the element.
+        places: of its nodes in the order that is wanted, (n, d).
+    """
+    import skfem
+
+    element = getattr(skfem, functions)()
     far = np.linalg.norm(element.doflocs[None] - places[:, None], axis=-1)
     values, slopes = zip(*(element.lbasis(points, i) for i in far.argmin(axis=1)), strict=True)
-    return np.array(values), np.array(slopes), points, weights
+    return np.array(values), np.array(slopes)
 
 
 def _tabulate_wedge(
