@@ -15,7 +15,7 @@ from femubench.core.errors import FemubenchError, ModelError
 from femubench.core.fit.extended_model import check_joint_fit, extend_model
 from femubench.core.fit.modal_fit import Fit, Problem, State, bounds_of, fit, state_at
 from femubench.core.fit.projection import Projection, Projector
-from femubench.core.fit.static_response import Basis, enrich_problem, place_data
+from femubench.core.inference.coordinates import modes_for, place_data
 from femubench.core.inference.examine import Examination, is_innate
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.prior import Base, textbook_bases
@@ -132,9 +132,8 @@ def _fits_on(
     """Yield fits of causes on a textbook set, in the noise of the leading explanation."""
     model = extend_model(examination.model, base.parts, base.x)
     best = examination.posterior.explanations[0].fit.state.problem
-    basis = Basis.of(model, best.data.measurement)
-    problem = place_data(basis, best.data, best.noise, ())
-    project = Projector(model, basis.modes.shapes)
+    problem = place_data(model, best.data, best.noise, ())
+    project = Projector(model, modes_for(model).shapes)
 
     def offered(finding: CataloguedCause) -> Hypothesis | None:
         effect = effects.get(finding.effect)
@@ -172,21 +171,19 @@ def _fits(
     ]
     together = np.array([np.concatenate(xs) for xs in product(*alone)])
     for state in _best(problem, parts, together):
-        own, placed_parts = enrich_problem(problem, parts)
-        found = fit(own, placed_parts, state.x)
+        found = fit(problem, parts, state.x)
         if found is not None:
             # Several causes add up in modal coordinates and not in a model.
-            borne = check_joint_fit(found) if len(parts) > 1 or own is not problem else found
+            borne = check_joint_fit(found) if len(parts) > 1 else found
             if borne is not None:
                 yield borne
 
 
 def _best(problem: Problem, parts: Sequence[Projection], starts: FloatArray) -> list[State]:
     """Return the few states of least cost among some starts."""
-    own, placed_parts = enrich_problem(problem, parts)
     low, high = bounds_of(parts)
     states = []
     for start in starts:
         with suppress(ModelError):
-            states.append(state_at(own, placed_parts, np.clip(start, low, high)))
+            states.append(state_at(problem, parts, np.clip(start, low, high)))
     return in_order(states, lambda state: state.cost)[:_STARTS]

@@ -157,9 +157,9 @@ class TestWrongInput:
             (["design-change"], "'design-change' stands for"),
             (["case", "--effects", "test-mos"], "no effect 'test-mos'; did you mean 'test-moss'"),
             (["case", "--effects", ""], "no effect ''"),
-            (["case", "--tolerance", "0.3"], "0.3 is no number >= 0 and <= 0.2"),
-            (["case", "--tolerance", "nan"], "nan is no number >= 0 and <= 0.2"),
-            (["case", "--budget=-1"], "-1.0 is no number >= 0"),
+            (["case", "--tolerance", "0.3"], "tolerance = 0.3 (expected a number >= 0 and <= 0.2)"),
+            (["case", "--tolerance", "nan"], "tolerance = nan (expected a number >= 0 and <= 0.2)"),
+            (["case", "--budget=-1"], "budget = -1.0 (expected seconds >= 0)"),
             (
                 ["case", "--output", "case"],
                 "case: is not empty (expected a new or an empty folder)",

@@ -1,10 +1,11 @@
-"""Large models: few modes and the response to each hypothesis do what all modes would do."""
+"""Large models: frames on fewer elements, matrices in all modes, and what is too large."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,43 +16,35 @@ from numpy.testing import assert_allclose
 from femubench import Measurement, Model, Sensors, solve_modes
 from femubench.core.case.case import Case
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.change.hypothesis import Hypothesis, hypotheses_of
+from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.diagnosis.diagnose import diagnose
-from femubench.core.fem.frame import GroundSpring, Joint, Material, Member, Place, Support
+from femubench.core.errors import NotApplicable
+from femubench.core.fem.coarse_mesh import coarsen_mesh
+from femubench.core.fem.frame import Factor, GroundSpring, Joint, Material, Member, Place, Support
 from femubench.core.fem.model import Dofs
 from femubench.core.fem.sections import Section
-from femubench.core.fit.extended_model import departure, extend_model, raw_residual
-from femubench.core.fit.modal_fit import Problem, state_at
-from femubench.core.fit.noise import Noise
-from femubench.core.fit.projection import Projection, Projector
-from femubench.core.fit.residuals import Data
-from femubench.core.fit.static_response import Basis, LargeProblem, enrich_problem, place_data
-from femubench.core.inference.effort import Effort
-from femubench.core.inference.examine import Examination, examine
-from femubench.core.inference.screening import _pulls, screen_hypotheses
-from femubench.core.modal.eigen import count_evaluations, modes_of
+from femubench.core.fit.projection import Projector
+from femubench.core.inference.coordinates import modes_for
+from femubench.core.inference.settings import settings
+from femubench.core.modal.eigen import DENSE_LIMIT, count_evaluations, modes_of
 from femubench.core.roles import Effect
 from femubench.fem import Frame
 from femubench.plugins.effects.added_mass import AddedMass
-from femubench.plugins.effects.attached_oscillator import AttachedOscillator
 from femubench.plugins.effects.axial_preload import AxialPreload
-from femubench.plugins.effects.joint_rotation import JointRotation
-from femubench.plugins.effects.local_stiffness_loss import LocalStiffnessLoss
-from femubench.plugins.effects.material import MemberMass, MemberStiffness, YoungsModulus
+from femubench.plugins.effects.material import MemberStiffness, YoungsModulus
 from femubench.plugins.effects.shear_deformation import ShearDeformation
 from femubench.plugins.effects.temperature import Temperature
 from tests.simulated import modes_at
 
 FrameBuilder = Callable[..., Frame]
-KNOWN: tuple[Effect, ...] = (AddedMass(), JointRotation(), MemberStiffness(), YoungsModulus())
 USED, HELD_OUT = 6, 3
 ALUMINIUM = Material(70e9, 0.33, 2700.0)
 
 
 @pytest.fixture(scope="module")
 def model(ladder: FrameBuilder) -> Model:
-    """Return the ladder with 40 elements a member, 837 dofs."""
-    frame = ladder("timoshenko", elements=40, polar=False, accelerometer=False)
+    """Return the ladder with 26 elements a member, 543 dofs."""
+    frame = ladder("timoshenko", elements=26, polar=False, accelerometer=False)
     return Model.of(replace(frame, rotary_inertia=True))
 
 
@@ -67,106 +60,15 @@ def measured(
     return replace(found, frequencies=frequencies, shapes=shapes)
 
 
-def posed_on(model: Model, hypotheses: tuple[Hypothesis, ...]) -> Problem:
-    measurement = measured(model, sensors_on_joints(model.frame_structure.frame), USED)
-    data = Data(measurement, np.zeros(0))
-    noise = Noise.of(np.zeros((len(data), 0)), 0.0)
-    return place_data(Basis.of(model, measurement), data, noise, hypotheses)
-
-
-def projected(problem: Problem, hypothesis: Hypothesis) -> Projection:
-    assert isinstance(problem, LargeProblem)
-    return Projector(problem.model, problem.common.modes.shapes)(hypothesis)
-
-
-def one(model: Model, effect: Effect, place: str) -> Hypothesis:
-    (found,) = (h for h in hypotheses_of(model, [effect]) if h.place == place)
-    return found
-
-
-class TestCoordinates:
-    @pytest.mark.parametrize(
-        ("effect", "place", "x"),
-        [
-            (JointRotation(), "E", [2.3]),
-            (LocalStiffnessLoss(), "AB/13", [2.0]),
-            (MemberMass(), "EF", [1.5]),
-            (AttachedOscillator(), "BE@0.5", [1.0, -0.4]),
-        ],
-    )
-    def test_the_spectrum_is_that_of_the_extended_model(
-        self, model: Model, effect: Effect, place: str, x: list[float]
-    ) -> None:
-        hypothesis = one(model, effect, place)
-        problem = posed_on(model, ())
-        own, parts = enrich_problem(problem, (projected(problem, hypothesis),))
-        state = state_at(own, parts, np.array(x))
-        exact = np.sort(solve_modes(extend_model(model, parts, np.array(x)), 24).eigenvalues)
-        assert_allclose(state.eigenvalues[3:12], exact[3:12], rtol=1e-6)
-        raw = raw_residual(own, extend_model(model, parts, np.array(x)))
-        assert_allclose(state.raw, raw, atol=1e-3)
-
-    def test_one_basis_has_the_slopes_of_all(self, model: Model) -> None:
-        """Forces at the sensors in the basis make readings right to first order."""
-        problem = posed_on(model, ())
-        step = np.array([1e-3])
-        for effect, place in ((LocalStiffnessLoss(), "AB/13"), (AddedMass(), "BC@0.25")):
-            part = projected(problem, one(model, effect, place))
-            first, second = (
-                raw_residual(problem, extend_model(model, (part,), k * step)) for k in (1.0, 2.0)
-            )
-            slope = state_at(problem, (part,), 1.5 * step).jacobian[:, 0]
-            assert_allclose(slope, (first - second) / step, atol=2e-3 * np.abs(slope).max())
-
-    @pytest.mark.parametrize(
-        ("effect", "place"), [(AttachedOscillator(), "BE@0.5"), (AddedMass(), "BC@0.25")]
-    )
-    def test_coordinates_of_many_are_those_of_each(
-        self, model: Model, effect: Effect, place: str
-    ) -> None:
-        """Screened in modes and its own response, as in all that a fit of it has."""
-        hypotheses = (one(model, MemberStiffness(), "AB"), one(model, effect, place))
-        problem = posed_on(model, hypotheses)
-        base = state_at(problem, (), np.zeros(0))
-        parts = [projected(problem, hypothesis) for hypothesis in hypotheses]
-        for part, found in zip(
-            parts, screen_hypotheses(problem, base, parts, Effort()), strict=True
-        ):
-            own, (there,) = enrich_problem(problem, (part,))
-            for x, residual in zip(found.grid, found.residuals, strict=True):
-                exact = state_at(own, (there,), x).residual
-                assert_allclose(residual, exact, atol=1e-2 * max(1.0, np.abs(exact).max()))
-
-    def test_what_follows_a_mode_is_condensed(self, model: Model) -> None:
-        """Forces of an oscillator as of the mass and spring that stand at a point of the model."""
-        hypothesis = one(model, AttachedOscillator(), "BE@0.5")
-        projector = Projector(model, solve_modes(model, 30).shapes)
-        near, values = np.eye(30)[:, 8:13], np.linspace(1.0, 3.0, 5) * 1e6
-        found = _pulls(projector, hypothesis, near, values, weighed=False)
-        part = projector(hypothesis)
-        factors = hypothesis.factors(found.grid)
-        forces = np.tensordot(found.shares, found.forces, axes=1)
-        for g in (0, len(found.grid) // 2, len(found.grid) - 1):
-            stiff, mass = (part.matrix(factors[g], mass=kind) for kind in (False, True))
-            assert stiff is not None
-            assert mass is not None
-            for j, value in enumerate(values):
-                dynamic = stiff - value * mass
-                inner, blunt = dynamic[30, 30], 0.05 * stiff[30, 30]
-                own = inner / (inner**2 + blunt**2)  # 1 / inner, but for a resonance
-                follow = own * (dynamic[30:, :30] @ near[:, j])
-                exact = dynamic[:30, :30] @ near[:, j] - dynamic[:30, 30:] @ follow
-                assert_allclose(forces[g, :, j], exact, atol=1e-9 * np.abs(exact).max())
-
-    def test_a_large_model_is_solved_once_for_fewer_modes(self, model: Model) -> None:
-        fresh, other = (Model.of(model.frame_structure.frame) for _ in range(2))
-        with count_evaluations() as counter:
-            many, few = (modes_of(fresh, count) for count in (24, 9))
-            assert counter.count == 1
-            more = modes_of(fresh, 30)
-            assert counter.count == 2
-        assert (len(many), len(few), len(more)) == (24, 9, 30)
-        assert_allclose(few.eigenvalues[3:], solve_modes(other, 9).eigenvalues[3:], rtol=1e-9)
+def test_a_large_model_is_solved_once_for_fewer_modes(model: Model) -> None:
+    fresh, other = (Model.of(model.frame_structure.frame) for _ in range(2))
+    with count_evaluations() as counter:
+        many, few = (modes_of(fresh, count) for count in (24, 9))
+        assert counter.count == 1
+        more = modes_of(fresh, 30)
+        assert counter.count == 2
+    assert (len(many), len(few), len(more)) == (24, 9, 30)
+    assert_allclose(few.eigenvalues[3:], solve_modes(other, 9).eigenvalues[3:], rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -200,68 +102,75 @@ def test_alike_elements_share_matrices_and_act_as_each_alone(model: Model, effec
         assert all(len(own) < elements / 4 for own in blocks.values())
 
 
-@pytest.fixture(scope="module")
-def found(model: Model) -> Callable[..., Examination]:
-    """Return what exact data of the ladder with an effect in it are found to show."""
-
-    def run(effect: Effect, place: str, value: float, *others: Effect) -> Examination:
-        truth = effect.extend(model, place, [value])
-        measurement = measured(truth, sensors_on_joints(model.frame_structure.frame), USED)
-        return examine(model, measurement, [*KNOWN, *others], tolerance=0.0, pairs=False)
-
-    return run
+def case_of(model: Model, measurement: Measurement, **more: Any) -> Case:
+    used, held_out = tuple(range(1, USED + 1)), tuple(range(USED + 1, USED + HELD_OUT + 1))
+    return Case("case", "", "", Path(), model, measurement, used, held_out, **more)
 
 
-class TestNaming:
-    def test_what_is_hidden_is_found(self, found: Callable[..., Examination]) -> None:
-        effect, place, value = JointRotation(), "E", 2000.0
-        best = found(effect, place, value).best
-        (part,) = best.parts
-        assert (part.hypothesis.name, part.hypothesis.place) == (effect.name, place)
-        assert part.hypothesis.values(best.fit.state.x[None])[0, 0] == pytest.approx(
-            value, rel=1e-2
-        )
-        # The prior pulls a little; the modes of a truncated space would leave thousands.
-        assert best.chi2 < 0.1
-        assert departure(best.fit) < 1e-2
+def test_a_frame_has_as_many_elements_as_leave_it_small(model: Model) -> None:
+    frame = model.frame_structure.frame
+    assert coarsen_mesh(model, model.size - 1, 25).size == model.size - 3 * len(frame.members)
+    assert coarsen_mesh(model, 100, 25) is model
+    factor = Factor("E", ("AB/26",), 0.9)
+    found = coarsen_mesh(Model.of(replace(frame, factors=(factor,))), DENSE_LIMIT, 2)
+    counts = {m.name: m.elements for m in found.frame_structure.frame.members}
+    (others,) = {count for name, count in counts.items() if name != "AB"}
+    assert counts["AB"] == 26
+    assert DENSE_LIMIT - 3 * len(frame.members) < found.size <= DENSE_LIMIT
+    assert others < 26
 
-    @pytest.mark.slow(5)
-    def test_damage_over_many_elements_is_set_apart_from_that_of_one(
-        self, model: Model, found: Callable[..., Examination]
-    ) -> None:
-        examination = found(MemberStiffness(), "AB", -0.3, LocalStiffnessLoss())
-        best = examination.best
-        assert (best.searched, best.place) == (("member-stiffness",), "AB")
-        shortlist = [p.hypothesis for p in examination.problem.space.projections]
-        assert len(shortlist) < sum({h.name: h.places for h in shortlist}.values())
-        assert {h.name for h in shortlist} > {effect.name for effect in KNOWN}
 
-    def test_a_model_of_matrices(self, model: Model) -> None:
-        """Groups of a stiffness matrix, no elements, no tolerances, no model error."""
-        n = model.size
-        xyz = np.column_stack([np.arange(n, dtype=float), np.zeros((n, 2))])
-        dofs = Dofs(np.arange(n), ("z",) * n, xyz)
-        geometry = MatrixGeometry(tuple(f"n{i}" for i in range(n)), dofs)
-        feet = zip("ACDF", (1e5, 2e5, 4e5, 7e5), strict=True)
-        springs = [GroundSpring(Place(joint=joint), "z", value) for joint, value in feet]
-        whole = model.attach((), springs).stiffness
-        weaker = MemberStiffness().extend(model, "BE", [-0.5]).stiffness
-        rung = sp.csc_array(2.0 * (model.stiffness - weaker))
-        held = sp.csc_array(whole - rung)
-        bare = Model(model.mass, held + rung, dofs, geometry, groups={"frame": held, "rung": rung})
-        truth = MemberStiffness().extend(bare, "group:rung", [0.6])
-        rows = np.arange(10, n, 47)
-        labels = tuple(f"s{i}" for i in rows)
-        sensors = Sensors(labels, xyz[rows], ("z",) * len(rows))
-        rng = np.random.default_rng(3)
-        measurement = measured(truth, sensors, USED + HELD_OUT, rng)
-        used, held_out = tuple(range(1, USED + 1)), tuple(range(USED + 1, USED + HELD_OUT + 1))
-        case = Case("case", "", "", Path(), bare, measurement, used, held_out, model_error=0.0)
-        diagnosis = diagnose(case, [MemberStiffness(), YoungsModulus()], pairs=False)
-        assert [(c.effect, c.place) for c in diagnosis.causes] == [
-            ("member-stiffness", "group:rung")
-        ]
-        assert diagnosis.causes[0].parameters[0].value == pytest.approx(0.6, rel=0.2)
+@pytest.mark.slow(5)
+def test_a_large_frame_is_diagnosed_on_fewer_elements(
+    model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    truth = MemberStiffness().extend(model, "AB", [-0.3])
+    measurement = measured(truth, sensors_on_joints(model.frame_structure.frame), USED + HELD_OUT)
+    monkeypatch.setattr("femubench.core.diagnosis.diagnose.DENSE_LIMIT", 200)
+    effects = [AddedMass(), MemberStiffness()]
+    found = diagnose(case_of(model, measurement), effects, faults=(), pairs=False)
+    (cause,) = found.causes
+    assert (found.verdict, cause.effect, cause.place) == ("named", "member-stiffness", "AB")
+    assert cause.parameters[0].value == pytest.approx(-0.3, rel=1e-2)
+    (note,) = (note for note in found.notes if "elements a member" in note)
+    assert "with 9 elements a member at most, in 186 degrees of freedom instead of 543" in note
+    assert "frequencies are 0.14 % off those with all elements" in note
+    assert found.extended.size == 186
+
+
+def test_too_many_degrees_of_freedom_are_refused() -> None:
+    n = settings.most_dofs + 1
+    dofs = Dofs(np.arange(n), ("z",) * n, np.zeros((n, 3)))
+    geometry = MatrixGeometry(tuple(map(str, range(n))), dofs)
+    stiffness = sp.csc_array(sp.diags_array(np.arange(1.0, n + 1.0)))
+    with pytest.raises(NotApplicable, match=r"2001 degrees of freedom.* 2000 .*model\.groups"):
+        modes_for(Model(sp.csc_array(sp.eye_array(n)), stiffness, dofs, geometry))
+
+
+@pytest.mark.slow(5)
+def test_a_model_of_matrices(model: Model) -> None:
+    """Groups of a stiffness matrix, no elements, no tolerances, no model error."""
+    n = model.size
+    xyz = np.column_stack([np.arange(n, dtype=float), np.zeros((n, 2))])
+    dofs = Dofs(np.arange(n), ("z",) * n, xyz)
+    geometry = MatrixGeometry(tuple(f"n{i}" for i in range(n)), dofs)
+    feet = zip("ACDF", (1e5, 2e5, 4e5, 7e5), strict=True)
+    springs = [GroundSpring(Place(joint=joint), "z", value) for joint, value in feet]
+    whole = model.attach((), springs).stiffness
+    weaker = MemberStiffness().extend(model, "BE", [-0.5]).stiffness
+    rung = sp.csc_array(2.0 * (model.stiffness - weaker))
+    held = sp.csc_array(whole - rung)
+    bare = Model(model.mass, held + rung, dofs, geometry, groups={"frame": held, "rung": rung})
+    truth = MemberStiffness().extend(bare, "group:rung", [0.6])
+    rows = np.arange(10, n, 31)
+    labels = tuple(f"s{i}" for i in rows)
+    sensors = Sensors(labels, xyz[rows], ("z",) * len(rows))
+    rng = np.random.default_rng(3)
+    measurement = measured(truth, sensors, USED + HELD_OUT, rng)
+    case = case_of(bare, measurement, model_error=0.0)
+    diagnosis = diagnose(case, [MemberStiffness(), YoungsModulus()], pairs=False)
+    assert [(c.effect, c.place) for c in diagnosis.causes] == [("member-stiffness", "group:rung")]
+    assert diagnosis.causes[0].parameters[0].value == pytest.approx(0.6, rel=0.2)
 
 
 def lattice(count: int, elements: int) -> Frame:

@@ -228,7 +228,7 @@ class TestCaseFolder:
 
 @pytest.mark.nightly
 def test_a_large_model_uses_all_modes_with_a_reference(damaged: tuple[Frame, Frame]) -> None:
-    """Of a large model some modes are solved, more of them for more data."""
+    """A large frame is diagnosed on fewer elements."""
     fine = replace(FRAME, members=tuple(replace(m, elements=30) for m in FRAME.members))
     built, _ = damaged
     case = replace(case_with(built, 3, built), model=Model.of(fine))

@@ -15,7 +15,7 @@ from femubench import Case, InputError, Measurement, Model, Sensors, read_case, 
 from femubench.core.case.writing import write_case
 from femubench.core.fem.model_parameters import matrix_slopes, with_values
 from femubench.core.fit.modal_fit import state_at
-from femubench.core.fit.static_response import Basis
+from femubench.core.inference.coordinates import modes_for
 from femubench.core.inference.model_error import error_slopes
 from femubench.core.run.jobs import missing_capability
 from femubench.effect import Parameter
@@ -234,7 +234,7 @@ def test_what_a_group_is_says_how_far_it_may_change() -> None:
 
 
 def test_groups_are_classes_of_model_error() -> None:
-    slopes = error_slopes(problem_of(MODEL, DATA, ()), Basis.of(MODEL, DATA).modes)
+    slopes = error_slopes(problem_of(MODEL, DATA, ()), modes_for(MODEL))
     step = 1e-4
     for kind, names, quantity in (
         ("group stiffness", ("left", "right"), "E"),

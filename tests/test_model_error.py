@@ -16,7 +16,7 @@ from femubench.core.diagnosis.tables import find_passengers
 from femubench.core.fem.frame import Factor, JointSpring, Place
 from femubench.core.fit.modal_fit import Problem, State, fit, state_at
 from femubench.core.fit.noise import Noise
-from femubench.core.fit.static_response import Basis
+from femubench.core.inference.coordinates import modes_for
 from femubench.core.inference.examine import slopes_with
 from femubench.core.inference.model_error import (
     Inadequacy,
@@ -45,7 +45,7 @@ def problem() -> Problem:
 
 @pytest.fixture(scope="module")
 def slopes(problem: Problem) -> dict[str, FloatArray]:
-    return error_slopes(problem, Basis.of(MODEL, TEST).modes)
+    return error_slopes(problem, modes_for(MODEL))
 
 
 def raw(frame: Frame) -> FloatArray:
@@ -130,7 +130,7 @@ def test_slopes_with_a_cause_are_those_of_the_frame_with_it(
     slope = (4.0 * half - whole) / step
     expected = column(slopes_with(given))
     np.testing.assert_allclose(slope, expected, atol=2e-3 * np.abs(expected).max())
-    drawn = column(error_slopes(given.problem, Basis.of(MODEL, TEST).modes))
+    drawn = column(error_slopes(given.problem, modes_for(MODEL)))
     assert np.abs(expected - drawn).max() > 0.02 * np.abs(drawn).max()
 
 

@@ -14,11 +14,9 @@ from femubench.core.change.hypothesis import Hypothesis
 from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.reading import Reading
 from femubench.core.fem.model import Model
-from femubench.core.fit.modal_basis import nominal_space
 from femubench.core.fit.modal_fit import Fit, Problem, State, signed_hz, state_at
-from femubench.core.fit.static_response import LargeProblem
+from femubench.core.inference.coordinates import modes_for, place_data
 from femubench.core.inference.settings import settings
-from femubench.core.modal.eigen import modes_of
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 
@@ -224,14 +222,8 @@ def outlook_of(problem: Problem, found: Fit, points: Points) -> Outlook:
     """
     # In coordinates of our own: those of the problem are not kept as motions of the dofs.
     hypotheses = [part.hypothesis for part in found.parts]
-    if isinstance(problem, LargeProblem):
-        enriched = problem.common.enrich(problem.space, found.parts)
-        space, shapes = enriched.space, enriched.vectors
-    else:
-        modes = modes_of(problem.model)
-        shapes = modes.shapes[:, np.argsort(~modes.rigid, kind="stable")]
-        space = nominal_space(problem.model, modes, problem.data.measurement.sensors, hypotheses)
-    own = replace(problem, space=space)
-    state = state_at(own, space.projections, found.state.x, every=True)
+    space = place_data(problem.model, problem.data, problem.noise, hypotheses).space
+    state = state_at(replace(problem, space=space), space.projections, found.state.x, every=True)
     root = la.cholesky(found.covariance, lower=True) if hypotheses else np.zeros((0, 0))
+    shapes = modes_for(problem.model).shapes
     return Outlook(state, np.asarray(root), points.rows(problem.model) @ shapes)

@@ -30,7 +30,6 @@ _STIFF = 0.01
 _TYPICAL = 0.6
 _NOTHING = 1e-12
 _SIZES, _FREQUENCIES = (0.3, 1.5), 15
-_ALWAYS = 1e-6  # of a factor, from which on what is there at x = 0 counts
 
 
 @dataclass(frozen=True, repr=False)
@@ -120,20 +119,6 @@ class Hypothesis:
         """Return the factors of the terms at a typical magnitude, (n_terms,)."""
         low, high = self.bounds
         return np.asarray(self.factors(np.clip(np.full(len(low), _TYPICAL), low, high)[None])[0])
-
-    @cached_property
-    def directions(self) -> tuple[FloatArray, FloatArray]:
-        """Return coordinates, (g, k), and factors of the terms, (g, n_terms), for first order.
-
-        What is there at any magnitude, such as the arms of joints, may be no small change on a fine
-        mesh, and first order overrates it: the rest is tried with and without it.
-        """
-        grid = magnitudes(self)
-        factors = self.factors(np.vstack([grid, np.zeros((1, grid.shape[1]))]))
-        factors, always = factors[:-1], factors[-1:]
-        if np.abs(always).max() <= _ALWAYS:
-            return grid, factors
-        return np.vstack([grid, grid]), np.vstack([factors, factors - always])
 
     def values(self, x: FloatArray) -> FloatArray:
         """Return parameter values of coordinates, (g, k) both."""

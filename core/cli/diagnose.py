@@ -24,19 +24,6 @@ if TYPE_CHECKING:
 _STYLES = {".html": "html", ".md": "markdown"}
 
 
-# The ranges of click let nan pass.
-def _check_share(value: float) -> float:
-    if not 0.0 <= value <= 0.2:
-        raise ValueError(f"{value!r} is no number >= 0 and <= 0.2")
-    return value
-
-
-def _check_seconds(value: float) -> float:
-    if not value >= 0.0:
-        raise ValueError(f"{value!r} is no number >= 0")
-    return value
-
-
 @click.command("diagnose")
 @click.argument("case")
 @options.json_file("Write the diagnosis as JSON; - prints it.", options.OUTPUT_OR_SCREEN)
@@ -44,14 +31,14 @@ def _check_seconds(value: float) -> float:
     "Write the extended model as a case folder, which must be new or empty.", metavar="FOLDER"
 )
 @click.option(
-    "--tolerance", type=float, callback=options.read_with(_check_share), metavar="X",
+    "--tolerance", type=float, metavar="X",
     help="Ordinary relative scatter of every element; 0 for none. Default: the case's.",
 )  # fmt: skip
 @options.of_fields(RunOptions, "drawing", default="")
 @click.option("--no-pairs", is_flag=True, help="Look for single effects only, which is quicker.")
 @click.option("--no-faults", is_flag=True, help="Take data and input as they are.")
 @click.option(
-    "--budget", type=float, callback=options.read_with(_check_seconds), metavar="SECONDS",
+    "--budget", type=float, metavar="SECONDS",
     help="End after so long with what was found until then; a note says so. Default: no end.",
 )  # fmt: skip
 @click.option(

@@ -43,12 +43,7 @@ from femubench.core.fit.modal_fit import Problem, State, fit, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.projection import Projection
 from femubench.core.fit.residuals import Data
-from femubench.core.fit.static_response import (
-    Basis,
-    LargeProblem,
-    enrich_problem,
-    place_data,
-)
+from femubench.core.inference.coordinates import modes_for, place_data
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import zero_tolerance
 from femubench.core.modal.group_prior import GroupPriors
@@ -484,8 +479,8 @@ def _pose(
     Arguments:
         every: all measured modes, which the coordinates serve.
     """
-    basis, bias = Basis.of(model, every), mesh_bias(model, 2 * len(every) + settings.spare_modes)
-    still = basis.modes.rigid | (basis.modes.eigenvalues <= zero_tolerance(basis.modes))
+    modes, bias = modes_for(model), mesh_bias(model, 2 * len(every) + settings.spare_modes)
+    still = modes.rigid | (modes.eigenvalues <= zero_tolerance(modes))
     data = Data(measurement, np.zeros(0) if bias is None else bias, int(still.sum()))
     mode, _ = data.shape_rows
     largest = np.abs(data.shapes).max(axis=0, initial=0.0)
@@ -494,9 +489,7 @@ def _pose(
     rest[: len(measurement)] = rest_f * measurement.frequencies
     rest[len(measurement) :][: len(mode)] = rest_s * largest[mode]
     noise = Noise(np.diag(np.hypot(1.0, rest / data.std)))
-    problem = place_data(basis, data, noise, hypotheses)
-    if isinstance(problem, LargeProblem):
-        return enrich_problem(problem, [problem.common.projector(h) for h in hypotheses])
+    problem = place_data(model, data, noise, hypotheses)
     return problem, problem.space.projections
 
 

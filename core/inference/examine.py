@@ -26,7 +26,7 @@ from femubench.core.fit.mesh_error import mesh_bias
 from femubench.core.fit.modal_fit import Fit, Problem, State, fit, log_evidence, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
-from femubench.core.fit.static_response import Basis, LargeProblem, place_data
+from femubench.core.inference.coordinates import modes_for, place_data
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.model_error import (
     Fitted,
@@ -38,7 +38,6 @@ from femubench.core.inference.model_error import (
     scatter_slopes,
 )
 from femubench.core.inference.posterior import Explanation, Posterior, by_weight
-from femubench.core.inference.screening import with_shortlist
 from femubench.core.inference.search import Found, Search, adequacy
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import Modes, zero_tolerance
@@ -166,7 +165,6 @@ class Examination:
 
     def problem_of(self, explanation: Explanation) -> Problem:
         """Return the data in the coordinates of an explanation's textbook effects."""
-        # Of a large model every explanation has coordinates of its own.
         return replace(explanation.fit.state.problem, offset=0.0)
 
 
@@ -242,24 +240,21 @@ def examine(
     with threadpool_limits(1):
         effects = tuple(effects)
         hypotheses, known = _candidates(model, effects, reference)
-        basis = Basis.of(model, measurement)
-        problem, slopes = pose_problem(model, measurement, hypotheses, tolerance, basis)
+        problem, slopes = pose_problem(model, measurement, hypotheses, tolerance)
         before = None if reference is None else before_of(problem, reference)
         explanations: list[Explanation] = []
         error = None
         if width > 0.0:
-            error = model_error_of(problem, basis, before, width, log(1.0 - beam))
+            error = model_error_of(problem, before, width, log(1.0 - beam))
             with effort.scope():
                 explanations = search_explanations(problem, error, known, pairs, effort)
-        own = replace(problem, noise=beam_noise(basis, slopes, before, tolerance, log(beam)))
+        own = replace(problem, noise=beam_noise(slopes, before, tolerance, log(beam)))
         slopes = slopes[: len(measurement)].copy()  # those of shapes fill the memory
         floor = max((e.log_weight for e in explanations), default=-np.inf) - settings.lag
         more, atlas = Search(own, known, pairs=pairs, floor=floor, effort=effort).run()
     posterior = Posterior.of([*explanations, *more])
-    basis.solver.forget()
-    basis.forget()
     return Examination(
-        *(model, own, slopes, tolerance, posterior, tuple(atlas), basis.modes),
+        *(model, own, slopes, tolerance, posterior, tuple(atlas), modes_for(model)),
         error,
         reference,
     )
@@ -381,37 +376,33 @@ def slopes_with(state: State) -> dict[str, FloatArray]:
     """Return what `error_slopes` does of the model with the causes of a state in it.
 
     The same perturbations change what a cause does, which is no error that two states do not share.
-    Nothing for a large model, and where the causes make no model.
+    Nothing where the causes make no model.
     """
     problem = state.problem
     with suppress(FemubenchError):
-        if not isinstance(problem, LargeProblem):
-            model = extend_model(problem.model, state.parts, state.x)
-            basis = Basis.of(model, problem.data.measurement)
-            own = place_data(basis, problem.data, problem.noise, ())
-            return {**error_slopes(own, basis.modes), "general": general_slopes(state)}
+        model = extend_model(problem.model, state.parts, state.x)
+        own = place_data(model, problem.data, problem.noise, ())
+        return {**error_slopes(own, modes_for(model)), "general": general_slopes(state)}
     return {}
 
 
 def model_error_of(
-    problem: Problem, basis: Basis, before: State | None, width: float, log_prior: float
+    problem: Problem, before: State | None, width: float, log_prior: float
 ) -> Inadequacy:
     """Return the model error of a problem, and of a reference where there is one."""
-    present = error_slopes(problem, basis.modes)
-    reference = None if before is None else error_slopes(before.problem, basis.modes)
+    modes = modes_for(problem.model)
+    present = error_slopes(problem, modes)
+    reference = None if before is None else error_slopes(before.problem, modes)
     residual = np.zeros(0) if before is None else before.raw
     widths = {name: width * value for name, value in class_widths().items()}
     unshared = settings.width_between_states
     return Inadequacy.of(present, reference, residual, widths, unshared, log_prior)
 
 
-def beam_noise(
-    basis: Basis, slopes: FloatArray, before: State | None, tolerance: float, weight: float
-) -> Noise:
+def beam_noise(slopes: FloatArray, before: State | None, tolerance: float, weight: float) -> Noise:
     """Return the noise of a structure that is a beam model but for the scatter of its elements.
 
     Arguments:
-        basis: of the nominal model.
         slopes: sensitivities of the data to the scatter, (n_data, n_scatter).
         before: the nominal model compared with the reference, if any.
         tolerance: standard deviation of the scatter.
@@ -419,27 +410,23 @@ def beam_noise(
     """
     rows, known = slopes, np.zeros(0)
     if before is not None:
-        earlier = scatter_slopes(before.problem, basis.modes)[:, : slopes.shape[1]]
+        earlier = scatter_slopes(before.problem, modes_for(before.problem.model))
+        earlier = earlier[:, : slopes.shape[1]]
         rows, known = np.vstack([earlier, slopes]), before.raw
     covariance = np.eye(len(rows)) + tolerance**2 * (rows @ rows.T)
     return condition_noise(covariance, known, weight, beam=True)
 
 
 def pose_problem(
-    model: Model,
-    measurement: Measurement,
-    hypotheses: Iterable[Hypothesis],
-    tolerance: float,
-    basis: Basis | None = None,
+    model: Model, measurement: Measurement, hypotheses: Iterable[Hypothesis], tolerance: float
 ) -> tuple[Problem, FloatArray]:
     """Return data, noise and modal coordinates, and the sensitivities behind the noise."""
     if len(measurement) == 0:
         raise NotApplicable("there is no used mode")
-    if basis is None:
-        basis = Basis.of(model, measurement)
+    modes = modes_for(model)
     bias = mesh_bias(model, 2 * len(measurement) + settings.spare_modes)
-    still = basis.modes.rigid | (basis.modes.eigenvalues <= zero_tolerance(basis.modes))
+    still = modes.rigid | (modes.eigenvalues <= zero_tolerance(modes))
     data = Data(measurement, np.zeros(0) if bias is None else bias, int(still.sum()))
-    plain = place_data(basis, data, Noise(np.eye(len(data))), tuple(hypotheses))
-    slopes = scatter_slopes(plain, basis.modes) if tolerance else np.zeros((len(data), 0))
-    return with_shortlist(replace(plain, noise=Noise.of(slopes, tolerance))), slopes
+    plain = place_data(model, data, Noise(np.eye(len(data))), tuple(hypotheses))
+    slopes = scatter_slopes(plain, modes) if tolerance else np.zeros((len(data), 0))
+    return replace(plain, noise=Noise.of(slopes, tolerance)), slopes

@@ -31,8 +31,8 @@ from femubench.core.fit.extended_model import raw_residual
 from femubench.core.fit.modal_fit import State, log_evidence, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
-from femubench.core.fit.static_response import Basis, place_data
 from femubench.core.inference.charge import Charge, Repaired, charges_of
+from femubench.core.inference.coordinates import place_data
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.examine import (
     Examination,
@@ -204,7 +204,6 @@ class _Drawn:
     Arguments:
         model, measurement: with the faults corrected that were found before.
         reference, width: as in `inquire`.
-        basis: modes of the model, where they are known.
     """
 
     def __init__(
@@ -213,19 +212,17 @@ class _Drawn:
         measurement: Measurement,
         reference: Measurement | None,
         width: float,
-        basis: Basis | None = None,
     ) -> None:
         self.model, self.measurement = model, measurement
         self.reference, self.width = reference, width
-        self.basis = Basis.of(model, measurement) if basis is None else basis
         self._without: dict[Charge, _Drawn] = {}
 
     @cached_property
     def state(self) -> State:
         """Return the prediction, and the noise with scales that suit these data best."""
-        problem, _ = pose_problem(self.model, self.measurement, (), 0.0, self.basis)
+        problem, _ = pose_problem(self.model, self.measurement, (), 0.0)
         before = None if self.reference is None else before_of(problem, self.reference)
-        error = model_error_of(problem, self.basis, before, self.width, 0.0)
+        error = model_error_of(problem, before, self.width, 0.0)
         found = state_at(problem, (), np.zeros(0))
         noise = error.noise(error.fit(found))
         return replace(found, problem=replace(problem, noise=noise))
@@ -243,7 +240,7 @@ class _Drawn:
 
     def add_causes(self, explanation: Explanation) -> _Drawn:
         """Return the same with causes in the model, whose sizes are free to first order."""
-        other = _Drawn(self.model, self.measurement, self.reference, self.width, self.basis)
+        other = _Drawn(self.model, self.measurement, self.reference, self.width)
         state = explanation.fit.state
         factor, moved = state.problem.noise.factor, state.slopes @ state.x
         total = factor @ factor.T + state.slopes @ state.slopes.T
@@ -255,10 +252,7 @@ class _Drawn:
     def remove_fault(self, charge: Charge) -> _Drawn:
         """Return the same without a fault."""
         if charge not in self._without:
-            model, measurement = charge.repaired
-            basis = self.basis if model is self.model else None
-            other = _Drawn(model, measurement, self.reference, self.width, basis)
-            self._without[charge] = other
+            self._without[charge] = _Drawn(*charge.repaired, self.reference, self.width)
         return self._without[charge]
 
     def exactly(self, charge: Charge, gain: float) -> tuple[Charge, float]:
@@ -468,7 +462,7 @@ def _half_chi2(charge: Charge | None, model: Model, measurement: Measurement) ->
             model, measurement = charge.repaired
         data = Data(measurement, np.zeros(0))
         noise = Noise.of(np.zeros((len(data), 0)), 0.0)
-        problem = place_data(Basis.of(model, measurement), data, noise, ())
+        problem = place_data(model, data, noise, ())
         return 0.5 * float(np.square(state_at(problem, (), np.zeros(0)).raw).sum())
     except (FemubenchError, la.LinAlgError):
         return np.inf

@@ -16,13 +16,12 @@ from femubench.core.change.hypothesis import (
 )
 from femubench.core.fit.extended_model import check_joint_fit, extend_model
 from femubench.core.fit.modal_fit import Fit, Problem, State, fit, log_evidence, state_at
-from femubench.core.fit.projection import Projection
-from femubench.core.fit.static_response import Basis, LargeProblem, enrich_problem, place_data
+from femubench.core.fit.projection import Projection, Projector
+from femubench.core.inference.coordinates import modes_for, place_data
 from femubench.core.inference.effort import Effort, of_a_search
 from femubench.core.inference.grid_search import Screened, likely, residuals_at, screen
 from femubench.core.inference.posterior import Explanation, by_weight
 from femubench.core.inference.prior import Base, selection_cost, textbook_bases
-from femubench.core.inference.screening import rebase_problem, screen_hypotheses, with_shortlist
 from femubench.core.inference.settings import settings
 from femubench.core.roles import Effect
 from femubench.core.ties import in_order, least
@@ -140,13 +139,11 @@ class Search:
                     break
                 with self.effort.piece("values"):
                     explanations += self.split(best)
-        if isinstance(self.problem, LargeProblem):
-            explanations = self.borne_out(explanations)
         return explanations, found
 
     def bare(self, base: Base) -> Explanation:
         """Return a textbook set with nothing on top, in the coordinates of the model as drawn."""
-        state = state_at(*enrich_problem(self.problem, base.parts), base.x)
+        state = state_at(self.problem, base.parts, base.x)
         alone = replace(state, parts=(), x=np.zeros(0))
         return Explanation(base, Fit(alone, log_evidence(alone)), self.names)
 
@@ -168,8 +165,8 @@ class Search:
             known = {p.hypothesis.cause: p for p in item.problem.space.projections}
             if item.base.names == book or not kept or any(key not in known for key, _ in kept):
                 continue
-            problem, parts = enrich_problem(item.problem, [known[key] for key, _ in kept])
-            fitted = fit(problem, parts, np.concatenate([x for _, x in kept]))
+            parts = [known[key] for key, _ in kept]
+            fitted = fit(item.problem, parts, np.concatenate([x for _, x in kept]))
             if fitted is not None:
                 result.append(Explanation(item.base, fitted, self.names))
         return result
@@ -177,11 +174,11 @@ class Search:
     def split(self, explanation: Explanation) -> list[Explanation]:
         """Return an explanation with more values at one of its places, where there are more."""
         result, problem = [], replace(explanation.fit.state.problem, offset=0.0)
+        project = Projector(problem.model, modes_for(problem.model).shapes)
         for i, part in enumerate(explanation.parts):
-            model = problem.model
-            for own in finer(part.hypothesis, model, self.effects):
+            for own in finer(part.hypothesis, problem.model, self.effects):
                 parts = list(explanation.parts)
-                parts[i] = Basis.of(model, problem.data.measurement).projector(own)
+                parts[i] = project(own)
                 fitted = _fit_from_grid(problem, parts, i, explanation.fit)
                 self.coarse[id(own)] = id(part.hypothesis)
                 result += self.bear_out(explanation.base, fitted)
@@ -191,25 +188,13 @@ class Search:
         """Return the explanation by a fit that its own model bears out, if it is any.
 
         Several causes far behind count for nothing either way; one may have scales of its own.
-        Of a large model the best explanation alone is solved anew.
         """
-        if found is not None and not isinstance(found.state.problem, LargeProblem):
+        if found is not None:
             ahead = Explanation(base, found, self.names).log_weight > self.highest - settings.lag
             found = check_joint_fit(found) if ahead or len(found.parts) < 2 else found
         result = [] if found is None else [Explanation(base, found, self.names)]
         self.highest = max([self.highest, *(e.log_weight for e in result)])
         return result
-
-    def borne_out(self, explanations: list[Explanation]) -> list[Explanation]:
-        """Return explanations, the best cause fitted until its own model agrees with it."""
-        best = _best(explanations)
-        if not best.parts:
-            return explanations
-        if isinstance(best.fit.state.problem, LargeProblem):
-            best.fit.state.problem.common.forget()  # a solution takes its room
-        others = [e for e in explanations if e is not best]
-        borne = check_joint_fit(best.fit)
-        return others if borne is None else [*others, replace(best, fit=borne)]
 
     def promising(self, bare: Sequence[Explanation], plain: Found) -> list[Base]:
         """Return the textbook sets that come nearer to the data than the model as drawn."""
@@ -229,7 +214,7 @@ class Search:
             problem = self.ground(base) if base.parts else self.problem
             start = fit(problem, (), np.zeros(0))
             assert start is not None
-            atlas = screen_hypotheses(problem, start.state, problem.space.projections, self.effort)
+            atlas = screen(problem, start.state, problem.space.projections)
             fits = self.refine(problem, start, atlas)
             explanations = [Explanation(base, item, self.names) for item in (start, *fits)]
             self.highest = max(self.highest, _best(explanations).log_weight)
@@ -250,8 +235,7 @@ class Search:
         """
         model = extend_model(self.problem.model, base.parts, base.x)
         known = hypotheses_of(model, by_themselves(self.effects))
-        basis = Basis.of(model, self.problem.data.measurement)
-        return with_shortlist(place_data(basis, self.problem.data, self.problem.noise, known))
+        return place_data(model, self.problem.data, self.problem.noise, known)
 
     def refine(self, problem: Problem, start: Fit, screened: Sequence[Screened]) -> list[Fit]:
         """Return exact fits of the hypotheses that the atlas does not rule out."""
@@ -276,9 +260,8 @@ class Search:
             if fits and self.effort.stops():
                 break
             self.effort.step(number - 1, len(queue))
-            own, parts = enrich_problem(problem, (item.projection,))
             give_up = best + settings.given_up if id(item) in known else np.inf
-            result = fit(own, parts, x, give_up=give_up)
+            result = fit(problem, (item.projection,), x, give_up=give_up)
             if result is not None:
                 fits.append(result)
                 best = min(best, result.state.cost)
@@ -342,7 +325,9 @@ class Search:
     ) -> list[Explanation]:
         problem, state = found.problem, seed.fit.state
         floor = 0.5 * selection_cost(self.names, self.places)
-        above = rebase_problem(worthwhile(found, seed, settings.promise_share * floor), seed.fit)
+        above = worthwhile(found, seed, settings.promise_share * floor)
+        space = above.space.rebase(seed.parts, state.x)
+        above = replace(above, space=space, offset=state.problem.offset)
         start = fit(above, (), np.zeros(0))
         assert start is not None
         originals = {id(p.hypothesis): p for p in problem.space.projections}
@@ -373,7 +358,7 @@ class Search:
         if key in tried:
             return None
         tried.add(key)
-        return fit(*enrich_problem(problem, parts), np.concatenate([first, last]))
+        return fit(problem, parts, np.concatenate([first, last]))
 
     def swap(
         self, found: Found, pair: Explanation, tried: set[tuple[object, ...]]
@@ -384,8 +369,7 @@ class Search:
             counts = [len(p.hypothesis.parameters) for p in pair.parts]
             first = sum(counts[:i])
             x = pair.fit.state.x[first : first + counts[i]]
-            own, parts = enrich_problem(found.problem, (part,))
-            alone = fit(own, parts, x, steps=0)
+            alone = fit(found.problem, (part,), x, steps=0)
             if alone is not None:
                 seed = Explanation(found.base, alone, self.names)
                 result += self.grow(found, seed, tried)
@@ -414,17 +398,17 @@ def _fit_from_grid(
     first = sum(len(part.hypothesis.parameters) for part in parts[:new])
     last = first + len(known.parts[new].hypothesis.parameters)
     before, _, after = np.split(known.state.x, [first, last])
-    own, parts = enrich_problem(problem, parts)
-    there = replace(own.space, projections=(parts[new],))
+    there = replace(problem.space, projections=(parts[new],))
     # The others stay as they are: in the modes with them in it one hypothesis is tried alone.
     there = there.rebase((*parts[:new], *parts[new + 1 :]), np.append(before, after))
-    few = there.condense(there.projections, own.compared)
+    few = there.condense(there.projections, problem.compared)
     grid = parts[new].hypothesis.grid
-    grid, raw = residuals_at(replace(own, space=few.space), few.parts[0], grid)
+    grid, raw = residuals_at(replace(problem, space=few.space), few.parts[0], grid)
     if not len(grid):
         return None
-    cost = np.square(own.noise.residual(raw + own.offset)).sum(axis=1) + np.square(grid).sum(axis=1)
-    return fit(own, parts, np.concatenate([before, grid[least(cost)], after]))
+    residual = problem.noise.residual(raw + problem.offset)
+    cost = np.square(residual).sum(axis=1) + np.square(grid).sum(axis=1)
+    return fit(problem, parts, np.concatenate([before, grid[least(cost)], after]))
 
 
 def _best(explanations: Sequence[Explanation]) -> Explanation:
@@ -440,8 +424,6 @@ def worthwhile(found: Found, seed: Explanation, least: float) -> Problem:
         least: what chi-square must promise to fall by.
     """
     problem = found.problem
-    if isinstance(problem, LargeProblem):
-        return problem
     taken = {id(part.hypothesis) for part in seed.parts}
     others = [item for item in found.screened if id(item.projection.hypothesis) not in taken]
     still = found.explanations[0].fit.state.residual

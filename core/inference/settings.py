@@ -375,7 +375,7 @@ class Settings:
     )
     advised: int = _cost(8, "rows", "of advice, and explanations that it parts")
     points: int = _cost(48, "points", "of a structure where a test is thought through")
-    # The atlas, and large models.
+    # The atlas.
     responses: int = _cost(
         6, "vectors", "responses of the higher modes to a hypothesis; half where those suffice"
     )
@@ -385,13 +385,8 @@ class Settings:
     long_step: float = _cost(
         1.5, "prior deviations", "between neighbours on a grid, above which modes change places"
     )
-    large_shortlist: int = _cost(
-        240, "hypotheses", "of a large model in its coordinates; a quarter with a seed"
-    )
-    large_sizes: tuple[float, ...] = _cost(
-        (0.12, 0.5, 1.3, 2.6), "prior deviations", "at which each of them is tried"
-    )
-    large_slack: float = _cost(0.1, "of the prior", "a ranking by first order must not mind sizes")
+    most_dofs: int = _cost(2000, "dofs", "all of whose modes are solved for")
+    fewest_elements: int = _cost(2, "elements", "a member, below which a frame has more dofs")
     work_of_pieces: tuple[float, ...] = _cost(
         (0.35, 0.018, 1.0, 0.45, 1.0, 0.4, 0.35, 0.3),
         "searches for single causes",

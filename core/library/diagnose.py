@@ -57,7 +57,8 @@ def diagnose(
         plugins: installed plugins whose effects and faults are tried too; they are imported here.
 
     Raises:
-        InputError: when the case or an effect is unknown, or the case lacks what it takes.
+        InputError: when the case or an effect is unknown, the case lacks what it takes, or a
+            number is out of range.
         ModelError: when the model has no modes.
 
     Examples:
@@ -99,6 +100,8 @@ def diagnosis_of(
     """
     if budget is not None and not budget >= 0.0:
         raise InputError(f"budget = {budget!r}", expected="seconds >= 0")
+    if tolerance is not None and not 0.0 <= tolerance <= 0.2:
+        raise InputError(f"tolerance = {tolerance!r}", expected="a number >= 0 and <= 0.2")
     wanted = _effects(effects, plugins, others)
     read = one_case(case, plugins)
     if tolerance is not None:

@@ -354,6 +354,15 @@ def modes_of(model: Model, count: int | None = None) -> Modes:
     return modes.take(np.arange(min(wanted, len(modes)))) if small else modes
 
 
+def all_modes(model: Model) -> Modes:
+    """Return all modes of a model, solved densely whatever its size, and only once.
+
+    Raises:
+        ModelError: when the model has no modes.
+    """
+    return once_for(model, "modes", lambda: _solved(model, None, sparsely=False))
+
+
 def modes_up_to(model: Model, hertz: float, count: int = _MANY) -> Modes:
     """Return the modes of a large model up to a frequency and perhaps more, half of all at most.
 

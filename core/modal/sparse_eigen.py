@@ -98,11 +98,6 @@ class ShiftedModel:
         solved = self._factor.solve(basis)
         return solved, np.diag(1.0 / values) + basis.T @ solved
 
-    def forget(self) -> None:
-        """Let the factors go; they are made anew where they are wanted."""
-        for name in ("_woodbury", "_factor", "_cholesky"):
-            vars(self).pop(name, None)
-
     def solve(self, right: FloatArray) -> FloatArray:
         """Return (K - shift M)^-1 @ right, (n,) or (n, m)."""
         answer = self._factor.solve(right)

@@ -28,6 +28,7 @@ _SMALLEST_STEP = 1e-9
 _ROUNDING = 1e-10  # relative, of a modal quantity: some ten times what linear algebra leaves
 _NO_GAIN = 1e-6
 _PATIENCE = 3
+_HALVINGS = 8  # of a step that makes the cost grow
 _AWAY = 0.5  # prior deviations
 
 
@@ -50,7 +51,6 @@ class UpdateOptions:
         cost_tolerance: or when three steps in a row lower the cost by no more than this share:
             parameters that hardly matter drift on for ever.
         max_step: longest step of a scaled parameter in one iteration.
-        halvings: how often a step that makes the cost grow is halved.
         restarts: how often the end is left, by half a prior deviation in a random direction, and
             the iteration repeated: a saddle, such as that of a symmetric model, is left.
     """
@@ -64,7 +64,6 @@ class UpdateOptions:
     tolerance: float = 1e-6
     cost_tolerance: float = 1e-4
     max_step: float = 0.5
-    halvings: int = 8
     restarts: int = 0
 
     def __post_init__(self) -> None:
@@ -138,7 +137,7 @@ class Iteration:
         optimum, too short for the cost to show, are taken on every processor.
         """
         precision = self.parametric.precision
-        for halving in range(self.options.halvings + 1):
+        for halving in range(_HALVINGS + 1):
             q = np.clip(point.q + step / 2**halving, self.parametric.lower, self.parametric.upper)
             if np.abs(q - point.q).max() < _SMALLEST_STEP:
                 return None

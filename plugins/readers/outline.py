@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from femubench.fem import FloatArray, IntArray
+from femubench.plugins.readers.shells import ALIKE
 
-_TURNS = np.cos(np.deg2rad(20.0))  # of normals of neighbouring faces, as a knot of shells
 # Corners of the faces by the number of corners of an element and whether it is a solid.
 _FACES = {
     (4, True): ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
@@ -23,7 +23,7 @@ _FACES = {
 
 
 def find_outline(elements: Iterable[tuple[bool, IntArray]], xyz: FloatArray) -> IntArray:
-    """Return the edges at which the surface of a body ends or turns by 20 degrees, (e, 2).
+    """Return the edges at which the surface of a body ends or turns by `ALIKE`, (e, 2).
 
     Arguments:
         elements: whether solids, and the corners of some of one kind, (n, 3), (n, 4), (n, 6) or
@@ -56,4 +56,4 @@ def find_outline(elements: Iterable[tuple[bool, IntArray]], xyz: FloatArray) -> 
     number = np.diff(np.append(starts, len(own)))
     other = own[np.minimum(starts + 1, len(own) - 1)]
     along = np.abs(np.einsum("ij,ij->i", normals[own[starts]], normals[other]))
-    return np.asarray(edges[(number != 2) | (along < _TURNS)])
+    return np.asarray(edges[(number != 2) | (along < ALIKE)])

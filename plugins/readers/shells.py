@@ -75,7 +75,7 @@ _QUARTERS = {
     3: [((0.0, 0.0), 0.5), ((0.5, 0.0), 0.5), ((0.0, 0.5), 0.5), ((0.5, 0.5), -0.5)],
     4: [((x, y), 0.5) for x in (0.0, 0.5) for y in (0.0, 0.5)],
 }
-_ALIKE = np.cos(np.deg2rad(20.0))  # of normals: elements that share a line of nodes
+ALIKE = np.cos(np.deg2rad(20.0))  # of normals: elements that share a line of nodes
 _STRAIGHT = 1e-9  # of a unit vector: what rounding leaves of it
 
 
@@ -429,7 +429,7 @@ def _parts(
     while left:
         number, _, normal = left[0]
         alike = [
-            own @ normal > _ALIKE
+            own @ normal > ALIKE
             and thickness[other] == thickness[number]
             and elements[other][0] == elements[number][0]
             for other, _, own in left

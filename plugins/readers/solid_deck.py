@@ -16,7 +16,7 @@ from femubench import InputError, Model
 from femubench.fem import FloatArray, MatrixGeometry, SparseArray, matrix_model
 from femubench.modal import GroupPriors
 from femubench.plugins.readers import nodes, shells, solid_elements
-from femubench.plugins.readers.attachments import Attachments, NodeMotions
+from femubench.plugins.readers.attachments import Attachments, NodeMotions, rigid
 from femubench.plugins.readers.nodes import Point
 from femubench.plugins.readers.outline import find_outline
 from femubench.plugins.readers.reading import DIRECTIONS, needs
@@ -292,11 +292,8 @@ def _tie(
     """
     arms = np.array([places[str(n)] for n in around]) - np.array(places[str(node)])
     size = float(np.abs(arms).max())
-    body = np.zeros((len(around), 3, 6))
-    body[:, range(3), range(3)] = 1.0
-    for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):  # u = t + theta x arm
-        body[:, a, 3 + b], body[:, a, 3 + c] = arms[:, c] / size, -arms[:, b] / size
-    fit = np.linalg.pinv(body.reshape(-1, 6), rcond=1e-6)
+    body = np.vstack([rigid(arm / size)[:3] for arm in arms])
+    fit = np.linalg.pinv(body, rcond=1e-6)
     apart = sp.lil_array(-fit @ moved)
     for d in range(6):
         if (node, d) in at:

@@ -1,0 +1,45 @@
+"""The coordinates in which a diagnosis tries every cause: all modes of a model.
+
+There a cause of any size acts as in the model itself. A large model is made small before that:
+matrices in groups when they are read, a frame by fewer elements a member.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from femubench.core.change.hypothesis import Hypothesis
+from femubench.core.errors import NotApplicable
+from femubench.core.fem.model import Model
+from femubench.core.fit.modal_basis import nominal_space, rigid_first
+from femubench.core.fit.modal_fit import Problem
+from femubench.core.fit.noise import Noise
+from femubench.core.fit.residuals import Data
+from femubench.core.inference.settings import settings
+from femubench.core.modal.eigen import Modes, all_modes, once_for
+
+
+def modes_for(model: Model) -> Modes:
+    """Return all modes of a model, rigid-body modes first.
+
+    Raises:
+        NotApplicable: for a model that has too many.
+        ModelError: when the model has no modes.
+    """
+    if model.size > settings.most_dofs:
+        raise NotApplicable(
+            f"the model has {model.size} degrees of freedom, a diagnosis takes "
+            f"{settings.most_dofs} at most: matrices are reduced where the case names "
+            "[[model.groups]]"
+        )
+    return once_for(model, "rigid first", lambda: rigid_first(all_modes(model)))
+
+
+def place_data(model: Model, data: Data, noise: Noise, hypotheses: Sequence[Hypothesis]) -> Problem:
+    """Return data in the coordinates of a model, with what may be missing in it.
+
+    Raises:
+        NotApplicable, ModelError: as `modes_for`.
+    """
+    space = nominal_space(model, modes_for(model), data.measurement.sensors, hypotheses)
+    return Problem(model, space, data, noise)
