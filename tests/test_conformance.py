@@ -23,8 +23,8 @@ from femubench.core.child.guarded_child import Ending
 from femubench.core.child.limits import MIB
 from femubench.core.conformance import kit
 from femubench.core.conformance.checking import Subject, checks_of, findings, subjects
+from femubench.core.conformance.effect_checks import has_place
 from femubench.core.conformance.kit import Bench, Role
-from femubench.core.conformance.place_words import has_place
 from femubench.core.conformance.problems import problem
 from femubench.core.errors import InputError
 from femubench.core.plugin.loader import load_plugins
