@@ -10,6 +10,7 @@ from msgspec import Struct
 
 from femubench.core.errors import PluginError, harmless
 from femubench.core.plugin.distribution import select_known
+from femubench.core.plugin.importing import BrokenPlugin
 from femubench.core.schema.validation import say_fault
 
 LONGEST_DOC = 20_000  # characters
@@ -18,18 +19,10 @@ _Form = TypeVar("_Form")
 _AS_THEY_ARE = ("doc", "options", "about", "cases", "suffix", "suffixes")
 
 
-class Fault(Struct):
-    """What is wrong with the plugin, or with one thing that it offers."""
-
-    hook: str
-    message: str
-    traceback: str
-
-
 class PluginDescription(Struct):
     """A plugin; what it offers by kind is read one by one, so that a faulty one spoils no other."""
 
-    broken: list[Fault]
+    broken: list[BrokenPlugin]
     offers: dict[str, list[Any]]
     loaded: bool
 
