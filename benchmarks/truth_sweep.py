@@ -64,6 +64,7 @@ from femubench.core.challenge.posing import HEALTHY
 from femubench.core.challenge.truth_file import TRUTH_FILE, KnownCase, read_truth
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.plugin.loader import load_plugins
+from femubench.core.schema.validation import read_plain
 from truths.posing import (
     DEFECTS,
     FAULTS,
@@ -323,7 +324,7 @@ def describe_structure(record: Record) -> str:
     verdict = str(record["verdict"])
     if verdict not in ("named", "ambiguous"):
         return verdict.replace("-", " ")
-    causes = Answer.model_validate(record["answer"]).causes
+    causes = read_plain(Answer, record["answer"]).causes
     return "a cause" if any(cause.side == "model" for cause in causes) else "none"
 
 
@@ -345,7 +346,7 @@ def stated(truth: KnownCase, record: Record, same: Same) -> list[Statement]:
         faulty = truth.kind.endswith("-fault")
         return cause.side != "model" if faulty else cause.effect not in textbook
 
-    answer = Answer.model_validate(record["answer"])
+    answer = read_plain(Answer, record["answer"])
     return statements(answer, wanted.__contains__, is_placed, counts)
 
 

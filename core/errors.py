@@ -24,6 +24,12 @@ def harmless(text: str) -> str:
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
 
 
+def harmless_lines(text: str) -> str:
+    """Return a text of several lines, likewise."""
+    lines = text.split("\n")
+    return "\n".join("".join(c if c.isprintable() else ascii(c)[1:-1] for c in x) for x in lines)
+
+
 class FemubenchError(Exception):
     """Base of all errors that a user can act upon."""
 

@@ -13,9 +13,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from femubench import InputError, Model, read_case
-from femubench.core.challenge.answer import Answer, AnswerCause, read_answer
+from femubench.core.challenge.answer import Answer, AnswerCause, AnswerParameter, read_answer
 from femubench.core.challenge.draw import draw_case, registered_effects
 from femubench.core.challenge.measuring import QUALITY, chi2, see
 from femubench.core.challenge.outside import OUTSIDE
@@ -296,14 +297,14 @@ def test_a_seal_that_unpacks_to_very_much_is_refused() -> None:
     [
         (b"", "JSON"),
         (b"\xff\xfe", "UTF-8"),
-        (b"[]", "object"),
+        (b"[]", "expected a table"),
         (b"{}", "verdict"),
         (b'{"verdict": "perhaps"}', "verdict"),
-        (b'{"verdict": "named", "causes": [{"effect": 3}]}', r"causes\.0\.effect"),
-        (b'{"verdict": "named", "causes": [{"effect": "a", "probability": NaN}]}', "probability"),
+        (b'{"verdict": "named", "causes": [{"effect": 3}]}', r"causes\[0\]\.effect"),
+        (b'{"verdict": "named", "causes": [{"effect": "a", "probability": NaN}]}', "NaN"),
         (b'{"verdict": "named", "causes": [{"effect": "a", "probability": 7}]}', "probability"),
         (b'{"verdict": "named", "causes": [{"effect": "a\\nb"}]}', "effect"),
-        (b'{"verdict": "none", "causes": ' + b"[" * 5000 + b"]" * 5000 + b"}", "recursion|causes"),
+        (b'{"verdict": "none", "causes": ' + b"[" * 5000 + b"]" * 5000 + b"}", "nested|causes"),
         (b'{"verdict": "none"}' + b" " * 2**22, "too large"),
     ],
 )
@@ -429,16 +430,11 @@ def test_causes_outside_the_catalogue(verdict: str, excess: float, right: bool) 
 
 
 def test_sizes_are_judged_in_standard_deviations() -> None:
-    said = AnswerCause.model_validate(
-        {
-            "effect": "added-mass",
-            "place": "J1",
-            "parameters": [{"name": "mass", "value": 0.13, "std": 0.01, "unit": "kg"}],
-        }
-    )
+    mass = AnswerParameter(name="mass", value=0.13, std=0.01, unit="kg")
+    said = AnswerCause(effect="added-mass", place="J1", parameters=(mass,))
     (size,) = judge_answer(truth(cause(value=0.1)), answer("named", said), [40.0]).sizes
     assert size.deviations == pytest.approx(3.0)
-    elsewhere = said.model_copy(update={"place": "J3"})
+    elsewhere = structs.replace(said, place="J3")
     assert judge_answer(truth(cause()), answer("named", elsewhere), [40.0]).sizes == ()
 
 

@@ -23,7 +23,7 @@ from femubench.core.errors import OutputError
 from femubench.core.files import write_atomically
 from femubench.core.run.store import Store
 from femubench.core.schema.quantities import parse_size, parse_timeouts, say_duration
-from tests.command import call_bench
+from tests.command import call_bench, run_python
 from tests.toys.store_edits import edit, records
 
 MODULE = "femubench.core.cli.{}"  # of a verb
@@ -96,14 +96,9 @@ def invoke(site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Calla
     return lambda *words: call_bench(*words, code=None)
 
 
-def python(code: str, *, path: Path | None = None) -> str:
+def python(code: str) -> str:
     """Return what a fresh interpreter prints."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
-    if path is not None:
-        environment["PYTHONPATH"] = f"{path}{os.pathsep}{environment['PYTHONPATH']}"
-    command = [sys.executable, "-c", textwrap.dedent(code)]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    return done.stdout
+    return run_python("-c", textwrap.dedent(code)).stdout
 
 
 class TestHelp:

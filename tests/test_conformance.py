@@ -7,7 +7,6 @@ import os
 import random
 import re
 import subprocess
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -23,12 +22,12 @@ from femubench.core.child.guarded_child import Ending
 from femubench.core.child.limits import MIB
 from femubench.core.conformance import kit
 from femubench.core.conformance.checking import Subject, checks_of, findings, subjects
+from femubench.core.conformance.effect_checks import has_place
 from femubench.core.conformance.kit import Bench, Role
-from femubench.core.conformance.place_words import has_place
 from femubench.core.conformance.problems import problem
 from femubench.core.errors import InputError
 from femubench.core.plugin.loader import load_plugins
-from tests.command import call_bench
+from tests.command import call_bench, run_python
 
 ROOT = Path(__file__).parents[1]
 # Strategies that end or block their process, and what is said of them.
@@ -302,17 +301,10 @@ def pytest_configure():
 
 def run_pytest(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     (folder / "conftest.py").write_text(PLUGIN.format(toys=str(ROOT / "tests" / "toys")))
-    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--rootdir", "."]
-    plugin = ["-p", "femubench.core.conformance.pytest_plugin"]
+    command = ("-m", "pytest", "-p", "no:cacheprovider", "--rootdir", ".")
+    plugin = ("-p", "femubench.core.conformance.pytest_plugin")
     environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
-    return subprocess.run(
-        [*command, *plugin, *words],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return run_python(*command, *plugin, *words, code=None, cwd=folder, env=environment)
 
 
 @pytest.mark.slow(10)
@@ -337,7 +329,7 @@ def test_pytest_without_the_option_does_nothing(tmp_path: Path) -> None:
         "import sys, femubench.core.conformance.pytest_plugin; "
         "sys.exit(bool({'numpy', 'scipy', 'pluggy.x', 'pandas'} & set(sys.modules)))"
     )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+    run_python("-c", code)
 
 
 def test_docs_name_every_check() -> None:

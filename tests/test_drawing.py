@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 import xml.etree.ElementTree as ET
 from typing import Any
 
@@ -15,6 +13,7 @@ from matplotlib.figure import Figure as Canvas
 from femubench.core.drawing.wireframe import DrawnJoint, DrawnMember, Wireframe
 from femubench.core.plot.figure import draw_figure, render_figure
 from femubench.reproduction import Bars, Curve, Curves, Figure, MatrixImage, StructureMap
+from tests.command import run_python
 
 AWKWARD = 'a < b & "c" $x_1$ $'
 X = np.linspace(0.0, 1100.0, 50)
@@ -81,10 +80,7 @@ def test_same_text_in_another_process() -> None:
         f"array = np.array; print(render_figure({MATRIX!r}), render_figure({BARS!r}), "
         "sep=chr(10), end='')"
     )
-    found = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, encoding="utf-8"
-    )
-    assert found.stdout == here
+    assert run_python("-c", code, encoding="utf-8").stdout == here
 
 
 @each

@@ -13,7 +13,7 @@ from effect_checks import check_exact, check_neutral
 from femubench import InputError, Model, diagnose, read_case
 from femubench.core.case.case import Case
 from femubench.core.case.writing import write_case
-from femubench.core.conformance.place_words import has_place
+from femubench.core.conformance.effect_checks import has_place
 from femubench.core.drawing.places import find_wireframe
 from femubench.core.effect.places import split_direction
 from femubench.effect import ModelPlaces, Places

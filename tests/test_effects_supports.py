@@ -12,7 +12,7 @@ from effect_checks import changed_matrices, check_neutral
 from scipy.optimize import brentq
 
 from femubench import Measurement, Model, Sensors, diagnose
-from femubench.core.conformance.place_words import has_place
+from femubench.core.conformance.effect_checks import has_place
 from femubench.core.drawing.places import find_wireframe
 from femubench.core.effect.places import split_direction
 from femubench.core.fem.model import common_dofs

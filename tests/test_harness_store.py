@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -21,6 +19,7 @@ from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.records import run_from_json, run_to_json
 from femubench.core.schema.results import Block, JobResult, Run, Status
 from femubench.core.score.ranking import rank_results
+from tests.command import run_python
 
 MODES = (
     PairedMode(1, 100.0, 103.0, 0.99),
@@ -173,8 +172,7 @@ def test_a_record_that_does_not_fit_on_the_disk_leaves_no_trace(tmp_path: Path) 
     store = Store(tmp_path)
     store.begin(META)
     store.append(META["run"], GOOD)
-    command = [sys.executable, "-c", FULL, str(tmp_path), str(Path(__file__).parent), str(size)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    done = run_python("-c", FULL, tmp_path, Path(__file__).parent, size)
     count, _, message = done.stdout.strip().partition(" ")
     assert "a record cannot be written: " in message
     assert str(store.file_of(META["run"])) in message

@@ -425,8 +425,11 @@ def test_an_effect_and_a_reader_are_imported_by_who_uses_them(fine: Path) -> Non
 HOOKED = ("strategies", "scenarios", "effects", "faults", "readers", "reporters", "papers")
 FORGED: Mapping[str, tuple[object, str]] = {
     "no object": ([1], "its answer is no JSON object"),
-    "no offers": ({"broken": [], "loaded": True}, "its description is none: 'offers'"),
-    "numbers": ({"broken": 3, "offers": {}}, "its description is none: faults was given as int"),
+    "no offers": ({"broken": [], "loaded": True}, "its description is none: offers: missing"),
+    "numbers": (
+        {"broken": 3, "offers": {}},
+        "its description is none: broken: a whole number, expected a list",
+    ),
     "no fault": ({"fault": 3}, "its answer is no fault"),
     "half a fault": ({"fault": ["ValueError"]}, "its answer is no fault"),
 }
@@ -448,10 +451,10 @@ def test_a_forged_description_is_one_line(
 @pytest.mark.parametrize(
     ("key", "value", "says"),
     [
-        ("name", 3, "name was given as int, not str"),
+        ("name", 3, "name: a whole number, expected a text"),
         ("citation", "", "citation is missing"),
-        ("needs", ["everything"], "needs 'everything' is unknown"),
-        ("options", {"x": [1]}, "option 'x' is no plain value"),
+        ("needs", ["everything"], "needs 'everything', which is none of"),
+        ("options", {"x": [1]}, "options.x: a list, expected"),
     ],
 )
 def test_what_a_description_says_is_checked(

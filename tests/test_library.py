@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import subprocess
-import sys
 import textwrap
 import threading
 from dataclasses import dataclass, field, replace
@@ -23,7 +21,7 @@ import femubench.papers
 from femubench.core.display import LINES, WIDTH
 from femubench.core.schema.run_options import split_keywords
 from femubench.core.score.repeatability import result_differences
-from tests.command import call_bench
+from tests.command import call_bench, run_python
 from tests.frf_problems import frf_set, write_universal
 from tests.test_cli import put_case
 from tests.toys import reproduction_toys
@@ -325,16 +323,7 @@ class TestRank:
         )
         (folder / "script.py").write_text(script)
         words = ["script.py"] if how == "script" else ["-"]
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
-        done = subprocess.run(
-            [sys.executable, *words],
-            input=script,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        assert done.stdout.split() == ["once", "ok"]
+        assert run_python(*words, input=script).stdout.split() == ["once", "ok"]
 
 
 class TestLooks:
@@ -378,10 +367,7 @@ def test_the_page_of_the_docs_runs() -> None:
     text = (ROOT / "docs" / "library.md").read_text(encoding="utf-8")
     script = "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL))
     Path("page.py").write_text(script)
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
-    done = subprocess.run(
-        [sys.executable, "page.py"], env=environment, capture_output=True, text=True, check=True
-    )
+    done = run_python("page.py")
     assert "local:damping=0.001" in done.stdout
     assert "softer:share=0.2" in done.stdout
     assert "torsion-constant" in done.stdout

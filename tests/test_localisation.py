@@ -15,7 +15,8 @@ from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.sensors import Sensors
 from femubench.core.look.localisation import locate
-from femubench.core.look.shape_expansion import ModalCorrelation, expand
+from femubench.core.look.modes import Seen
+from femubench.core.look.shape_expansion import expand
 from femubench.core.modal.eigen import dense_matrices, solve_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.schema.diagnosis import LocationRow
@@ -121,12 +122,12 @@ def test_an_added_mass_shows_at_its_joint(ladder: FrameBuilder, joint: int) -> N
 
 
 @pytest.fixture
-def noisy(ladder: FrameBuilder) -> ModalCorrelation:
+def noisy(ladder: FrameBuilder) -> Seen:
     truth, _ = damaged(ladder(elements=2 * ELEMENTS), np.random.default_rng(1))
-    return ModalCorrelation.of(Model.of(ladder()), measured(truth, 3, f_std=1e-3, std=0.01))
+    return Seen(Model.of(ladder()), measured(truth, 3, f_std=1e-3, std=0.01))
 
 
-def test_the_gap_obeys_its_equations(noisy: ModalCorrelation) -> None:
+def test_the_gap_obeys_its_equations(noisy: Seen) -> None:
     expansion, shapes = expand(noisy), noisy.measurement.shapes
     mass, stiffness = dense_matrices(noisy.model)
     rows = noisy.model.observe(noisy.measurement.sensors)
@@ -140,7 +141,7 @@ def test_the_gap_obeys_its_equations(noisy: ModalCorrelation) -> None:
         assert 8.0 < np.square((shapes[:, j] - factor * seen) / 0.01).sum() < 12.1
 
 
-def test_no_other_shape_with_these_readings_has_a_smaller_error(noisy: ModalCorrelation) -> None:
+def test_no_other_shape_with_these_readings_has_a_smaller_error(noisy: Seen) -> None:
     expansion = expand(noisy)
     mass, stiffness = dense_matrices(noisy.model)
     modes = solve_modes(noisy.model)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -35,6 +33,7 @@ from femubench.modal import mac
 from femubench.plot import wireframe_of
 from femubench.results import PairedMode
 from femubench.scenarios import HERE
+from tests.command import run_python
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +118,7 @@ class TestModeShape:
             "plot.mode_shape(read_case(HERE / 'hframe'));"
             "sys.exit('matplotlib.pyplot' in sys.modules)"
         )
-        subprocess.run([sys.executable, "-c", code], check=True)
+        run_python("-c", code)
 
 
 class TestMac:

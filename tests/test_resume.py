@@ -22,6 +22,7 @@ from femubench.core.run.record_file import read_records, write_file
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult, Run
+from tests.command import run_python
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
@@ -167,14 +168,7 @@ def test_options_and_source_of_a_strategy_belong_to_its_version(tmp_path: Path) 
     assert version == keys.strategy_version(toys.Unchanged())  # of one file
     for text in ("A = 1\n", "A = 2\n"):
         (tmp_path / "lone.py").write_text(text)
-        found = subprocess.run(
-            [sys.executable, "-c", _VERSION],
-            cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
+        found = run_python("-c", _VERSION, path=tmp_path, cwd=tmp_path).stdout
         assert found.startswith("0+")
         assert found != version
         version = found

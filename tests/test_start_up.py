@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import ast
-import os
 import re
-import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -15,6 +13,7 @@ import pytest
 
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import CHECKS
+from tests.command import run_python
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -57,9 +56,7 @@ builtins.__import__ = refusing
 
 def started(words: str) -> tuple[int, str, set[str]]:
     """Return exit code, stderr and modules of ``bench`` in a fresh interpreter."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-    command = [sys.executable, "-c", RUN, *words.split()]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    done = run_python("-c", RUN, *words.split(), code=None)
     return done.returncode, done.stderr, set(done.stdout.splitlines()[-1].split())
 
 
@@ -130,7 +127,6 @@ def test_dependencies_are_what_is_imported() -> None:
 def test_without_modules_of_unix_all_but_runs_works_and_that_is_one_line(tmp_path: Path) -> None:
     found, store = str(tmp_path / "found.json"), str(tmp_path / "store")
     effects = ("--effects", "torsion-constant", "--no-pairs")
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     for words, code in (
         (("--help",), 0),
         (("plugins", "list"), 0),
@@ -138,9 +134,7 @@ def test_without_modules_of_unix_all_but_runs_works_and_that_is_one_line(tmp_pat
         (("report", found, "-f", "md"), 0),
         (("run", "frame", "-s", "unchanged", "--store", store), 2),
     ):
-        command = [sys.executable, "-c", AS_ON_WINDOWS + RUN, *words]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-        assert done.returncode == code, done.stderr
+        done = run_python("-c", AS_ON_WINDOWS + RUN, *words, code=code)
         assert len(done.stderr.splitlines()) == (code > 0), done.stderr
         assert code == 0 or "takes Linux or macOS (on Windows WSL)" in done.stderr
 
@@ -148,4 +142,4 @@ def test_without_modules_of_unix_all_but_runs_works_and_that_is_one_line(tmp_pat
 def test_a_run_and_a_diagnosis_load_no_statistics() -> None:
     code = "import sys, femubench.core.run.runner, femubench.core.diagnosis.diagnose\n"
     code += "sys.exit('scipy.stats' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+    run_python("-c", code)

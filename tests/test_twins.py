@@ -17,6 +17,7 @@ from twin_toys import Chance, Drawn, Memory
 import femubench
 from femubench.core.case.case import Case
 from femubench.core.case.reader import read_case
+from femubench.core.case.similarity import Similarity, matrix_factors, similar_case, similar_frame
 from femubench.core.errors import InputError, NotApplicable
 from femubench.core.fem.frame import (
     Brace,
@@ -54,7 +55,6 @@ from femubench.core.score.repeatability import unsteady
 from femubench.core.score.scoring import judge, reference_of
 from femubench.core.score.twin_gain import twin_gains
 from femubench.core.twin.disguise import disguise_case
-from femubench.core.twin.similarity import Similarity, matrix_factors, similar_case, similar_frame
 from femubench.core.twin.twins import FAMILIES, Twin, again, twin_of, twins_of
 from femubench.core.typing import SparseArray
 from tests.command import call_bench

@@ -8,8 +8,6 @@ import json
 import os
 import re
 import shutil
-import subprocess
-import sys
 from itertools import product
 from pathlib import Path
 
@@ -26,7 +24,7 @@ from femubench.core.schema.records import read_run, run_from_json
 from femubench.plugins.readers.universal import UniversalReader
 from femubench.reports.cells import plain
 from femubench.reports.markdown import escape
-from tests.command import call_bench
+from tests.command import call_bench, run_python
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("core", "papers", "plugins", "reports", "scenarios")
@@ -181,8 +179,7 @@ def test_an_end_that_the_library_reads_beyond(tmp_path: Path) -> None:
         (folder / "case.toml").write_text("\n".join(toml[: at - 2] + toml[at + 1 :]))
     code = f"import femubench\nfor folder in {folders}:\n try: femubench.read_case(folder)\n"
     code += " except femubench.InputError as e: print(e)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[:200]
+    run_python("-c", code)
 
 
 def test_more_elements_than_memory(case: Path) -> None:

@@ -2,47 +2,38 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, field_validator
+from msgspec import Meta, Struct
 
 from femubench.core.diagnosis.result import Diagnosis
-from femubench.core.errors import InputError
 from femubench.core.files import MIB, read_text
+from femubench.core.schema.bounds import Real
 from femubench.core.schema.diagnosis import Verdict
+from femubench.core.schema.records import parse_json, to_plain
+from femubench.core.schema.validation import read_plain
 from femubench.core.typing import Side
 
 _AND = " + "
 _ROUNDING = 1e-6
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 # Sums of probabilities may round to a little more than 1.
-Probability = Annotated[
-    float,
-    Field(ge=0.0, le=1.0 + 1e-9, allow_inf_nan=False),
-    AfterValidator(lambda value: min(value, 1.0)),
-]
-Word = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
+Probability = Annotated[float, Meta(ge=0.0, le=1.0 + 1e-9)]
+Word = Annotated[str, Meta(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
 
 
-class _AnswerPart(BaseModel):
-    # An answer may say more than is judged: rivals, residuals, advice.
-    model_config = ConfigDict(extra="ignore", frozen=True, from_attributes=True)
-
-
-class AnswerParameter(_AnswerPart):
+class AnswerParameter(Struct, frozen=True):
     """A size: `std` is None where it was not fitted; `textbook` where a handbook gives it."""
 
     name: Word
-    value: Finite
-    std: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None = None
+    value: Real
+    std: Annotated[float, Meta(ge=0.0, le=1e300)] | None = None
     unit: Word = ""
     textbook: bool = False
 
 
-class AnswerCause(_AnswerPart):
+class AnswerCause(Struct, frozen=True):
     """An effect at a place; ``a + b`` at ``p + q`` for a pair within a group.
 
     A fault of data or input, by its `side`, belongs to every member of a group.
@@ -50,16 +41,11 @@ class AnswerCause(_AnswerPart):
 
     effect: Word
     place: Word = ""
-    parameters: tuple[AnswerParameter, ...] = Field((), max_length=20)
+    parameters: Annotated[tuple[AnswerParameter, ...], Meta(max_length=20)] = ()
     probability: Probability | None = None
     side: Side = "model"
     # The name alone, where it says nothing of the place.
     place_probability: Probability | None = None
-
-    @field_validator("place_probability", mode="before")
-    @classmethod
-    def _known(cls, value: object) -> object:
-        return None if isinstance(value, float) and math.isnan(value) else value
 
     @property
     def claim(self) -> float | None:
@@ -79,8 +65,8 @@ class AnswerCause(_AnswerPart):
         return tuple(zip(effects, places, strict=True))
 
 
-class Answer(_AnswerPart):
-    """What somebody says of a blind case.
+class Answer(Struct, frozen=True):
+    """What somebody says of a blind case; more than is judged, as rivals or advice, is left out.
 
     Arguments:
         verdict: one word.
@@ -90,13 +76,15 @@ class Answer(_AnswerPart):
     """
 
     verdict: Verdict
-    causes: tuple[AnswerCause, ...] = Field((), max_length=200)
+    causes: Annotated[tuple[AnswerCause, ...], Meta(max_length=200)] = ()
     nothing: Probability | None = None
 
     @classmethod
     def of(cls, diagnosis: Diagnosis) -> Answer:
         """Return the answer that a diagnosis gives."""
-        return cls.model_validate(diagnosis)
+        return read_plain(
+            cls, {name: to_plain(getattr(diagnosis, name)) for name in cls.__struct_fields__}
+        )
 
     @property
     def probability(self) -> float | None:
@@ -110,7 +98,7 @@ class Answer(_AnswerPart):
         stated = [cause.claim or 0.0 for cause in known if cause.side == "model"]
         faults = [cause.claim or 0.0 for cause in known if cause.side != "model"]
         if self.verdict == "none":
-            return self.nothing
+            return None if self.nothing is None else min(self.nothing, 1.0)
         if self.verdict not in ("named", "ambiguous") or not known:
             return None
         if self.verdict == "named":
@@ -126,12 +114,7 @@ def read_answer(path: Path) -> Answer:
     Raises:
         InputError: when the file cannot be read, is too large or is no answer.
     """
-    text = read_text(path, 4 * MIB)
-    try:
-        return Answer.model_validate_json(text)
-    except ValidationError as error:
-        fault = error.errors(include_url=False, include_input=False)[0]
-        key = ".".join(str(part) for part in fault["loc"][:6])
-        what = str(fault["msg"])[:200]
-        expected = "the JSON of `bench diagnose --json`"
-        raise InputError(what, file=path, key=key or None, expected=expected) from None
+    expected = "the JSON of `bench diagnose --json`"
+    return read_plain(
+        Answer, parse_json(read_text(path, 4 * MIB), file=path, expected=expected), file=path
+    )

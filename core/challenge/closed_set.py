@@ -15,16 +15,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
-
-import tomlkit
-from tomlkit.exceptions import TOMLKitError
+from typing import TYPE_CHECKING
 
 from femubench.core.case.case import Case
 from femubench.core.case.reader import read_case
-from femubench.core.challenge.posing import CASE_FILE
+from femubench.core.challenge.posing import CASE_FILE, case_text, parse_case
 from femubench.core.errors import InputError, require
-from femubench.core.files import MIB, check_new, read_bytes, read_text
+from femubench.core.files import MIB, check_new, read_bytes
 
 if TYPE_CHECKING:
     from cryptography.fernet import Fernet
@@ -83,11 +80,7 @@ def _open_part(case: Case) -> dict[str, bytes]:
     file = case.folder / CASE_FILE
     if not case.held_out and not case.modifications:
         raise InputError("holds nothing back", file=file, expected="held-out or modified modes")
-    try:
-        document = tomlkit.parse(read_text(file, MIB))
-    except TOMLKitError as error:
-        raise InputError(str(error), file=file, expected="valid TOML") from None
-    tables: Any = document
+    tables = parse_case(file)
     for name in ("modification", "reference", "diagnosis"):
         tables.pop(name, None)
     measured = tables["measurement"]
@@ -97,7 +90,7 @@ def _open_part(case: Case) -> dict[str, bytes]:
     if not modes.endswith(".csv"):
         what, expected = f"modes in {modes}", "a table modes.csv, as `bench init` writes it"
         raise InputError(what, file=file, key="measurement.modes", expected=expected)
-    text = tomlkit.dumps(document).rstrip("\n") + "\n"
+    text = case_text(tables)
     found = {
         path.name: read_bytes(path, _LARGEST)
         for path in sorted(case.folder.iterdir())

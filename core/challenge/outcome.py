@@ -19,6 +19,8 @@ from femubench.core.challenge.score import (
 from femubench.core.challenge.truth_file import KnownCase, TrueCause
 from femubench.core.effect.places import Places
 from femubench.core.fem.frame import Frame
+from femubench.core.schema.records import to_plain
+from femubench.core.schema.validation import read_plain
 
 OUTCOMES = (
     "right",
@@ -91,7 +93,7 @@ def outcome(truth: KnownCase, record: Record, same: Same) -> str:
     """
     verdict = str(record["verdict"]).replace("-", " ")
     faulty = truth.kind.endswith("-fault") and "answer" in record
-    if faulty and (found := faults_in(Answer.model_validate(record["answer"]))):
+    if faulty and (found := faults_in(read_plain(Answer, record["answer"]))):
         if _holds(truth, found, same):
             return "right" if _only(truth, found, same) else "with others"
         return "other place" if _holds(truth, found, anywhere) else "wrong"
@@ -102,7 +104,7 @@ def outcome(truth: KnownCase, record: Record, same: Same) -> str:
     textbook = set(record.get("textbook", ())) - wanted
     sets = [
         tuple(part for part in parts if part[0] not in textbook)
-        for parts in candidates(Answer.model_validate(record["answer"]))
+        for parts in candidates(read_plain(Answer, record["answer"]))
     ]
     if not any(sets):
         return "none"
@@ -135,7 +137,7 @@ def record_of(answer: Answer) -> dict[str, Any]:
     return {
         "verdict": answer.verdict,
         "probability": answer.probability,
-        "answer": answer.model_dump(mode="json"),
+        "answer": to_plain(answer),
         "textbook": [
             cause.effect
             for cause in answer.causes
@@ -149,7 +151,7 @@ def size_errors(truth: KnownCase, record: Record, same: Same) -> tuple[SizeError
     if record["verdict"] not in ("named", "ambiguous"):
         return ()
     found = []
-    for said in Answer.model_validate(record["answer"]).causes:
+    for said in read_plain(Answer, record["answer"]).causes:
         for cause in truth.causes:
             sizes = [p for p in said.parameters if p.std and p.unit == cause.unit]
             here = said.effect == cause.effect and same(said.place, cause.place)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
@@ -57,10 +58,7 @@ def overlay(
     check_new(target)
     changed = truth_folder / CASE_FILE
     file = changed if changed.is_file() else structure / CASE_FILE
-    try:
-        document = tomlkit.parse(read_text(file, MIB))
-    except TOMLKitError as error:
-        raise InputError(str(error), file=file, expected="valid TOML") from None
+    document = parse_case(file)
     if "measurement" not in document:
         raise InputError("no measurement", file=file, key="measurement", expected="a table")
     changes = document.pop("modification", [])
@@ -80,5 +78,17 @@ def overlay(
         document["reference"] = {"modes": HEALTHY}
         if healthy is not None:
             document["reference"]["mass"] = healthy
-    text = tomlkit.dumps(document).rstrip("\n") + "\n"
-    (target / CASE_FILE).write_text(text, encoding="utf-8")
+    (target / CASE_FILE).write_text(case_text(document), encoding="utf-8")
+
+
+def parse_case(file: Path) -> Any:  # noqa: ANN401 - tables of any keys
+    """Return a `case.toml` as tables that can be changed; raises InputError for what is no TOML."""
+    try:
+        return tomlkit.parse(read_text(file, MIB))
+    except TOMLKitError as error:
+        raise InputError(str(error), file=file, expected="valid TOML") from None
+
+
+def case_text(document: Any) -> str:  # noqa: ANN401 - of `parse_case`
+    """Return the text of changed tables."""
+    return tomlkit.dumps(document).rstrip("\n") + "\n"

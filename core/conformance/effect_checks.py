@@ -11,7 +11,6 @@ import numpy as np
 from femubench.core.conformance import kit
 from femubench.core.conformance.fingerprints import fingerprint, first_difference
 from femubench.core.conformance.kit import Bench, Verdict, check, fail_check, pass_check
-from femubench.core.conformance.place_words import has_place
 from femubench.core.conformance.problems import GROUPED, PLAIN, problem
 from femubench.core.conformance.results import (
     Given,
@@ -20,9 +19,13 @@ from femubench.core.conformance.results import (
     symmetric,
 )
 from femubench.core.conformance.strategy_checks import own_doc
+from femubench.core.drawing.places import find_wireframe
+from femubench.core.effect.model_places import ModelPlaces
+from femubench.core.effect.places import bare_place, split_direction
 from femubench.core.effect.reading import Reading
 from femubench.core.effect.sizes import Site, Size
-from femubench.core.errors import NotApplicable
+from femubench.core.errors import ModelError, NotApplicable
+from femubench.core.fem.group_factors import Groups
 from femubench.core.fem.model import Model
 from femubench.core.look.modes import Seen
 from femubench.core.modal.eigen import solve_modes
@@ -125,6 +128,20 @@ def places(effect: Effect) -> Verdict:
             if fault:
                 return fail_check(f"{where}: {fault}")
     return pass_check() if count else kit.not_applicable("it has no place in any of the models")
+
+
+def has_place(model: Model, place: str) -> bool:
+    """Tell whether a word stands for a place of a model, by the grammar of docs/effects.md."""
+    if find_wireframe(model, [place]).places[0].kind != "elsewhere":
+        return True
+    bare = split_direction(bare_place(place).removesuffix(":branch"))[0]
+    groups = (*Groups(model).places("stiffness"), *Groups(model).places("mass"))
+    if {bare, place} & set(groups):
+        return True
+    try:
+        return bool(ModelPlaces(model).node_pairs(bare))
+    except ModelError:
+        return False
 
 
 def _parameters(effect: Effect, model: Model, place: str) -> str | None:

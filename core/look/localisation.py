@@ -15,7 +15,8 @@ from femubench.core.fem.group_factors import Groups
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.inference.settings import settings
-from femubench.core.look.shape_expansion import Expansion, ModalCorrelation, expand
+from femubench.core.look.modes import Seen
+from femubench.core.look.shape_expansion import Expansion, expand
 from femubench.core.modal.correlation import modal_scale_factor
 from femubench.core.modal.measurement import Measurement
 from femubench.core.schema.diagnosis import LocationRow
@@ -98,9 +99,7 @@ def _springs(structure: Structure, shapes: FloatArray, gaps: FloatArray) -> Valu
     return _named(names, error / (energy + _mean(energy)))
 
 
-def force_residual(
-    elements: Elements, comparison: ModalCorrelation, expansion: Expansion
-) -> list[Values]:
+def force_residual(elements: Elements, seen: Seen, expansion: Expansion) -> list[Values]:
     """Return how much of the force residual every place explains, by kind of place.
 
     The residual r = (K - lambda M) u of every dof is what the model lacks. A change a of the
@@ -122,25 +121,25 @@ def force_residual(
         root = np.sqrt(np.where(floor > 0.0, floor, 1.0))
         found.append(_named(names, explained / root))
     frame = elements.structure.frame
-    at_nodes = _at_nodes(comparison, gaps)
+    at_nodes = _at_nodes(seen, gaps)
     joints = {j.name: float(at_nodes[i]) for i, j in enumerate(frame.joints) if i < len(at_nodes)}
     return [*found, joints]
 
 
-def node_residual(comparison: ModalCorrelation, expansion: Expansion) -> list[Values]:
+def node_residual(seen: Seen, expansion: Expansion) -> list[Values]:
     """Return the energy of the force residual at the nodes of a model from files."""
-    geometry = comparison.model.geometry
+    geometry = seen.model.geometry
     if not isinstance(geometry, MatrixGeometry):
         return []
     _, gaps = _weighted(expansion)
-    return [_named(geometry.names, _at_nodes(comparison, gaps))]
+    return [_named(geometry.names, _at_nodes(seen, gaps))]
 
 
-def group_energy(comparison: ModalCorrelation, expansion: Expansion) -> list[Values]:
+def group_energy(seen: Seen, expansion: Expansion) -> list[Values]:
     """Return the error in constitutive relation of the groups of a model from files."""
     shapes, gaps = _weighted(expansion)
-    names = Groups(comparison.model).places("stiffness")
-    parts = comparison.model.groups.values()
+    names = Groups(seen.model).places("stiffness")
+    parts = seen.model.groups.values()
     error = np.array([np.einsum("nm,nm->", gaps, k @ gaps) for k in parts])
     energy = np.array([np.einsum("nm,nm->", shapes, k @ shapes) for k in parts])
     if not names:
@@ -148,26 +147,26 @@ def group_energy(comparison: ModalCorrelation, expansion: Expansion) -> list[Val
     return [_named(names, error / (energy + _mean(energy)))]
 
 
-def _at_nodes(comparison: ModalCorrelation, gaps: FloatArray) -> FloatArray:
+def _at_nodes(seen: Seen, gaps: FloatArray) -> FloatArray:
     """Return sqrt(sum of r^2 / K_dd) over modes and dofs of every node, (n_nodes,)."""
-    model = comparison.model
+    model = seen.model
     diagonal = np.abs(model.stiffness.diagonal())
     force = np.square(model.stiffness_times(gaps)).sum(axis=1)
     energy = np.divide(force, diagonal, out=np.zeros(len(force)), where=diagonal > 0.0)
     return np.sqrt(np.bincount(model.dofs.node, weights=energy))
 
 
-def ecomac(comparison: ModalCorrelation) -> Values:
+def ecomac(seen: Seen) -> Values:
     """Return the mean difference of paired unit shapes at every sensor (1 - MAC by coordinate).
 
     Source: Hunt (1992), Application of an enhanced coordinate modal assurance criterion.
     """
-    m = comparison.measurement
-    paired = np.flatnonzero(comparison.pairing.index >= 0)
+    m = seen.measurement
+    paired = np.flatnonzero(seen.pairing.index >= 0)
     if len(paired) == 0 or not len(m.sensors):
         return {}
     measured = m.shapes[:, paired]
-    model = comparison.readings[:, comparison.pairing.index[paired]]
+    model = seen.readings[:, seen.pairing.index[paired]]
     known = np.isfinite(measured)
     use = known.sum(axis=0) > 1
     measured, model, known = measured[:, use], model[:, use], known[:, use]
@@ -179,7 +178,7 @@ def ecomac(comparison: ModalCorrelation) -> Values:
     return {label: float(v) for label, v, k in zip(m.sensors.labels, mean, count, strict=True) if k}
 
 
-def mdlac(elements: Elements, comparison: ModalCorrelation) -> list[Values]:
+def mdlac(elements: Elements, seen: Seen) -> list[Values]:
     """Return how well the frequency shifts look like those of a softer place, by kind of place.
 
     The squared cosine between the measured relative shifts and the sensitivities of the
@@ -187,13 +186,13 @@ def mdlac(elements: Elements, comparison: ModalCorrelation) -> list[Values]:
 
     Source: Messina, Williams & Contursi (1998), multiple damage location assurance criterion.
     """
-    shifts = comparison.shifts
+    shifts = seen.shifts
     paired = np.flatnonzero(np.isfinite(shifts))
     if len(paired) < settings.least_modes or np.abs(shifts[paired]).max() < settings.negligible:
         return []
-    index = comparison.pairing.index[paired]
-    shapes = comparison.modes.shapes[:, index]
-    energy = elements.work(shapes, shapes) / comparison.modes.eigenvalues[index]
+    index = seen.pairing.index[paired]
+    shapes = seen.modes.shapes[:, index]
+    energy = elements.work(shapes, shapes) / seen.modes.eigenvalues[index]
     found: list[Values] = []
     for names, gather in (elements.members, elements.labels):
         slope = np.asarray(gather @ energy)
@@ -230,23 +229,23 @@ def locate(model: Model, measurement: Measurement) -> tuple[LocationRow, ...]:
     Raises:
         ModelError: when the model has no modes.
     """
-    comparison = ModalCorrelation.of(model, measurement)
+    seen = Seen(model, measurement)
     found: dict[str, list[Values]] = {}
     try:
-        expansion = expand(comparison)
+        expansion = expand(seen)
     except ModelError:  # no sensor sees any motion, or every shift is singular
         expansion = None
     shaped = expansion is not None and expansion.shapes.shape[1] > 0
     if model.structure is not None:
         elements = Elements(model.structure)
         if expansion is not None and shaped:
-            found["force-residual"] = force_residual(elements, comparison, expansion)
+            found["force-residual"] = force_residual(elements, seen, expansion)
             found["energy-error"] = energy_error(elements, expansion)
-        found["mdlac"] = mdlac(elements, comparison)
+        found["mdlac"] = mdlac(elements, seen)
     elif expansion is not None and shaped:
-        found["force-residual"] = node_residual(comparison, expansion)
-        found["energy-error"] = group_energy(comparison, expansion)
-    found["ecomac"] = [ecomac(comparison)]
+        found["force-residual"] = node_residual(seen, expansion)
+        found["energy-error"] = group_energy(seen, expansion)
+    found["ecomac"] = [ecomac(seen)]
     return tuple(row for name, kinds in found.items() for row in _rows(name, kinds))
 
 

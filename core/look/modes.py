@@ -11,6 +11,7 @@ import scipy.linalg as la
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
+from femubench.core.fit.mesh_error import mesh_bias
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import Modes
 from femubench.core.modal.frequency_changes import (
@@ -57,6 +58,30 @@ class Seen:
         highest = int(self.pairing.index.max(initial=-1)) + 1
         wanted = highest if highest > 0 else len(self.measurement)
         return min(wanted, len(self.modes))
+
+    @cached_property
+    def bias(self) -> FloatArray:
+        """Return the relative correction of the model's frequencies for its mesh, (p,)."""
+        bias = np.zeros(len(self.modes))
+        found = mesh_bias(self.model, int(self.pairing.index.max(initial=-1)) + 1, self.modes)
+        if found is not None:
+            bias[: len(found)] = found
+        return bias
+
+    @property
+    def shifts(self) -> FloatArray:
+        """Return f_measured / f_model - 1 of every pair, nan without a partner, (m,)."""
+        index = self.pairing.index
+        frequency = self.modes.natural_frequencies * (1.0 + self.bias)
+        ratio = self.measurement.frequencies / frequency[index] - 1.0
+        return np.where(index >= 0, ratio, np.nan)
+
+    @property
+    def eigenvalues(self) -> FloatArray:
+        """Return measured eigenvalues as this mesh would show them in rad^2/s^2, (m,)."""
+        index = self.pairing.index
+        bias = np.where(index >= 0, self.bias[index], 0.0)
+        return np.asarray(self.measurement.eigenvalues / np.square(1.0 + bias))
 
     @cached_property
     def deviations(self) -> FloatArray:

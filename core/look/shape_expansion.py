@@ -9,66 +9,11 @@ import scipy.linalg as la
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
-from femubench.core.fit.mesh_error import mesh_bias
 from femubench.core.inference.settings import settings
-from femubench.core.modal.eigen import Modes
-from femubench.core.modal.frequency_changes import elastic_modes
-from femubench.core.modal.measurement import Measurement
-from femubench.core.modal.pairing import LEAST_SENSORS, Pairing, pair_measured
+from femubench.core.look.modes import Seen
+from femubench.core.modal.pairing import LEAST_SENSORS
 from femubench.core.modal.sparse_eigen import ShiftedModel
 from femubench.core.typing import FloatArray
-
-
-@dataclass(frozen=True)
-class ModalCorrelation:
-    """Measured modes and the modes of a model.
-
-    Arguments:
-        model: any model.
-        measurement: measured modes.
-        modes: elastic modes of the model.
-        readings: the same at the sensors, (n_sensors, p).
-        pairing: partners of the measured modes.
-        bias: relative correction of the model's frequencies for its mesh, (p,).
-    """
-
-    model: Model
-    measurement: Measurement
-    modes: Modes
-    readings: FloatArray
-    pairing: Pairing
-    bias: FloatArray
-
-    @classmethod
-    def of(cls, model: Model, measurement: Measurement) -> ModalCorrelation:
-        """Solve a model and pair its modes with the measured ones.
-
-        Raises:
-            ModelError: when the model has no modes.
-        """
-        modes = elastic_modes(model, 2 * len(measurement) + settings.spare_modes)
-        readings = np.asarray(model.observe(measurement.sensors) @ modes.shapes)
-        pairing = pair_measured(measurement, modes, readings)
-        bias = np.zeros(len(modes))
-        found = mesh_bias(model, int(pairing.index.max(initial=-1)) + 1, modes)
-        if found is not None:
-            bias[: len(found)] = found
-        return cls(model, measurement, modes, readings, pairing, bias)
-
-    @property
-    def shifts(self) -> FloatArray:
-        """Return f_measured / f_model - 1 of every pair, nan without a partner, (m,)."""
-        index = self.pairing.index
-        frequency = self.modes.natural_frequencies * (1.0 + self.bias)
-        ratio = self.measurement.frequencies / frequency[index] - 1.0
-        return np.where(index >= 0, ratio, np.nan)
-
-    @property
-    def eigenvalues(self) -> FloatArray:
-        """Return measured eigenvalues as this mesh would show them in rad^2/s^2, (m,)."""
-        index = self.pairing.index
-        bias = np.where(index >= 0, self.bias[index], 0.0)
-        return np.asarray(self.measurement.eigenvalues / np.square(1.0 + bias))
 
 
 @dataclass(frozen=True)
@@ -86,7 +31,7 @@ class Expansion:
     eigenvalues: FloatArray
 
 
-def expand(comparison: ModalCorrelation) -> Expansion:
+def expand(seen: Seen) -> Expansion:
     """Return the measured modes that have a shape, expanded by the error in constitutive relation.
 
     Of all shapes u that meet the readings within their noise, the one whose error has the least
@@ -97,10 +42,10 @@ def expand(comparison: ModalCorrelation) -> Expansion:
     Source: Ladeveze & Chouaki (1999), Application of a posteriori error estimation for structural
     model updating, Inverse Problems 15; the solution by readings is the dual of theirs by dofs.
     """
-    m = comparison.measurement
-    rows = comparison.model.observe(m.sensors)
+    m = seen.measurement
+    rows = seen.model.observe(m.sensors)
     columns = []
-    for j, eigenvalue in enumerate(comparison.eigenvalues):
+    for j, eigenvalue in enumerate(seen.eigenvalues):
         known = np.isfinite(m.shapes[:, j])
         if known.sum() < LEAST_SENSORS:
             continue
@@ -110,29 +55,29 @@ def expand(comparison: ModalCorrelation) -> Expansion:
         std = np.where(np.isfinite(std) & (std > 0.0), std, settings.reachable_shape_std * size)
         sensors = np.asarray(rows[np.flatnonzero(known)].toarray()) / std[:, None]
         if size > 0.0:
-            columns.append(_expanded(comparison, sensors, reading / std, float(eigenvalue)))
+            columns.append(_expanded(seen, sensors, reading / std, float(eigenvalue)))
     if not columns:
-        none = np.zeros((comparison.model.size, 0))
+        none = np.zeros((seen.model.size, 0))
         return Expansion(none, none, np.zeros(0))
     shapes, gaps, values = zip(*columns, strict=True)
     return Expansion(np.column_stack(shapes), np.column_stack(gaps), np.array(values))
 
 
 def _expanded(
-    comparison: ModalCorrelation, sensors: FloatArray, reading: FloatArray, eigenvalue: float
+    seen: Seen, sensors: FloatArray, reading: FloatArray, eigenvalue: float
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return shape and gap of one mode, and the eigenvalue.
 
     Arguments:
-        comparison: model and modes.
+        seen: model and modes.
         sensors: readings from dofs in standard deviations, (n_sensors, n).
         reading: in standard deviations, (n_sensors,).
         eigenvalue: measured, in rad^2/s^2.
     """
-    model = comparison.model
+    model = seen.model
     # As near as that to one of the model, K - lambda M is as good as singular.
     step = settings.negligible
-    near = np.abs(comparison.modes.eigenvalues / eigenvalue - 1.0).min(initial=1.0) < 0.5 * step
+    near = np.abs(seen.modes.eigenvalues / eigenvalue - 1.0).min(initial=1.0) < 0.5 * step
     solve = _Solver(model, eigenvalue * (1.0 + step) if near else eigenvalue)
     patterns = solve(sensors.T)
     energy = patterns.T @ model.stiffness_times(patterns)

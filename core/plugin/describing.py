@@ -15,9 +15,10 @@ from femubench.core.plugin.apart import Origin
 from femubench.core.plugin.distribution import about
 from femubench.core.plugin.foreign import doc_of
 from femubench.core.plugin.importing import (
+    PREFIX,
     BrokenPlugin,
     Offers,
-    broken_plugin,
+    describe_fault,
     import_offer,
     offers_of,
     source_of,
@@ -46,14 +47,14 @@ def describe_plugin(origin: Origin, _: Mapping[str, Any]) -> dict[str, Any]:
         found = offers_of(source, broken)
     except BaseException as fault:  # of whatever kind: it is the plugin's own
         found = None
-        broken.append(broken_plugin(source, fault))
+        broken.append(describe_fault(source, fault))
     for kind, offered in (found or {kind: Offers() for kind in _DESCRIBE}).items():
         offers[kind] = []
         for name in offered:
             try:
                 offers[kind].append(_describe_offer(origin, kind, offered[name]))
             except BaseException as fault:
-                broken.append(broken_plugin(source, fault, kind))
+                broken.append(describe_fault(source, fault, PREFIX + kind))
     faults = [asdict(fault) for fault in broken]
     for item in faults:
         item["traceback"] = item["traceback"][-_LONGEST_TRACE:]

@@ -138,7 +138,9 @@ class _Reference(Later):
                 named = f"is named {filled.name!r} and offered as {self.name!r}"
                 raise PluginError(f"{self.target.value} {named}")
         except _FAULTS as fault:
-            raise PluginError(str(_broken(self.source, fault, PREFIX + self.kind))) from fault
+            raise PluginError(
+                str(describe_fault(self.source, fault, PREFIX + self.kind))
+            ) from fault
         return filled
 
 
@@ -167,7 +169,7 @@ def take(
             hook = next((name for name in HOOKS if repr(name) in text), "")
             raise _HookError(hook, text.removeprefix(f"Plugin {source.name!r} ")) from fault
     except _FAULTS as fault:
-        broken.append(_broken(source, fault))
+        broken.append(describe_fault(source, fault))
         return None
     return {
         kind: tuple(_collect(source, manager, kind, offers, broken))
@@ -249,7 +251,7 @@ def _collect(
     try:
         offered = list(_call(manager, hook))
     except _FAULTS as fault:
-        broken.append(_broken(source, fault, hook))
+        broken.append(describe_fault(source, fault, hook))
         return
     for entry in offered:
         try:
@@ -261,7 +263,7 @@ def _collect(
             if filled.name in taken:
                 raise PluginError(f"the name {filled.name!r} is taken by another of the {kind}")
         except _FAULTS as fault:
-            broken.append(_broken(source, fault, hook))
+            broken.append(describe_fault(source, fault, hook))
             continue
         taken[filled.name] = filled
         yield filled.name
@@ -286,12 +288,8 @@ def _call(manager: pluggy.PluginManager, hook: str) -> Iterator[object]:
             yield EntryPoint(name, value, hook)
 
 
-def broken_plugin(source: Source, fault: BaseException, kind: str = "") -> BrokenPlugin:
-    """Return what is wrong with a plugin, or with what it offers of a kind."""
-    return _broken(source, fault, PREFIX + kind if kind else "")
-
-
-def _broken(source: Source, fault: BaseException, hook: str = "") -> BrokenPlugin:
+def describe_fault(source: Source, fault: BaseException, hook: str = "") -> BrokenPlugin:
+    """Return what is wrong with a plugin, or with what it offers under a hook."""
     try:
         text = " ".join(str(fault).split())
     except Exception:

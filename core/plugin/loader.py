@@ -16,7 +16,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
-from femubench.core.errors import PluginError, harmless
+from femubench.core.errors import PluginError, harmless, harmless_lines
 from femubench.core.plugin import apart
 from femubench.core.plugin.apart import Origin
 from femubench.core.plugin.foreign import Foreign, make_proxy
@@ -28,7 +28,7 @@ from femubench.core.plugin.importing import (
     take,
 )
 from femubench.core.plugin.markers import PROJECT
-from femubench.core.plugin.validation import CHECKS, choose_names, of_type
+from femubench.core.plugin.validation import CHECKS, choose_names
 from femubench.core.roles import Effect, Fault, Paper, Reader, Reporter, Scenario, Strategy
 from femubench.core.source_files import stamps
 from femubench.core.version import __version__
@@ -147,22 +147,25 @@ def _believed(
         )
         broken.append(_wrong(origin, "", message))
         return
+    from femubench.core.plugin.description import read_plugin
+
     try:
-        faults = [
-            _broken_plugin(origin, item) for item in of_type(description["broken"], list, "faults")
-        ]
-        offered = {kind: of_type(description["offers"][kind], list, kind) for kind in found}
-    except (KeyError, TypeError, PluginError) as fault:
+        said = read_plugin(description)
+    except PluginError as fault:
         broken.append(_wrong(origin, "", f"its description is none: {fault}"))
         return
+    faults = [
+        _wrong(origin, harmless(one.hook)[:80], one.message, harmless_lines(one.traceback))
+        for one in said.broken
+    ]
     offers = {
-        kind: tuple(_described(origin, kind, offered[kind], taken, faults))
+        kind: tuple(_described(origin, kind, said.offers.get(kind, ()), taken, faults))
         for kind, taken in found.items()
     }
     broken += faults[:_MOST_FAULTS]
     if len(faults) > _MOST_FAULTS:
         broken.append(_wrong(origin, "", f"and {len(faults) - _MOST_FAULTS} more faults"))
-    if description.get("loaded") is True:
+    if said.loaded:
         yield LoadedPlugin(origin.plugin, origin.distribution, offers, own=False)
 
 
@@ -184,16 +187,6 @@ def _described(
 def _wrong(origin: Origin, hook: str, message: str, trace: str = "") -> BrokenPlugin:
     clean = harmless(message)[:_LONGEST_MESSAGE]
     return BrokenPlugin(origin.plugin, origin.distribution, hook, clean, trace)
-
-
-def _broken_plugin(origin: Origin, item: Any) -> BrokenPlugin:  # noqa: ANN401 - what a third party stated
-    texts = [of_type(item[key], str, key) for key in ("hook", "message", "traceback")]
-    trace = "".join(f"{_printable(line)}\n" for line in texts[2].splitlines())
-    return _wrong(origin, harmless(texts[0])[:80], texts[1], trace)
-
-
-def _printable(line: str) -> str:
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
 
 
 def list_effects(*plugins: str) -> tuple[Effect, ...]:

@@ -16,15 +16,8 @@ SIMPLE = (bool, int, float, str, type(None))
 class StatedOptions(ABC):
     """A strategy whose options are known and set without its code."""
 
-    @property
-    @abstractmethod
-    def options(self) -> dict[str, Any]:
-        """Return the options that fit on a command line, with their present values."""
-
-    @property
-    @abstractmethod
-    def open(self) -> tuple[str, ...]:
-        """Return options that take further entries by name."""
+    options: Mapping[str, Any]  # those that fit on a command line, with their present values
+    open: tuple[str, ...]  # those that take further entries by name
 
     @property
     @abstractmethod
@@ -43,7 +36,7 @@ class StatedOptions(ABC):
 def options_of(strategy: object) -> dict[str, Any]:
     """Return the options that fit on a command line, with their present values."""
     if isinstance(strategy, StatedOptions):
-        return strategy.options
+        return dict(strategy.options)
     if not is_dataclass(strategy) or isinstance(strategy, type):
         return {}
     present = {field.name: getattr(strategy, field.name) for field in fields(strategy)}

@@ -7,9 +7,9 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from femubench.core.errors import PluginError, UnknownNameError, harmless
+from femubench.core.errors import PluginError, UnknownNameError
 from femubench.core.roles import (
     CAPABILITIES,
     Effect,
@@ -22,7 +22,6 @@ from femubench.core.roles import (
     list_declared,
 )
 
-Thing = TypeVar("Thing")
 # Names become words on the command line and parts of file names.
 _WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
 _GROUPED = re.compile(rf"({_WORD.pattern}/)?{_WORD.pattern}")
@@ -204,30 +203,6 @@ def check_name(filled: object) -> None:
         PluginError: when it is none.
     """
     _check_name(filled, filled, _WORD)
-
-
-def of_type(value: object, wanted: type[Thing], what: str) -> Thing:
-    """Return a value that a process of a third party stated.
-
-    Raises:
-        PluginError: when it is of another type.
-    """
-    if not isinstance(value, wanted):
-        raise PluginError(f"{what} was given as {type(value).__name__}, not {wanted.__name__}")
-    return value
-
-
-def check_texts(value: object, what: str, known: Iterable[str] | None = None) -> list[str]:
-    """Return a list of lines that a process of a third party stated.
-
-    Raises:
-        PluginError: when it is none, or an entry is not among the known ones.
-    """
-    found = [harmless(of_type(item, str, what)) for item in of_type(value, list, what)]
-    for item in found if known is not None else ():
-        if item not in (known or ()):
-            raise PluginError(f"{what} {item[:80]!r} is unknown")
-    return found
 
 
 def _instance(offered: object) -> object:

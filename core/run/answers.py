@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from femubench.core.errors import FemubenchError, StrategyFailure, harmless
+from femubench.core.errors import FemubenchError, StrategyFailure, harmless, harmless_lines
 from femubench.core.fem.model import Model
 from femubench.core.run.jobs import Estimate, JobOutcome, Report, one_line
 from femubench.core.run.plain_arrays import BytesError, Shelf, open_bytes
@@ -137,20 +137,14 @@ def _outcome(status: Status, report: Report) -> JobOutcome:
         raise BytesError(f"{length} bytes of figures, allowed {_LONGEST_FIGURES}")
     said = {field.name: getattr(report, field.name) for field in fields(Report)}
     said["reason"] = _harmless(report.reason, _LONGEST_REASON)
-    said["traceback"] = _harmless_lines(report.traceback)
+    # Of a long one the end.
+    said["traceback"] = harmless_lines(report.traceback[-LONGEST_TEXT:])[-LONGEST_TEXT:]
     return JobOutcome(**{**said, **figures, "status": status})
 
 
 def _harmless(text: str, longest: int = _LONGEST_NAME) -> str:
     """Return a text on one line, which no terminal obeys."""
     return harmless(text[:longest])[:longest]
-
-
-def _harmless_lines(text: str) -> str:
-    """Return a text of several lines, which no terminal obeys; of a long one the end."""
-    lines = text[-LONGEST_TEXT:].split("\n")
-    clean = ("".join(c if c.isprintable() else ascii(c)[1:-1] for c in line) for line in lines)
-    return "\n".join(clean)[-LONGEST_TEXT:]
 
 
 def _harmless_estimate(item: Estimate) -> Estimate:

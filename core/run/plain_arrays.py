@@ -16,7 +16,7 @@ from msgspec import Meta, Struct
 
 from femubench.core.errors import FemubenchError
 from femubench.core.schema.records import encodable, to_builtin
-from femubench.core.schema.validation import find_fault
+from femubench.core.schema.validation import say_fault
 from femubench.core.typing import AnyArray
 
 _LENGTH = 8  # bytes that hold the length of the head
@@ -112,12 +112,6 @@ def open_bytes(kind: type[_T], data: bytes | memoryview) -> tuple[_T, list[AnyAr
     except (msgspec.DecodeError, ValueError, RecursionError) as error:
         raise BytesError(f"the head cannot be read: {error}") from error
     return head, _arrays(tables, view[_LENGTH + size :])
-
-
-def say_fault(kind: object, data: object, error: msgspec.ValidationError) -> str:
-    """Return path, fault and expectation of an error of `msgspec`, in one line."""
-    path, what, expected = find_fault(kind, data, error)
-    return f"{path}: {what}" + (f", expected {expected}" if expected else "")
 
 
 def _arrays(tables: list[_Table], rest: memoryview) -> list[AnyArray]:

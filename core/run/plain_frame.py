@@ -17,7 +17,8 @@ import msgspec
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame, Material, Member
 from femubench.core.fem.sections import Section, TabulatedKappa
-from femubench.core.run.plain_arrays import BytesError, say_fault
+from femubench.core.run.plain_arrays import BytesError
+from femubench.core.schema.validation import say_fault
 
 # What a strategy may change of a frame; the rest says what kind of structure it is.
 _KEPT = ("plane", "free", "sets", "families")

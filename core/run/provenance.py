@@ -8,7 +8,7 @@ import platform
 import secrets
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -26,7 +26,7 @@ from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Strategy
 from femubench.core.score.bounded_gain import Rule
 from femubench.core.score.scoring import Reference
-from femubench.core.source_files import Stamp, python_files, stamp, stamps
+from femubench.core.source_files import Stamp, stamp, stamps
 from femubench.core.version import __version__
 
 _OWN = "femubench"
@@ -73,7 +73,7 @@ def about_of(strategy: Strategy) -> dict[str, str]:
     """Return what the package of a strategy says of it; of one given by hand, its DOI alone."""
     inner = strategy.base if isinstance(strategy, Variant) else strategy
     if isinstance(inner, ForeignStrategy):
-        return inner.about
+        return dict(inner.about)
     return about(_OWN if comes_along(strategy) else "", getattr(inner, "doi", ""))
 
 
@@ -93,7 +93,8 @@ def home_of(strategy: Strategy) -> tuple[str, str]:
 
 def source_digest(top: str = _OWN, module: str = "") -> str:
     """Return a digest of the Python files of a package, or of the file of a lone module."""
-    return _digest(tuple(_stamps(top, module)))
+    own = getattr(sys.modules.get(module), "__file__", None)
+    return _digest(stamps(top) or ((stamp(own),) if own else ()))
 
 
 def package_version(top: str) -> str:
@@ -116,16 +117,6 @@ def _installed(package: str, missing: str) -> str:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
         return missing
-
-
-def _stamps(top: str, module: str) -> Iterator[Stamp]:
-    """Yield the Python files of a package, or the file of a lone module, with time and size."""
-    folders = getattr(sys.modules.get(top), "__path__", ())
-    files = sorted({file for folder in folders for file in python_files(folder)})
-    own = getattr(sys.modules.get(module), "__file__", None)
-    if not files and own:
-        files = [own]
-    yield from map(stamp, files)
 
 
 @lru_cache(maxsize=64)

@@ -81,6 +81,12 @@ def find_fault(
     return path, what, expected
 
 
+def say_fault(kind: object, data: object, error: msgspec.ValidationError) -> str:
+    """Return path, fault and expectation of an error of `msgspec`, in one line."""
+    path, what, expected = find_fault(kind, data, error)
+    return f"{path}: {what}" + (f", expected {expected}" if expected else "")
+
+
 def _culprit(kind: Any, data: object, steps: Sequence[Any], message: str) -> str:  # noqa: ANN401
     """Return the key of a mapping at which the same error is raised again, by halves of it."""
     table: Any = data

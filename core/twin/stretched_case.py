@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from femubench.core.case.case import Case
+from femubench.core.case.similarity import similar_section
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.frame import Frame, GroundSpring, Joint, Material, Member, Place, PointMass
 from femubench.core.fem.model import Model
@@ -20,7 +21,6 @@ from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import pair_measured
 from femubench.core.twin.reduced_solid import LARGEST, ReducedSolid
-from femubench.core.twin.similarity import similar_section
 from femubench.core.typing import FloatArray
 
 FILE = "stretch.npz"  # in the folder of a case

@@ -9,9 +9,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from femubench.core.case.case import Case
+from femubench.core.case.similarity import Similarity, similar_case
 from femubench.core.errors import NotApplicable
 from femubench.core.twin.disguise import disguise_case
-from femubench.core.twin.similarity import Similarity, similar_case
 from femubench.core.twin.stretched_case import draw_stretched_case
 
 MARK = "~"  # between the name of a case and the number of its twin

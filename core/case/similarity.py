@@ -15,6 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.case.case import Case
+from femubench.core.case.matrix_files import matrices_of
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.frame import (
@@ -147,20 +148,29 @@ def _model(model: Model, by: Similarity) -> Model:
         return Model.of(similar_frame(model.structure.frame, by))
     if not isinstance(model.geometry, MatrixGeometry):
         raise NotApplicable("a model without elements and without nodes has no similar one")
+    return similar_matrices(model, model.geometry, by)
+
+
+def similar_matrices(model: Model, geometry: MatrixGeometry, by: Similarity) -> Model:
+    """Return the model of matrices, with low-rank changes in them, of the similar structure."""
     dofs = replace(model.dofs, xyz=by.length * model.dofs.xyz)
     mass, stiffness = matrix_factors(dofs, by)
+    whole = matrices_of(model)
 
     def parts(named: Mapping[str, SparseArray], factor: SparseArray) -> dict[str, SparseArray]:
-        return {name: _scaled(part, factor) for name, part in named.items()}
+        return {name: scale_matrix(part, factor) for name, part in named.items()}
 
+    outlines = {name: by.length * ends for name, ends in geometry.outlines.items()}
     return replace(
         model,
-        mass=_scaled(model.mass, mass),
-        stiffness=_scaled(model.stiffness, stiffness),
+        mass=scale_matrix(whole[0], mass),
+        stiffness=scale_matrix(whole[1], stiffness),
+        mass_change=None,
+        stiffness_change=None,
         groups=parts(model.groups, stiffness),
         mass_groups=parts(model.mass_groups, mass),
         dofs=dofs,
-        geometry=replace(model.geometry, dofs=dofs),
+        geometry=replace(geometry, dofs=dofs, outlines=outlines),
     )
 
 
@@ -178,7 +188,8 @@ def matrix_factors(dofs: Dofs, by: Similarity) -> tuple[SparseArray, SparseArray
     return mass, stiffness
 
 
-def _scaled(matrix: SparseArray, factor: SparseArray) -> SparseArray:
+def scale_matrix(matrix: SparseArray, factor: SparseArray) -> SparseArray:
+    """Return a matrix with one of `matrix_factors` from both sides, (n, n)."""
     found: SparseArray = (factor @ matrix @ factor).asformat(matrix.format)
     return found
 
