@@ -203,7 +203,7 @@ def test_a_mistake_names_its_remedy_and_leaves_nothing(tmp_path: Path, mistake: 
         ("a folder that is no case", "diagnose .", "which `bench init` writes"),
         ("a sensor between two nodes", "update portal -s baruch -o new", "node at every sensor"),
         ("one sensor over time", "identify one.csv", "two or more in one file"),
-        ("responses in several files", "identify a.uff a.uff", "one file, that has all of them"),
+        ("a response in two files", "identify a.uff a.uff", "--modes A --modes B"),
     ],
 )
 def test_other_mistakes_name_their_remedy(

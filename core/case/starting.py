@@ -31,6 +31,7 @@ from femubench.core.case.writing import new_folder
 from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
 from femubench.core.files import check_regular
+from femubench.core.modal.rigid import rigid_body_vectors, rigid_modes_of
 from femubench.core.roles import Reader
 
 # Mass over the cube of the diagonal, kg/m3: a mast of 1 km to a block of steel.
@@ -351,12 +352,17 @@ class _Keys:
 
 
 def sizes_of(model: Model) -> str:
-    """Return how large and heavy a model is, as a clause: a wrong unit shows there first."""
+    """Return how large and heavy a model is, as a clause: a wrong unit shows there first.
+
+    Matrices that hold a model lack the rows of what is held, and their mass.
+    """
+    motions = rigid_body_vectors(model.dofs).shape[1] if model.structure is None else 0
+    held = rigid_modes_of(model).shape[1] < motions
     extent = np.ptp(model.dofs.xyz, axis=0) if len(model.dofs) else np.zeros(3)
     sides = " x ".join(f"{side:.4g}" for side in extent)
     return (
         f"has {model.size} degrees of freedom, spans {sides} m along x, y, z and has a mass of "
-        f"{model.total_mass:.4g} kg"
+        f"{model.total_mass:.4g} kg{', but for rows that are held' if held else ''}"
     )
 
 
