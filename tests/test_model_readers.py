@@ -333,7 +333,7 @@ def test_a_held_job_has_the_mass_of_its_free_rows(tmp_path: Path) -> None:
         mass, expected = held.mass[theirs][:, theirs].sum(), body.mass[ours][:, ours].sum()
         assert mass == pytest.approx(expected, rel=1e-6)
         assert mass < 0.95 * DENSITY * SIDES.prod()
-    assert sizes_of(held).endswith(" kg, but for rows that are held")
+    assert sizes_of(held).endswith(" kg, without held rows if it has any")
     assert sizes_of(femubench.read_model(tmp_path / "body.inp")).endswith(" kg")
 
 

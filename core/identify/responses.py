@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from femubench.core.errors import InputError
@@ -81,9 +80,9 @@ def identify_responses(
 
 def _check_linked(data: FrequencyResponses, seen: BoolArray) -> None:
     """Check that forces link all responses: else shapes have no common scale."""
-    graph = sp.block_array([[None, seen], [seen.T, None]])
-    part = connected_components(graph, directed=False)[1][: len(seen)]
-    apart = np.flatnonzero(seen.any(axis=1) & (part != part[seen.any(axis=1)][0]))
+    part = connected_components(seen @ seen.T)[1]
+    measured = np.flatnonzero(seen.any(axis=1))
+    apart = measured[part[measured] != part[measured[0]]]
     if len(apart):
         label = data.responses.labels[apart[0]]
         what = f"no force links the response at {label} with the first one: the scale is unknown"
