@@ -12,6 +12,7 @@ import pytest
 
 import femubench
 from femubench import Identification, InputError, identify
+from femubench.core.case.response_files import join_files
 from femubench.core.identify.complexity import mean_phase_deviation, phase_collinearity
 from femubench.modal import FrequencyResponses, TimeSignals
 from femubench.plot import mode_shape, stabilisation, synthesis
@@ -205,6 +206,57 @@ def test_the_command_writes_tables_that_a_case_reads(tmp_path: Path, small: Any)
     assert "<script" not in page
     again = call_bench("identify", file, "--output", tmp_path / "out", code=2)
     assert "is not empty" in again.output
+
+
+@pytest.mark.slow(3)
+def test_responses_of_one_test_lie_in_several_files(tmp_path: Path, small: Any) -> None:
+    """One drive a file, sensors that rove, both at once: the responses are those of one file."""
+    whole, cuts = small.measured, [range(5), range(5, 13)]
+    drives = [part(whole, range(13), i) for i in (0, 1)]
+    both = [part(whole, rows, i) for rows in cuts for i in (0, 1)]
+    for held in (drives, [whole.take(rows) for rows in cuts], both):
+        joined = join_files([tmp_path] * len(held), held)
+        assert isinstance(joined, FrequencyResponses)
+        np.testing.assert_array_equal(joined.values, whole.values)
+        assert joined.responses.labels == whole.responses.labels
+    files = [write_universal(tmp_path / f"{k}.uff", one) for k, one in enumerate(both)]
+    done = call_bench("identify", files[0], files[-1], code=2)
+    assert "no force links the response at 6:z with the first one" in done.output
+    call_bench("identify", *files, "--output", tmp_path / "found")
+    table = (tmp_path / "found" / "modes.csv").read_text(encoding="utf-8").splitlines()
+    hertz = [float(line.split(",")[1]) for line in table[1:]]
+    assert hertz == pytest.approx(small.frequencies, rel=5e-4)
+
+
+def part(measured: FrequencyResponses, rows: range, force: int) -> FrequencyResponses:
+    """Return some responses to one force."""
+    one = measured.take(rows)
+    values = one.values[:, :, force : force + 1]
+    return replace(one, values=values, references=measured.references.take([force]))
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({}, "b.uff: the response at 1:z to 1:z is in a file before it, too"),
+        ({"frequencies": 1.01}, "b.uff: lines: 361, 20.2 to 202 Hz (expected 361, 20 to 200 Hz"),
+        ({"quantity": "mobility"}, "b.uff: mobility (expected accelerance, as"),
+        ({"responses": replace(sensors(13), xyz=np.ones((13, 3)))}, "'1:z' has two places"),
+    ],
+    ids=["pair", "lines", "quantity", "place"],
+)
+def test_files_that_do_not_belong_together(
+    tmp_path: Path, small: Any, change: Any, says: str
+) -> None:
+    if "frequencies" in change:
+        change = {"frequencies": change["frequencies"] * small.measured.frequencies}
+    files = [
+        write_universal(tmp_path / f"{name}.uff", replace(small.measured, **more))
+        for name, more in (("a", {}), ("b", change))
+    ]
+    done = call_bench("identify", *files, code=2)
+    assert says in done.output.replace(f"{tmp_path}/", "")
+    assert done.output.count("\n") == 1
 
 
 def test_drawings_refuse_what_they_cannot_draw(found: Identification) -> None:

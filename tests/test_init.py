@@ -17,7 +17,10 @@ from click.testing import Result
 
 import femubench
 import femubench.plot
+from femubench.core.case.case import Match
+from femubench.core.case.matching import Alignment
 from femubench.core.case.records import mean_record
+from femubench.core.case.turns import propose_axes
 from femubench.modal import FrequencyResponses
 from tests.command import call_bench
 from tests.frf_problems import write_universal
@@ -38,11 +41,11 @@ def chain(folder: Path) -> tuple[np.ndarray, np.ndarray]:
     return np.sqrt(values) / (2.0 * np.pi), shapes
 
 
-def universal(folder: Path, length: float = 1e3, count: int = 6, **nodes: np.ndarray) -> Path:
-    """Write a test of the chain, in mm unless stated, its axis along the test's y, 3 mm off."""
+def universal(folder: Path, axis: int = 3, count: int = 6, **nodes: np.ndarray) -> Path:
+    """Write a test in mm of the chain, which lies along y, 3 mm off, and moves along an axis."""
     hertz, shapes = chain(folder)
     zero, x = np.zeros(SPANS), 0.2 * np.arange(1.0, SPANS + 1.0)
-    place = {"x": zero + 0.003 * length, "y": length * x, "z": zero} | nodes
+    place = {"x": zero + 3.0, "y": 1e3 * x, "z": zero} | nodes
     numbers = np.arange(1, SPANS + 1)
     sets = [
         pyuff.prepare_151(model_name="chain", return_full_dict=True),
@@ -58,7 +61,8 @@ def universal(folder: Path, length: float = 1e3, count: int = 6, **nodes: np.nda
         {
             "type": 55, "analysis_type": 2, "data_ch": 2, "spec_data_type": 8, "load_case": 1,
             "mode_n": k + 1, "freq": 0.98 * hertz[k], "modal_damp_vis": 0.01,
-            "node_nums": numbers, "r1": zero, "r2": zero, "r3": shapes[:, k],
+            "node_nums": numbers,
+            **{f"r{own}": shapes[:, k] if own == axis else zero for own in (1, 2, 3)},
         }
         for k in range(count)
     ]  # fmt: skip
@@ -100,6 +104,43 @@ def test_folder_runs_and_says_what_was_done(tmp_path: Path) -> None:
                   ["diagnose", str(folder), "--no-pairs", "--effects", "added-mass"]):  # fmt: skip
         found = call_bench(*words)
         assert "coordinates were taken in mm" in " ".join(found.output.split())
+
+
+def test_directions_of_sensors_that_are_wrong_are_seen_by_shapes(tmp_path: Path) -> None:
+    """The chain moves along its z; along y springs of a slope, other at every mass, hold it."""
+    universal(tmp_path, axis=1)
+    other = STIFFNESS * sp.diags_array(np.linspace(0.5, 3.0, SPANS))
+    for name, more in (("K", other), ("M", MASS * sp.eye_array(SPANS))):
+        both = sp.block_diag([scipy.io.mmread(tmp_path / f"{name}.mtx"), more])
+        scipy.io.mmwrite(tmp_path / f"{name}.mtx", sp.coo_array(both), symmetry="symmetric")
+    rows = (tmp_path / "dofs.csv").read_text()
+    for line in rows.splitlines()[1:]:
+        row, node, _, *xyz = line.split(",")
+        rows += ",".join([str(int(row) + SPANS), node, "y", *xyz]) + "\n"
+    (tmp_path / "dofs.csv").write_text(rows)
+    done = init(tmp_path, "--frame", "y,-x,z")
+    stated = " ".join(done.output.split())
+    (remedy,) = re.findall(
+        r'like the model\'s with frame = "(\S+)": mean MAC 1, not 0\.\d+', stated
+    )
+    assert remedy in (tmp_path / "case" / "case.toml").read_text()
+    for words in (["--frame", remedy], ["--frame", "y,-x,z", "--directions", remedy]):
+        (tmp_path / "case").rename(tmp_path / words[-2])
+        done = init(tmp_path, *words)
+        assert " ".join(done.output.split()).count("1.000") == 6  # MAC
+        assert "shapes are like" not in done.output
+
+
+def test_directions_alone_that_are_wrong_are_named() -> None:
+    case = femubench.cases["suite/portal"]
+    own = case.measurement.sensors
+    places = tuple(Match(label, "", x, x) for label, x in zip(own.labels, own.xyz, strict=True))
+    case, as_stated = replace(case, matches=places), Alignment(None, np.eye(3), 0.01)
+    assert propose_axes(case, as_stated) == ""
+    axes = own.axes[:, [2, 1, 0, 5, 4, 3]]
+    turned = femubench.Sensors.along(own.labels, own.xyz, axes)
+    case = replace(case, measurement=replace(case.measurement, sensors=turned))
+    assert 'with directions = "z,-y,x": mean MAC 0.99' in propose_axes(case, as_stated)
 
 
 X = 1e3 * 0.2 * np.arange(1.0, SPANS + 1.0)
@@ -203,7 +244,7 @@ def test_a_mistake_names_its_remedy_and_leaves_nothing(tmp_path: Path, mistake: 
         ("a folder that is no case", "diagnose .", "which `bench init` writes"),
         ("a sensor between two nodes", "update portal -s baruch -o new", "node at every sensor"),
         ("one sensor over time", "identify one.csv", "two or more in one file"),
-        ("responses in several files", "identify a.uff a.uff", "one file, that has all of them"),
+        ("a response in two files", "identify a.uff a.uff", "--modes A --modes B"),
     ],
 )
 def test_other_mistakes_name_their_remedy(

@@ -50,6 +50,7 @@ from femubench.core.fem.frame import (
     Vector,
 )
 from femubench.core.fem.mesh import ON_MEMBER, locate, nearest_place, place_xyz
+from femubench.core.fem.model import Model
 from femubench.core.fem.sections import SHAPES, Section
 from femubench.core.fem.sensors import moved_names
 from femubench.core.typing import FloatArray
@@ -161,6 +162,14 @@ class FrameSite:
 
 # A structure on which places and directions can be checked.
 Site: TypeAlias = FrameSite | MatrixGeometry
+
+
+def site_of(model: Model) -> Site:
+    """Return the structure of a model, with its joints and members or with its nodes."""
+    held = model.geometry
+    return held if isinstance(held, MatrixGeometry) else FrameSite(model.frame_structure.frame)
+
+
 # The tables of `[model]` bear the names of the frame's lists, their keys those of its fields.
 _PARTS: dict[str, type] = {
     "joints": Joint,

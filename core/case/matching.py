@@ -50,6 +50,7 @@ class Alignment:
         origin: of the test's origin in m along the axes of the model, (3,).
         without: labels of sensors that are left out.
         model_unit: of a model that comes in files; None of one that is in m by definition.
+        directions: the axes of the model in those of the directions, (3, 3); None for `turn`.
     """
 
     unit: float | None
@@ -58,6 +59,7 @@ class Alignment:
     origin: FloatArray = field(default_factory=lambda: np.zeros(3))
     without: Collection[str] = ()
     model_unit: LengthUnit | None = None
+    directions: FloatArray | None = None
 
     @classmethod
     def of(cls, spec: MeasurementSpec, model_unit: LengthUnit | None = None) -> Alignment:
@@ -69,6 +71,7 @@ class Alignment:
             np.array(spec.origin, dtype=float),
             spec.without,
             model_unit,
+            None if spec.directions is None else parse_frame(spec.directions),
         )
 
     def moved(self, xyz: FloatArray) -> FloatArray:
@@ -77,10 +80,10 @@ class Alignment:
 
     def direction(self, name: str) -> str:
         """Return a direction of the test as one of the model."""
-        if np.array_equal(self.turn, np.eye(3)):
+        turn = self.turn if self.directions is None else self.directions
+        if np.array_equal(turn, np.eye(3)):
             return name
-        axis = axis_of(name)
-        return direction_of(np.concatenate([self.turn @ axis[:3], self.turn @ axis[3:]]))
+        return direction_of(np.kron(np.eye(2), turn) @ axis_of(name))
 
 
 class Placed(NamedTuple):
@@ -418,7 +421,7 @@ def match_sensors(
             stated = (f"{file.name}: coordinates were taken in {unit}, since {why}", *stated)
         stated = (*stated, *describe_matches([match for match, _ in kept], file.name))
     if not kept:
-        expected = "nodes with coordinates, in a direction that the model has"
+        expected = "nodes with coordinates, in a direction that the model has (--directions AXES)"
         raise InputError("no sensor fits the structure", file=file, expected=expected)
     found = tuple(match for match, _ in kept)
     places = np.array([match.xyz for match in found])

@@ -19,11 +19,11 @@ from femubench.core.case.faults import BadKey, KeyPath, at_key
 from femubench.core.case.files import LARGEST_CASE, CaseFiles
 from femubench.core.case.frame_tables import FrameTables
 from femubench.core.case.frames import (
-    FrameSite,
     Site,
     alteration_of,
     attachments,
     frame_of,
+    site_of,
 )
 from femubench.core.case.matching import Alignment, Placed, match_sensors
 from femubench.core.case.matrices import model_of_matrices, reader_of, reading_with
@@ -154,11 +154,7 @@ class _Building:
         model = self.model()
         if isinstance(model.geometry, MatrixGeometry):
             model = with_mesh(model)
-        site: Site = (
-            model.geometry
-            if isinstance(model.geometry, MatrixGeometry)
-            else FrameSite(model.frame_structure.frame)
-        )
+        site = site_of(model)
         measurement = self.measurement(site)
         info = self.spec.case
         modifications = self.modifications(model, site, measurement.sensors)

@@ -90,7 +90,8 @@ def mean_record(records: Sequence[Measurement], files: Sequence[Path]) -> tuple[
         rows = {label: i for i, label in enumerate(record.sensors.labels)}
         if apart := sorted(set(rows) ^ set(first.sensors.labels)):
             what = f"not the sensors of {files[0]}: {', '.join(apart[:6])} in one of them only"
-            raise InputError(what, file=file, expected="the same sensors, or a case of its own")
+            expected = "the same sensors; parts of one test: `bench identify A B --output FOLDER`"
+            raise InputError(what, file=file, expected=expected)
         own = record.shapes[[rows[label] for label in first.sensors.labels]]
         ways = (first.frequencies, first.shapes, record.frequencies, own)
         index = pair_modes(*ways, least_mac=_LEAST_MAC, window=_WINDOW).index

@@ -248,6 +248,46 @@ def _sensors(file: Path, side: Sensors, known: Sensors | None) -> Sensors:
     return Sensors(labels, xyz, tuple(directions))
 
 
+def join_files(files: Sequence[Path], parts: Sequence[Responses]) -> Responses:
+    """Return what several files hold of one state: records after one another, or all responses.
+
+    Raises:
+        InputError: where they do not belong together: other lines, quantities or places, a response
+            that two of them have.
+    """
+    signals = [part for part in parts if isinstance(part, TimeSignals)]
+    held = [part for part in parts if isinstance(part, FrequencyResponses)]
+    if len(parts) == 1 or not held:
+        return parts[0] if len(parts) == 1 else TimeSignals.joined(signals)
+    if signals:
+        what, expected = "records over time and frequency responses", "files of one kind"
+        raise InputError(what, file=files[0], expected=expected)
+    every = [Sensors.united([part.responses for part in held])]
+    every += [Sensors.united([part.references for part in held])]
+    joined = held[0].spread(*every)
+    for file, part in zip(files[1:], held[1:], strict=True):
+        more, lines = part.spread(*every), joined.frequencies
+        own, twice = (np.isfinite(one.values).all(axis=0) for one in (more, joined))
+        what = expected = ""
+        if part.quantity != joined.quantity:
+            what, expected = part.quantity, f"{joined.quantity}, as {files[0]} has"
+        elif len(part.frequencies) != len(lines) or not np.allclose(part.frequencies, lines):
+            what, expected = (dict(one.rows())["lines"] for one in (part, joined))
+            what, expected = f"lines: {what}", f"{expected}, as {files[0]} has"
+        elif len(pair := np.argwhere(own & twice)):
+            labels = (side.labels[k] for side, k in zip(every, pair[0], strict=True))
+            what = "the response at {} to {} is in a file before it, too".format(*labels)
+            expected = "every pair once; of repeats `bench init --modes A --modes B`"
+        if what:
+            raise InputError(what, file=file, expected=expected)
+        known = None
+        if joined.deviations is not None and more.deviations is not None:
+            known = np.where(own, more.deviations, joined.deviations)
+        values = np.where(own, more.values, joined.values)
+        joined = replace(joined, values=values, deviations=known)
+    return joined
+
+
 def responses_npz(measured: FrequencyResponses) -> bytes:
     """Return frequency responses as a NumPy file that `read_responses` reads."""
     held, stds = BytesIO(), measured.deviations

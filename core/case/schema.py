@@ -421,6 +421,9 @@ class MeasurementSpec(TomlTable):
     frame: Annotated[str, Field(strict=True, max_length=40)] | None = Field(
         None, description='the axes of the model in those of the test, e.g. "x,z,-y"'
     )
+    directions: Annotated[str, Field(strict=True, max_length=40)] | None = Field(
+        None, description="the same of the directions of the sensors alone"
+    )
     tolerance: Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)] | None = Field(
         None, description="a number >= 0 and <= 1, of the size of the structure"
     )

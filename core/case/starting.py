@@ -17,20 +17,24 @@ from femubench.core.case.case import SCATTER, Case
 from femubench.core.case.drawn import CASE_FILE
 from femubench.core.case.faults import Remedy
 from femubench.core.case.files import LARGEST_FILE
+from femubench.core.case.matching import Alignment
 from femubench.core.case.matrices import reader_of, reading_with
 from femubench.core.case.model_files import ModelFiles, further_files, read_model
 from femubench.core.case.modes import FIT_STD
 from femubench.core.case.reader import read_case
 from femubench.core.case.records import COVARIANCE, MODES, REFERENCES, SENSORS
 from femubench.core.case.response_files import holds_responses, read_responses
-from femubench.core.case.schema import LengthUnit
+from femubench.core.case.schema import CaseSpec, LengthUnit
 from femubench.core.case.table_text import csv_bytes
 from femubench.core.case.tables import SUFFIXES, read_table
+from femubench.core.case.toml_text import spec_of
+from femubench.core.case.turns import propose_axes
 from femubench.core.case.units import METRES, NEWTONS
 from femubench.core.case.writing import new_folder
-from femubench.core.errors import InputError
+from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.model import Model
 from femubench.core.files import check_regular
+from femubench.core.modal.rigid import rigid_body_vectors, rigid_modes_of
 from femubench.core.roles import Reader
 
 # Mass over the cube of the diagonal, kg/m3: a mast of 1 km to a block of steel.
@@ -50,7 +54,8 @@ class Beginning:
         mass, dofs: files with the mass, and with labels or places of the rows of matrices.
         sensors: a file with the places of sensors, where `modes` has none.
         model_unit: of the lengths of the model; None where it was not stated.
-        unit, frame, tolerance, origin, without: of the test, as the keys of ``[measurement]``.
+        unit, frame, directions, tolerance, origin, without: of the test, as the keys of
+            ``[measurement]``.
         reference: the modes or responses of the structure as it was, like `modes`.
         tables: what was identified, by name: the file that it comes from, and the table.
         stated: what to say of it.
@@ -64,6 +69,7 @@ class Beginning:
     model_unit: LengthUnit | None = None
     unit: LengthUnit | None = None
     frame: str | None = None
+    directions: str | None = None
     tolerance: float | None = None
     origin: str | None = None
     without: str | None = None
@@ -92,7 +98,7 @@ class Beginning:
         """Return the command that begins the case with other keys."""
         words = ["bench", "init", str(folder)]
         files = ("model", "mass", "dofs", "modes", "reference", "sensors")
-        axes = ("model-unit", "unit", "frame", "origin", "tolerance", "without")
+        axes = ("model-unit", "unit", "frame", "directions", "origin", "tolerance", "without")
         for key in (*files, *axes):
             value = remedy.keys.get(key, getattr(self, key.replace("-", "_")))
             for one in value if isinstance(value, tuple) else (value,):
@@ -134,7 +140,8 @@ def start_case(
             modes = fresh / REFERENCE if REFERENCE in given.tables else path
             before = _shared_out(mode_numbers(modes, readers), path)[0]
         keys = _Keys(folder.resolve().name, given, copies, used, held_out, guessed, before)
-        (fresh / CASE_FILE).write_text(keys.text(readers), encoding="utf-8")
+        text = keys.text(readers)
+        (fresh / CASE_FILE).write_text(text, encoding="utf-8")
         try:
             case = read_case(fresh, readers=readers)
         except InputError as error:
@@ -150,6 +157,11 @@ def start_case(
             raise InputError(
                 error.what, file=file, line=line, key=error.key, expected=expected
             ) from None
+        with suppress(ModelError):
+            spec = spec_of(text, fresh / CASE_FILE, CaseSpec).measurement
+            if found := propose_axes(case, Alignment.of(spec)):
+                given = replace(given, stated=(*given.stated, found))
+        keys = replace(keys, given=given)
         (fresh / CASE_FILE).write_text(keys.text(readers, case), encoding="utf-8")
         if case.matches:
             (fresh / MATCHES).write_bytes(_matches_csv(case))
@@ -320,6 +332,8 @@ class _Keys:
             yield f'unit = "{given.unit}"   # of the coordinates of the sensors'
         if given.frame is not None:
             yield f"frame = {_quoted(given.frame)}   # the model's axes in those of the test"
+        if given.directions is not None:
+            yield f"directions = {_quoted(given.directions)}   # likewise of directions alone"
         if given.tolerance is not None:
             yield f"tolerance = {given.tolerance!r}   # of the size of the structure"
         if given.origin is not None:
@@ -351,12 +365,17 @@ class _Keys:
 
 
 def sizes_of(model: Model) -> str:
-    """Return how large and heavy a model is, as a clause: a wrong unit shows there first."""
+    """Return how large and heavy a model is, as a clause: a wrong unit shows there first.
+
+    Matrices that hold a model lack the rows of what is held, and their mass.
+    """
+    motions = rigid_body_vectors(model.dofs).shape[1] if model.structure is None else 0
+    held = rigid_modes_of(model).shape[1] < motions
     extent = np.ptp(model.dofs.xyz, axis=0) if len(model.dofs) else np.zeros(3)
     sides = " x ".join(f"{side:.4g}" for side in extent)
     return (
         f"has {model.size} degrees of freedom, spans {sides} m along x, y, z and has a mass of "
-        f"{model.total_mass:.4g} kg"
+        f"{model.total_mass:.4g} kg{', without held rows if it has any' if held else ''}"
     )
 
 

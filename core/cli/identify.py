@@ -86,8 +86,8 @@ def identify(
     """Find modes in measured responses, without a click.
 
     FILE holds frequency responses, or motions over time with or without the force (a universal
-    file, .csv, .mat, .npz, .h5, .lvm); several are records of one state. Ambient motions take
-    femubench[identify].
+    file, .csv, .mat, .npz, .h5, .lvm); several are records of one state, or hold a part of its
+    responses each. Ambient motions take femubench[identify].
     """
     if output is not None:
         check_new(output)

@@ -57,6 +57,9 @@ def _parse_origin(text: str) -> str:
     help="The axes of the model in those of the test, e.g. x,z,-y. Default: x,y,z.",
 )  # fmt: skip
 @click.option(
+    "--directions", metavar="AXES", help="The same of the sensors' directions alone.",
+)  # fmt: skip
+@click.option(
     "--tolerance", type=float, metavar="X",
     help="How far a sensor may be from the structure, of its size. Default: 0.01.",
 )  # fmt: skip
@@ -78,6 +81,7 @@ def init(
     unit: LengthUnit | None,
     model_unit: LengthUnit | None,
     frame: str | None,
+    directions: str | None,
     tolerance: float | None,
     origin: str | None,
     without: str | None,
@@ -87,7 +91,8 @@ def init(
     With the files of a model and of a test, these are copied, the sensors matched with the model,
     and a case is written that runs; without any, a commented example.
     """
-    others = (mass, dofs, sensors, model_unit, unit, frame, tolerance, origin, without, reference)
+    axes = (frame, directions, tolerance, origin, without)
+    others = (mass, dofs, sensors, model_unit, unit, *axes, reference)
     if model is None and not modes and all(other is None for other in others):
         from femubench.core.library.plugins import init_case
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from femubench.core.errors import InputError
 from femubench.core.typing import FloatArray
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _TINY = 1e-9  # of a unit vector
+_APART = 1e-3  # of the coordinates of a point in two files
 
 
 def unit_motions(directions: Iterable[str]) -> FloatArray:
@@ -101,6 +103,28 @@ class Sensors:
             axes: translations or rotations in (x, y, z, rx, ry, rz), (n_sensors, 6).
         """
         return cls(tuple(labels), xyz, tuple(direction_of(axis) for axis in axes))
+
+    @classmethod
+    def united(cls, every: Sequence[Sensors]) -> Sensors:
+        """Return the sensors of several lists, each label once, at the first place that is known.
+
+        Raises:
+            InputError: for a label at two places.
+        """
+        held: dict[str, tuple[FloatArray, str]] = {}
+        for one in every:
+            for label, xyz, direction in zip(one.labels, one.xyz, one.directions, strict=True):
+                before, _ = held.setdefault(label, (xyz, direction))
+                if not np.isfinite(before).all():
+                    held[label] = (xyz, direction)
+                elif np.linalg.norm(xyz - before) > _APART * np.linalg.norm(before):
+                    what, expected = (
+                        f"{label!r} has two places",
+                        "a name of its own for every point",
+                    )
+                    raise InputError(what, key="sensors", expected=expected)
+        xyz = np.array([place for place, _ in held.values()], dtype=float).reshape(-1, 3)
+        return cls(tuple(held), xyz, tuple(direction for _, direction in held.values()))
 
     def __len__(self) -> int:
         return len(self.labels)

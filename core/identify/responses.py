@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from femubench.core.errors import InputError
 from femubench.core.identify.basis import Lines
@@ -60,6 +61,7 @@ def identify_responses(
     if not np.abs(np.nan_to_num(data.values)).any():
         raise InputError("all responses are zero", expected="measured responses")
     seen: BoolArray = np.asarray(np.isfinite(data.values).all(axis=0))
+    _check_linked(data, seen)
     values = np.where(seen, data.values, 0.0)
     poles = _all_poles(data.frequencies, values, seen, most_poles)
     omega, derivative = 2.0 * np.pi * data.frequencies, DERIVATIVES[data.quantity]
@@ -74,6 +76,17 @@ def identify_responses(
         near = np.abs(seeds - fit.poles[:, None]) < _SAME * np.abs(fit.poles[:, None])
         keep &= near.any(axis=1)
     return _identification(data, fit, lines, clusters, poles, keep)
+
+
+def _check_linked(data: FrequencyResponses, seen: BoolArray) -> None:
+    """Check that forces link all responses: else shapes have no common scale."""
+    part = connected_components(seen @ seen.T)[1]
+    measured = np.flatnonzero(seen.any(axis=1))
+    apart = measured[part[measured] != part[measured[0]]]
+    if len(apart):
+        label = data.responses.labels[apart[0]]
+        what = f"no force links the response at {label} with the first one: the scale is unknown"
+        raise InputError(what, expected="one force, or one sensor, that both parts have")
 
 
 def _course(data: FrequencyResponses, seen: BoolArray) -> FloatArray:

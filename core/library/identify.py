@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 from femubench.core.case.records import record_tables
 from femubench.core.case.response_files import (
     Responses,
+    join_files,
     locate_sensors,
     read_places,
     read_responses,
@@ -55,7 +56,8 @@ def identify(
 
     Arguments:
         measured: a file (universal, a table, ``.mat``, ``.npz``, HDF5, ``.lvm``), several files
-            that are records over time of one state, or what such a file holds.
+            of one state (records over time, or responses that no two of them have), or what such
+            a file holds.
         band: lowest and highest frequency in Hz; None for all that was measured.
         order: number of poles of the largest model; None for 120 of frequency responses, and for
             60 of motions over time.
@@ -119,11 +121,7 @@ def identification_of(
         files, readers = _files(measured), tuple(plugins.readers.values())
         file = files[0]
         read = [read_responses(one, readers, known, variables) for one in files]
-        over_time = [one for one in read if isinstance(one, TimeSignals)]
-        if len(read) > 1 and len(over_time) < len(read):
-            expected = "records over time; of frequency responses one file, that has all of them"
-            raise InputError("frequency responses", file=file, expected=expected)
-        measured = TimeSignals.joined(over_time) if over_time else read[0]
+        measured = join_files(files, read)
     if known is not None:
         measured = locate_sensors(measured, known, Path(sensors or ""))
     said = ""

@@ -106,6 +106,18 @@ class FrequencyResponses(Shown):
         """Return the same numbers as those of another quantity, times a factor."""
         return self._with_values(lambda values: factor * values, quantity=quantity)
 
+    def spread(self, responses: Sensors, references: Sensors) -> FrequencyResponses:
+        """Return the same among more responses and references, nan where none was measured."""
+        rows = [responses.labels.index(label) for label in self.responses.labels]
+        columns = [references.labels.index(label) for label in self.references.labels]
+
+        def wide(values: AnyArray) -> AnyArray:
+            whole = np.full((len(values), len(responses), len(references)), np.nan, values.dtype)
+            whole[np.ix_(range(len(values)), rows, columns)] = values
+            return whole
+
+        return self._with_values(wide, responses=responses, references=references)
+
     def transpose(self) -> FrequencyResponses:
         """Return the responses with forces and motions exchanged, as reciprocity allows."""
         sides = {"responses": self.references, "references": self.responses}

@@ -77,19 +77,13 @@ class TimeSignals(Shown):
         sides: list[Any] = []
         for side, column, empty in (("sensors", "values", np.nan), ("forces", "force_values", 0.0)):
             every = [getattr(part, side) for part in parts]
-            first = {
-                label: (one.xyz[k], one.directions[k])
-                for one in reversed(every)
-                for k, label in enumerate(one.labels)
-            }
-            labels = tuple(dict.fromkeys(label for one in every for label in one.labels))
-            xyz = np.array([first[label][0] for label in labels], dtype=float).reshape(-1, 3)
-            values = np.full((ends[-1], len(labels)), empty)
+            united = Sensors.united(every)
+            values = np.full((ends[-1], len(united)), empty)
             for part, one, rows in zip(parts, every, pairwise(ends), strict=True):
                 if len(one):
-                    where = [labels.index(label) for label in one.labels]
+                    where = [united.labels.index(label) for label in one.labels]
                     values[slice(*rows), where] = getattr(part, column)
-            sides += [Sensors(labels, xyz, tuple(first[label][1] for label in labels)), values]
+            sides += [united, values]
         starts = [
             end + start for end, part in zip(ends, parts, strict=False) for start in part.starts
         ]
