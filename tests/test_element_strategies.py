@@ -42,6 +42,7 @@ from femubench.core.update.element_families import (
 )
 from femubench.core.update.equation_error import (
     FLOOR,
+    Hessian,
     equations,
     nearest_positive,
     rigid_basis,
@@ -368,9 +369,26 @@ def test_bounded_factors_solve_the_convex_problem() -> None:
     # With diagonal A'A and scalar cores the answer is known: every factor on its own.
     family = ElementFamily.physical(one_member(False, "out-of-plane").frame_structure)
     best = np.linspace(-3.0, 0.5, len(family))
-    normal = np.diag(np.linspace(1.0, 5.0, len(family)))
-    x = nearest_positive(family, normal, best)
+    x = nearest_positive(family, np.diag(np.sqrt(np.linspace(1.0, 5.0, len(family)))), best)
     assert x == pytest.approx(np.maximum(best, FLOOR - 1.0), abs=1e-4)
+
+
+@pytest.mark.parametrize("singular", [False, True])
+def test_newton_steps_are_those_of_the_whole_matrix(singular: bool) -> None:
+    family = ElementFamily.generic(NOMINAL.frame_structure)
+    rows, _, _ = equations(NOMINAL, family, exact_modes(NOMINAL, 5), orthogonality=True)
+    hessian, n = Hessian.of(family, rows), len(family)
+    assert hessian.band.shape[0] < n / 3
+    assert len(hessian.wide) == 15
+    blocks = RNG.standard_normal((*family.columns.shape, 40))
+    bend = 0.0 * blocks @ blocks.swapaxes(1, 2) if singular else blocks @ blocks.swapaxes(1, 2)
+    whole = rows.toarray().T @ rows.toarray()
+    whole = np.pad(whole / np.diagonal(whole).max() + 1e-14 * np.eye(n), (0, 1))
+    for columns, block in zip(family.columns, bend, strict=True):
+        whole[np.ix_(columns, columns)] += block
+    right = whole[:n, :n] @ RNG.standard_normal(n)
+    left = whole[:n, :n] @ hessian.solve(bend, right) - right
+    assert np.linalg.norm(left) < (1e-6 if singular else 1e-13) * np.linalg.norm(right)
 
 
 def test_bounded_cores_are_the_nearest_ones() -> Any:
@@ -381,7 +399,7 @@ def test_bounded_cores_are_the_nearest_ones() -> Any:
     def distance(x: Any) -> Any:
         return (x - best) @ normal @ (x - best)
 
-    x = nearest_positive(family, normal, best)
+    x = nearest_positive(family, half, best)
     assert smallest_core_eigenvalue(family, best) < 0.0
     assert smallest_core_eigenvalue(family, x) == pytest.approx(FLOOR, abs=1e-4)
     # Convexity: no feasible direction from the optimum may lead downhill.

@@ -95,7 +95,7 @@ def elastic_stiffness(structure: MeshedFrame) -> SparseArray:
     if structure.frame.springs:
         stiffness = stiffness + structure.once(
             "springs",
-            structure.interpolation,
+            structure.rests_on("springs"),
             lambda: structure.assemble_attachments((), structure.frame.springs)[1],
         )
     if structure.frame.braces:

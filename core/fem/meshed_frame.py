@@ -16,7 +16,7 @@ from femubench.core.errors import ModelError
 from femubench.core.fem.assembly import AssemblyPlan, narrow_indices, plan_assembly
 from femubench.core.fem.beam import BeamProperties
 from femubench.core.fem.frame import Frame, GroundSpring, Place, PointMass, split_half
-from femubench.core.fem.kinematics import Kinematics, point_block, spring_rows
+from femubench.core.fem.kinematics import Kinematics, node_at, point_block, spring_rows
 from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.mesh import Mesh
 from femubench.core.fem.parameters import Property
@@ -196,6 +196,19 @@ class MeshedFrame:
             return p.rigid_1, p.rigid_2
         shear = (p.shear_shape * 12 * p.EIz * p.flex_y, p.shear_shape * 12 * p.EIy * p.flex_z)
         return p.rigid_1, p.rigid_2, *shear
+
+    def rests_on(self, attachments: str) -> tuple[FloatArray, ...]:
+        """Return the properties that decide how attachments move, of which nodes need none.
+
+        Arguments:
+            attachments: ``masses`` or ``springs``.
+        """
+        items = getattr(self.frame, attachments)
+
+        def between() -> bool:
+            return any(node_at(self.frame, self.mesh, item.at) is None for item in items)
+
+        return self.interpolation if self.once(f"{attachments} between", (), between) else ()
 
     @cached_property
     def spring_index(self) -> dict[str, IntArray]:

@@ -101,7 +101,7 @@ class Structure(MeshedFrame):
         if self.frame.masses:
             mass = mass + self.once(
                 "masses",
-                self.interpolation,
+                self.rests_on("masses"),
                 lambda: self.assemble_attachments(self.frame.masses, ())[0],
             )
         if self.frame.oscillators:

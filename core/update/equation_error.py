@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from femubench.core.errors import NotApplicable, SelfCheckFailed, StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import DENSE_LIMIT, dense_matrices
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.rigid import rigid_modes_of
-from femubench.core.typing import FloatArray, SparseArray
+from femubench.core.typing import FloatArray, IntArray, SparseArray
 from femubench.core.update.element_families import Family
 from femubench.core.update.quasi import ITERATIONS, Expansion, Frequencies, QuasiModes, WantedModes
 from femubench.core.update.strategy import ParameterEstimate, UpdateResult
@@ -24,6 +25,7 @@ _GAP = 1e-9  # of the squared size of the equations
 _SHRINK = 0.2
 _MOST_STEPS = 400
 _RIDGE = 1e-14  # decides motions of x that no equation sees
+_REFINED = 2  # solutions of what the last one left
 
 
 def smallest_core_eigenvalue(family: Family, x: FloatArray) -> float:
@@ -31,7 +33,9 @@ def smallest_core_eigenvalue(family: Family, x: FloatArray) -> float:
     return float(np.linalg.eigvalsh(family.relative_cores(x)).min())
 
 
-def nearest_positive(family: Family, normal: FloatArray, best: FloatArray) -> FloatArray:
+def nearest_positive(
+    family: Family, rows: FloatArray | SparseArray, best: FloatArray
+) -> FloatArray:
     """Return the least-squares solution among cores with eigenvalues of at least `FLOOR`.
 
     The problem is convex; a logarithmic barrier with Newton steps from the nominal model solves
@@ -39,7 +43,7 @@ def nearest_positive(family: Family, normal: FloatArray, best: FloatArray) -> Fl
 
     Arguments:
         family: elements with cores, linear in the unknowns.
-        normal: A'A of the equations, (n, n).
+        rows: A of the equations, (m, n).
         best: the solution of least squares without bounds, (n,).
 
     Raises:
@@ -49,9 +53,8 @@ def nearest_positive(family: Family, normal: FloatArray, best: FloatArray) -> Fl
     """
     if smallest_core_eigenvalue(family, best) >= FLOOR:
         return best
-    size = max(float(np.abs(np.diagonal(normal)).max()), 1e-300)
-    hessian = normal / size + _RIDGE * np.eye(len(best))
-    objective = float(best @ hessian @ best)
+    hessian = Hessian.of(family, rows)
+    objective = float(best @ hessian.times(best))
     x, barrier = np.zeros_like(best), objective
     count = family.cores.shape[0] * family.cores.shape[-1] if family.cores is not None else 1
     for _ in range(_MOST_STEPS):
@@ -69,32 +72,112 @@ def nearest_positive(family: Family, normal: FloatArray, best: FloatArray) -> Fl
     )
 
 
+@dataclass(frozen=True)
+class Hessian:
+    """A'A of equations, its largest diagonal term 1, and a ridge.
+
+    Equations of motion couple unknowns of elements that meet, which stand near each other in the
+    right order; those of orthogonality see all unknowns, are few, and are kept apart.
+
+    Arguments:
+        rows: A, sparse (m, n).
+        wide: those of its rows that see many unknowns, in that order, (k, n).
+        order: of the unknowns, (n,).
+        band: what the other rows and the ridge are in that order, below the diagonal, (b + 1, n).
+        places: in the band of each pair of patterns of an element, behind it where there is none,
+            (n_e, n_a, n_a).
+    """
+
+    rows: SparseArray
+    wide: FloatArray
+    order: IntArray
+    band: FloatArray
+    places: IntArray
+
+    @classmethod
+    def of(cls, family: Family, rows: FloatArray | SparseArray) -> Hessian:
+        """Find an order of the unknowns of a family with a narrow band."""
+        rows = sp.csr_array(rows)
+        rows = rows / np.sqrt(max(float(rows.power(2).sum(axis=0).max()), 1e-300))
+        n = rows.shape[1]
+        wide = np.diff(rows.indptr) > n // 4
+        wide &= wide.sum() <= n // 4
+        thin, elements = rows[~wide], np.arange(len(family.columns))
+        used = family.columns >= 0
+        own = sp.csr_array(
+            (np.ones(used.sum()), (np.nonzero(used)[0], family.columns[used])),
+            shape=(len(elements), n),
+        )
+        normal = sp.coo_array(thin.T @ thin + _RIDGE * sp.eye_array(n))
+        order = reverse_cuthill_mckee(sp.csr_array(abs(normal) + own.T @ own), symmetric_mode=True)
+        at = np.append(np.argsort(order), -n)  # the last one for what is no unknown
+        i, j = at[family.columns][:, :, None], at[family.columns][:, None, :]
+        low, right = at[normal.row] - at[normal.col], at[normal.col]
+        width = 1 + max(int(low.max()), int(np.where((i >= 0) & (j >= 0), i - j, 0).max()))
+        band = np.zeros((width, n))
+        band[low[low >= 0], right[low >= 0]] = normal.data[low >= 0]
+        places = np.where((j >= 0) & (i >= j), (i - j) * n + j, width * n)
+        return cls(rows, rows[wide].toarray()[:, order], order, band, places)
+
+    def times(self, x: FloatArray) -> FloatArray:
+        """Return the matrix times a vector, (n,)."""
+        return np.asarray(self.rows.T @ (self.rows @ x) + _RIDGE * x)
+
+    def solve(self, bend: FloatArray, right: FloatArray) -> FloatArray:
+        """Return the solution for a right side, blocks of elements added, (n,).
+
+        Arguments:
+            bend: added to the unknowns of each pair of patterns of an element, (n_e, n_a, n_a).
+
+        Source: Woodbury (1950) for the rows that see many unknowns.
+        """
+        count = self.band.size
+        added = np.bincount(self.places.ravel(), bend.ravel(), count + 1)[:count]
+        band = self.band + added.reshape(self.band.shape)
+        factor = _definite(band), True
+        turned = la.cho_solve_banded(factor, self.wide.T)
+        inner = la.cho_factor(np.eye(len(self.wide)) + self.wide @ turned)
+        found, left = np.zeros(len(right)), right[self.order]
+        for _ in range(_REFINED):
+            near = la.cho_solve_banded(factor, left)
+            found += near - turned @ la.cho_solve(inner, self.wide @ near)
+            pushed = la.blas.dsbmv(len(band) - 1, 1.0, band, found, lower=1)
+            left = right[self.order] - pushed - self.wide.T @ (self.wide @ found)
+        return found[np.argsort(self.order)]
+
+
+def _definite(band: FloatArray) -> FloatArray:
+    """Return the Cholesky factor of a band, its diagonal raised until it has one."""
+    shift = 0.0
+    while True:
+        shifted = band.copy()
+        shifted[0] += shift
+        try:
+            return np.asarray(la.cholesky_banded(shifted, lower=True))
+        except la.LinAlgError:
+            shift = max(10.0 * shift, np.finfo(float).eps * float(band[0].max()))
+
+
 def _newton(
-    family: Family, hessian: FloatArray, best: FloatArray, x: FloatArray, barrier: float
+    family: Family, hessian: Hessian, best: FloatArray, x: FloatArray, barrier: float
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return gradient, Newton step and Newton decrement squared."""
     assert family.cores is not None
     room = family.relative_cores(x) - FLOOR * np.eye(family.cores.shape[-1])
     tilted = np.linalg.solve(room[:, None], family.cores)  # e, a, q, q
     pull = np.einsum("eaqq->ea", tilted)
-    bend = np.einsum("eaij,ebji->eab", tilted, tilted)
+    flat = tilted.reshape(*tilted.shape[:2], -1)
+    bend = flat @ np.swapaxes(tilted, 2, 3).reshape(flat.shape).swapaxes(1, 2)
     n = len(x)
     row = np.where(family.columns < 0, n, family.columns)  # row n collects what is no unknown
-    gradient = np.zeros(n + 1)
-    np.add.at(gradient, row, -pull)
-    second = np.zeros((n + 1, n + 1))
-    np.add.at(second, (row[:, :, None], row[:, None, :]), bend)
-    total = hessian @ (x - best) + barrier * gradient[:n]
-    curvature = hessian + barrier * second[:n, :n]
-    try:
-        step = -la.cho_solve(la.cho_factor(curvature), total)
-    except la.LinAlgError:  # singular to roundoff: the shortest step will do
-        step = -la.lstsq(curvature, total)[0]
+    gradient = np.bincount(row.ravel(), -pull.ravel(), n + 1)[:n]
+    total = hessian.times(x - best) + barrier * gradient
+    step = -hessian.solve(barrier * bend, total)
     return total, step, float(-total @ step)
 
 
 def _line_search(
-    family: Family, hessian: FloatArray, best: FloatArray, x: FloatArray,
+    family: Family, hessian: Hessian, best: FloatArray, x: FloatArray,
     slope: FloatArray, step: FloatArray, barrier: float,
 ) -> FloatArray:  # fmt: skip
     """Return the next point, inside the cone and lower by Armijo's rule; x itself if none is."""
@@ -104,7 +187,7 @@ def _line_search(
         if room.min() <= 0.0:
             return np.inf
         apart = point - best
-        return float(0.5 * apart @ hessian @ apart - barrier * np.log(room).sum())
+        return float(0.5 * apart @ hessian.times(apart) - barrier * np.log(room).sum())
 
     start, gain, length = value(x), float(slope @ step), 1.0
     while length > 1e-10:
@@ -210,7 +293,7 @@ def solve_least_change(
     y, _, rank, singular = la.lstsq(inner, b, cond=_CUTOFF, lapack_driver="gelsd")
     x = y if basis is None else basis @ y
     if family.cores is not None:
-        x = nearest_positive(family, a.T @ a, x)
+        x = nearest_positive(family, matrix, x)
     return Solution(
         x=np.asarray(x),
         rank=int(rank),

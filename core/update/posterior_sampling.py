@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 
 from femubench.core.change.change import Change
 from femubench.core.change.parametric_model import ParametricModel
@@ -48,6 +49,7 @@ _SAMPLES = 40
 _WALKERS, _FEWEST_WALKERS = 4, 96  # for each unknown, and in all: few take no less time
 _BLOCK, _LONGEST = 500, 8000  # steps
 _LONG_ENOUGH = 25.0  # autocorrelation times
+_WINDOW = 5.0  # of them, over which an autocorrelation is summed
 _BURN_IN = 3.0  # autocorrelation times
 
 
@@ -328,7 +330,7 @@ def _settled(sampler: Any) -> tuple[FloatArray, dict[str, float]]:  # noqa: ANN4
         StrategyFailure: when the longest chain is too short for its autocorrelation.
     """
     while True:
-        time = float(np.max(sampler.get_autocorr_time(tol=0)))
+        time = autocorrelation_time(sampler.get_chain())
         if sampler.iteration >= _LONG_ENOUGH * time:
             break
         if sampler.iteration >= _LONGEST:
@@ -343,6 +345,29 @@ def _settled(sampler: Any) -> tuple[FloatArray, dict[str, float]]:  # noqa: ANN4
         "autocorrelation_time": time,
         "effective_samples": len(chain) / time,
     }
+
+
+def autocorrelation_time(chain: FloatArray) -> float:
+    """Return the longest integrated autocorrelation time of the coordinates in steps.
+
+    As `emcee.autocorr.integrated_time`, which transforms every walker there and back by itself.
+
+    Arguments:
+        chain: (steps, walkers, coordinates).
+
+    Source: Sokal (1997), Monte Carlo methods in statistical mechanics, section 3, for the window.
+    """
+    steps, times = len(chain), []
+    padded = next_fast_len(2 * steps, real=True)
+    for series in np.moveaxis(chain, 2, 0):
+        apart = series - series.mean(axis=0)
+        power = np.square(np.abs(rfft(apart, padded, axis=0)))
+        # What each walker has at no lag is the sum of its squares.
+        mean = (power / np.square(apart).sum(axis=0)).mean(axis=1)
+        sums = 2.0 * np.cumsum(irfft(mean, padded)[:steps]) - 1.0
+        within = np.arange(steps) < _WINDOW * sums
+        times.append(sums[np.argmin(within) if within.any() else -1])
+    return float(np.max(times))
 
 
 def _normal_result(
