@@ -23,8 +23,8 @@ from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.fem import FloatArray, SparseArray
 from femubench.modal import GroupPriors
 from femubench.plugins.readers.bulk_data import BulkDataReader
+from femubench.plugins.readers.deck_file import SolidDeck, read_deck
 from femubench.plugins.readers.nodes import read_nodes
-from femubench.plugins.readers.solid_deck import SolidDeck, read_deck
 from femubench.plugins.readers.solid_elements import KINDS
 
 READER = BulkDataReader()

@@ -161,3 +161,12 @@ def test_matrices_without_a_frame_and_a_frame_on_supports(block: Model) -> None:
             "ij,ij->j", found.shapes, model.attach(*change).mass @ expected.shapes
         )[~expected.rigid]
         np.testing.assert_allclose(np.abs(likeness), 1.0, atol=1e-5)
+
+
+def test_a_mass_between_nodes_of_a_frame_that_no_motion_leaves_free() -> None:
+    held = Support(Place(joint="J000"), ("x", "y", "z", "rx", "ry", "rz"))
+    model = Model.of(lattice(2, 3, supports=(held,)))
+    member = model.frame_structure.frame.members[-1].name
+    change = ([PointMass(Place(member=member, s=0.4), 1.0)], [])
+    found = modes_of_changes(model, [change], COUNT)[0]
+    assert elastic_gap(found, solve_modes(model.attach(*change), COUNT)) < 1e-5

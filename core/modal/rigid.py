@@ -73,7 +73,7 @@ def rigid_continuation(dofs: Dofs, rigid: FloatArray) -> _Motion:
         rigid: combinations of motions of a rigid body, (n, r).
     """
     motion = _motions(dofs)
-    combined = la.lstsq(motion(dofs.xyz, dofs.motions), rigid)[0]
+    combined = np.linalg.lstsq(motion(dofs.xyz, dofs.motions), rigid)[0]  # there may be none
     return lambda xyz, axes: np.asarray(motion(xyz, axes) @ combined)
 
 

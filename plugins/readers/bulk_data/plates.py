@@ -15,8 +15,9 @@ from femubench.plugins.readers.bulk_data.cards import Card, Deck
 from femubench.plugins.readers.bulk_data.properties import at_least_0, moduli_of
 from femubench.plugins.readers.bulk_data.structure import BulkData, GridPoint, number_cards
 from femubench.plugins.readers.bulk_data.systems import KINDS
+from femubench.plugins.readers.deck_file import SolidDeck
 from femubench.plugins.readers.reading import DIRECTIONS
-from femubench.plugins.readers.solid_deck import SolidDeck, solid_model
+from femubench.plugins.readers.solid_deck import solid_model
 
 _SAME = 1e-3  # of a factor that is stated with few digits, as 5/6 by .8333
 _LINE = 1e-9  # of the moments of grids about their middle: what rounding leaves on a line

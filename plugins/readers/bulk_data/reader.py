@@ -6,8 +6,9 @@ from pathlib import Path
 
 from femubench import Model
 from femubench.plugins.readers.bulk_data.cards import Deck
+from femubench.plugins.readers.bulk_data.frame import BulkFrame
 from femubench.plugins.readers.bulk_data.plates import BulkPlates, has_plates
-from femubench.plugins.readers.bulk_data.structure import BulkFrame, grids_of
+from femubench.plugins.readers.bulk_data.structure import grids_of
 from femubench.plugins.readers.bulk_data.writing import write_cards
 from femubench.plugins.readers.reading import ProgramReader
 from femubench.plugins.readers.solid_elements import BYTES

@@ -23,17 +23,13 @@ from femubench.fem import (
     Structure,
 )
 from femubench.plugins.readers.bulk_data.cards import Card, Deck
+from femubench.plugins.readers.bulk_data.frame import ELEMENTS, PROPERTIES, BulkFrame
 from femubench.plugins.readers.bulk_data.plates import BulkPlates, has_plates
 from femubench.plugins.readers.bulk_data.properties import SHAPES, Bar
-from femubench.plugins.readers.bulk_data.structure import (
-    ELEMENTS,
-    PROPERTIES,
-    BulkFrame,
-    GridPoint,
-    number_cards,
-)
+from femubench.plugins.readers.bulk_data.structure import GridPoint, number_cards
+from femubench.plugins.readers.deck_file import REST
 from femubench.plugins.readers.reading import DIRECTIONS
-from femubench.plugins.readers.solid_deck import REST, factors_of
+from femubench.plugins.readers.solid_deck import factors_of
 
 _SAME = 1e-12  # far below any update, above the rounding of a change of units
 _KEPT = 1e-9  # to which the matrices must be those of bars with other properties
