@@ -110,7 +110,7 @@ def case_of(model: Model, measurement: Measurement, **more: Any) -> Case:
 def test_a_frame_has_as_many_elements_as_leave_it_small(model: Model) -> None:
     frame = model.frame_structure.frame
     assert coarsen_mesh(model, model.size - 1, 25).size == model.size - 3 * len(frame.members)
-    assert coarsen_mesh(model, 100, 25) is model
+    assert coarsen_mesh(model, 100, 25).size == model.size - 3 * len(frame.members)
     factor = Factor("E", ("AB/26",), 0.9)
     found = coarsen_mesh(Model.of(replace(frame, factors=(factor,))), DENSE_LIMIT, 2)
     counts = {m.name: m.elements for m in found.frame_structure.frame.members}

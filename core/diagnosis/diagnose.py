@@ -189,8 +189,8 @@ def _with_few_elements(case: Case) -> Case:
         return case
     model = coarsen_mesh(drawn, DENSE_LIMIT, settings.fewest_elements)
     if model.size > settings.most_dofs:
-        model = coarsen_mesh(model, settings.most_dofs, 1)
-    if model is drawn:
+        model = coarsen_mesh(drawn, settings.most_dofs, 1)
+    if model.size == drawn.size:
         return case
     count = len(case.measurement)
     pair = (elastic_modes(m, count).natural_frequencies[:count] for m in (model, drawn))

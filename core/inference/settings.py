@@ -386,7 +386,7 @@ class Settings:
         1.5, "prior deviations", "between neighbours on a grid, above which modes change places"
     )
     most_dofs: int = _cost(2000, "dofs", "all of whose modes are solved for")
-    fewest_elements: int = _cost(2, "elements", "a member, below which a frame has more dofs")
+    fewest_elements: int = _cost(4, "elements", "a member, at least, where these are few enough")
     work_of_pieces: tuple[float, ...] = _cost(
         (0.35, 0.018, 1.0, 0.45, 1.0, 0.4, 0.35, 0.3),
         "searches for single causes",
