@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from running import run_jobs
 
 from femubench.core.errors import InputError
 from femubench.core.run import provenance as keys, slots, store as locks
 from femubench.core.run.record_file import read_records, write_file
-from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult, Run
 from tests.command import run_python
@@ -218,7 +218,7 @@ _RUN = """
 import sys
 sys.path.insert(0, {toys!r})
 import harness_toys as toys
-from femubench.core.run.runner import run_jobs
+from running import run_jobs
 from femubench.core.run.store import Store
 
 if __name__ == "__main__":
