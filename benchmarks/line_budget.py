@@ -17,7 +17,7 @@ PACKAGE = ("core", "plugins", "reports", "papers", "scenarios", "femubench")
 ALL = "package"  # the rooms of PACKAGE together
 # What the rooms have now: they may shrink, and the package is to come to 73 000 lines.
 BUDGETS = {
-    ALL: 88_522,
+    ALL: 88_488,
     "core": 1_037,
     "core/advise": 677,
     "core/case": 7_358,
@@ -40,7 +40,7 @@ BUDGETS = {
     "core/plugin": 1_919,
     "core/publish": 1_479,
     "core/reproduction": 617,
-    "core/run": 4_660,
+    "core/run": 4_626,
     "core/schema": 1_480,
     "core/score": 2_447,
     "core/study": 621,
@@ -51,7 +51,7 @@ BUDGETS = {
     "papers": 3_273,
     "scenarios": 750,
     "femubench": 370,
-    "tests": 48_119,
+    "tests": 48_145,
     "truths": 14_092,
     "benchmarks": 7_461,
 }

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from click.testing import Result
 from run_edits import called, failed, moved, renamed, scaled
+from running import run_jobs
 
 from femubench.core.errors import InputError
-from femubench.core.run.runner import run_jobs
 from femubench.core.schema.records import run_from_json, run_to_json
 from femubench.core.score.comparison import METRICS, Against, Threshold, compare_runs
 from femubench.core.score.ranking import rank_results

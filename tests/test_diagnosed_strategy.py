@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from running import run_jobs
 
 from femubench import (
     Case,
@@ -23,7 +24,6 @@ from femubench import (
     solve_modes,
 )
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.run.runner import run_jobs
 from femubench.core.score.leaderboard import leaderboard
 from femubench.fem import Frame, GroundSpring, Place, Preload
 from femubench.modal import rigid_modes_of

@@ -35,7 +35,6 @@ LENGTH, SECTION, STEEL = 1.0, Section.solid_rectangle(0.03, 0.012), Material(207
 SPEED = np.sqrt(STEEL.E * SECTION.Iy / (STEEL.rho * SECTION.A)) / (2.0 * np.pi)
 STATIONS = np.array([0.2, 0.4, 0.5, 0.75, 0.9, 1.0])
 ROLLER = 0.6
-FIXED = {"in-plane": ("x", "z", "ry"), "out-of-plane": ("z", "rx", "ry")}
 
 
 def beam(

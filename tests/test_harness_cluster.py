@@ -16,13 +16,13 @@ from typing import Any
 
 import psutil
 import pytest
+from running import run_jobs
 
 from femubench.core import errors
 from femubench.core.errors import FemubenchError, InputError
 from femubench.core.run import cluster
 from femubench.core.run.cluster import DaskWorkers, slurm_cluster
 from femubench.core.run.executor import LocalProcesses, open_executor
-from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult
 from femubench.core.schema.run_options import Where
@@ -187,7 +187,7 @@ import sys
 sys.path.insert(0, {toys!r})
 import harness_toys as toys
 from femubench.core.run.executor import open_executor
-from femubench.core.run.runner import run_jobs
+from running import run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.run_options import Where
 

@@ -11,6 +11,7 @@ from typing import Any, Never
 import harness_toys as toys
 import numpy as np
 import pytest
+from running import run_jobs
 
 from femubench.core.child import workers
 from femubench.core.errors import InputError
@@ -20,7 +21,7 @@ from femubench.core.pace import Advance
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.judging import judge_outcome
-from femubench.core.run.runner import Plan, Receivers, run_jobs
+from femubench.core.run.runner import Plan, Receivers
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult
 from femubench.core.schema.run_options import RunOptions

@@ -25,6 +25,7 @@ import psutil
 import pytest
 import scanner
 import zoo
+from running import run_jobs
 
 import femubench
 from femubench.core.child import guarded_child, sandbox, server, syscall_filter
@@ -35,7 +36,6 @@ from femubench.core.child.workers import Workers, run_apart
 from femubench.core.errors import InputError
 from femubench.core.run import cluster_worker
 from femubench.core.run.executor import LocalProcesses
-from femubench.core.run.runner import run_jobs
 from femubench.core.schema.results import JobResult
 from femubench.core.schema.run_options import Sandbox
 from tests.command import call_bench

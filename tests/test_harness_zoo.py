@@ -15,13 +15,13 @@ from typing import Any
 import harness_toys as toys
 import pytest
 import zoo
+from running import run_jobs
 
 from femubench.core.child import sandbox, server, workers
 from femubench.core.child.guarded_child import Ending
 from femubench.core.child.limits import MIB, Limits
 from femubench.core.run import runner
 from femubench.core.run.jobs import JobOutcome
-from femubench.core.run.runner import run_jobs
 from femubench.core.run.schedule import Workload, _Bench
 from femubench.core.run.slots import Slot, Start
 from femubench.core.schema.records import result_from_json, result_to_json

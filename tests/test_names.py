@@ -14,7 +14,7 @@ SUFFIXES = (".py", ".js", ".html", ".jinja")
 # Words of models and of English that are names too, and what a line says that may have them.
 ALLOWED = {
     # kind of model, a method, axes of a test
-    "frame": r"kind\b|'frame' or 'matrices'|`parameters` and `frame`|axes",
+    "frame": r"kind\b|'frame' or 'matrices'|`parameters` and `frame`|axes|directions|ways",
     "density": r"rhoA|\"E\"",  # a quantity of elements, next to the others
     # likewise, and a symbol in drawings
     "spring": r"quantity|properties|lookup|weights|name|property|rigid|: \(\)|counted|marker|stiff"

@@ -14,11 +14,11 @@ import harness_toys as toys
 import pytest
 from click.testing import Result
 from run_edits import called, failed, moved, renamed, scaled, versioned
+from running import run_jobs
 
 import femubench
 from femubench.core.publish import publishing
 from femubench.core.publish.submissions import slug
-from femubench.core.run.runner import run_jobs
 from femubench.core.schema.records import read_run, run_from_json, run_to_json
 from femubench.core.score.leaderboard import leaderboard
 from femubench.reports.publish_page import pages_of

@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from running import run_jobs
 
 from femubench.core.errors import InputError
 from femubench.core.run import provenance as keys, slots, store as locks
 from femubench.core.run.record_file import read_records, write_file
-from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult, Run
 from tests.command import run_python
@@ -32,21 +32,13 @@ TOYS = Path(__file__).parent / "toys"
 CASE = toys.tiny_case()
 
 
-def stable(run: Run) -> dict[tuple[str, str, int], dict[str, Any]]:
-    """What of a run does not depend on when and how often it was interrupted."""
-    from femubench.core.schema.records import result_to_json
-
-    volatile = {"seconds", "rank", "gain"}
-    return {
-        (item.case, item.strategy, item.seed): {
-            name: value for name, value in result_to_json(item).items() if name not in volatile
-        }
-        for item in run.results
-    }
-
-
 def by_name(run: Run) -> list[JobResult]:
     return sorted(run.results, key=lambda item: (item.case, item.strategy, item.seed))
+
+
+def stable(run: Run) -> list[JobResult]:
+    """What of a run does not depend on when and how often it was interrupted."""
+    return [replace(item, seconds=0.0, rank=None, gain=None) for item in by_name(run)]
 
 
 def some(store: Store, **options: Any) -> Run:
@@ -218,7 +210,7 @@ _RUN = """
 import sys
 sys.path.insert(0, {toys!r})
 import harness_toys as toys
-from femubench.core.run.runner import run_jobs
+from running import run_jobs
 from femubench.core.run.store import Store
 
 if __name__ == "__main__":

@@ -10,10 +10,10 @@ import harness_toys as toys
 import numpy as np
 import pytest
 import scored
+from running import run_jobs
 from scipy.stats import t as student
 
 from femubench.core.errors import InputError
-from femubench.core.run.runner import run_jobs
 from femubench.core.schema.results import Run
 from femubench.core.score.comparison import Against, compare_runs
 from femubench.core.score.leaderboard import leaderboard

@@ -15,6 +15,7 @@ import harness_toys as toys
 import numpy as np
 import psutil
 import pytest
+from running import run_jobs
 
 from femubench.core.child.guarded_child import Ending, wait_for
 from femubench.core.child.limits import MIB, Limits
@@ -24,7 +25,6 @@ from femubench.core.run import schedule, standing_judge
 from femubench.core.run.answers import pack_outcome
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.judging import Dossier
-from femubench.core.run.runner import run_jobs
 from femubench.core.run.standing_judge import Judges
 from femubench.core.score.scoring import reference_of
 
@@ -179,7 +179,7 @@ def test_a_run_in_which_somebody_kills_judges_has_the_results_of_one_without(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     strategies, options = [toys.Unchanged(), toys.Softer()], {"jobs": 2, "seeds": range(4)}
-    calm = run_jobs([CASE], strategies, **options)  # type: ignore[arg-type]
+    calm = run_jobs([CASE], strategies, **options)
     start, asked = Judges.start, list[int]()
 
     def killed(self: Judges[Any], key: Any, case: bytes, what: Dossier, limits: Limits) -> Any:
@@ -190,7 +190,7 @@ def test_a_run_in_which_somebody_kills_judges_has_the_results_of_one_without(
         return found
 
     monkeypatch.setattr(schedule.Judges, "start", killed)
-    wild = run_jobs([CASE], strategies, **options)  # type: ignore[arg-type]
+    wild = run_jobs([CASE], strategies, **options)
     same = {"seconds": 0.0, "provenance": {}}
     assert len(asked) == 10
     assert not any(psutil.pid_exists(pid) for pid in asked)

@@ -11,6 +11,7 @@ from pathlib import Path
 import harness_toys as toys
 import numpy as np
 import pytest
+from running import run_jobs
 from twin_toys import Ratios
 
 import femubench
@@ -18,7 +19,6 @@ from femubench import read_case
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError, NotApplicable
 from femubench.core.run.companions import choose_companions
-from femubench.core.run.runner import run_jobs
 from femubench.core.run.starts import Starts
 from femubench.core.score.twin_gain import TwinGain, twin_gains
 from femubench.core.twin.reduced_solid import ReducedSolid

@@ -12,6 +12,7 @@ import harness_toys as toys
 import numpy as np
 import pytest
 import scored
+from running import run_jobs
 from twin_toys import Chance, Drawn, Memory
 
 import femubench
@@ -45,7 +46,6 @@ from femubench.core.library.rank import plan_again, plan_run, rank, request_of, 
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.run.companions import choose_companions
-from femubench.core.run.runner import run_jobs
 from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
 from femubench.core.schema.records import run_from_json, run_to_json

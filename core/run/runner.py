@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from typing import Any, Unpack
+from typing import Any
 
 from threadpoolctl import threadpool_limits
 
@@ -17,7 +17,7 @@ from femubench.core.errors import InputError
 from femubench.core.files import make_folder
 from femubench.core.pace import OnAdvance
 from femubench.core.roles import Strategy
-from femubench.core.run.executor import Executor, open_executor
+from femubench.core.run.executor import Executor
 from femubench.core.run.provenance import home_of, plan_digest, run_meta
 from femubench.core.run.recording import Progress, Results, begin_run, record_end
 from femubench.core.run.schedule import Answers, Workload
@@ -26,12 +26,7 @@ from femubench.core.run.starts import Starts
 from femubench.core.run.stopping import stopping
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobName, Run, origins_of
-from femubench.core.schema.run_options import (
-    RunKeywords,
-    RunOptions,
-    check_keywords,
-    split_keywords,
-)
+from femubench.core.schema.run_options import RunOptions
 from femubench.core.score.ranking import list_models, rank_results
 from femubench.core.score.repeatability import unsteady
 from femubench.core.score.scoring import Reference, reference_of
@@ -88,10 +83,16 @@ class Plan:
         receivers: Receivers = Receivers(),
         answers: Answers | None = None,
     ) -> Run:
-        """Run the jobs, each in a process of its own; see `run_jobs`.
+        """Run the jobs, each in a process of its own.
+
+        Ctrl-C lets the jobs that run come to their end, once more stops them; what is done is kept.
 
         Arguments:
             answers: of jobs that are not to be run, only judged.
+
+        Raises:
+            InputError: for two of one name, or a run that another process works on.
+            ModelError: when the nominal model of a case cannot be solved.
         """
         cases, strategies, options = self.cases, self.strategies, self.options
         starts, store = self.starts, receivers.store
@@ -157,41 +158,6 @@ class Plan:
                 solved[same] = reference_of(case)
             found[case.name] = solved[same]
         return found
-
-
-def run_jobs(
-    cases: Sequence[Case],
-    strategies: Sequence[Strategy],
-    options: RunOptions | None = None,
-    executor: Executor | None = None,
-    *,
-    store: Store | None = None,
-    progress: Progress | None = None,
-    starts: Starts | None = None,
-    **keywords: Unpack[RunKeywords],
-) -> Run:
-    """Run every strategy on every case with every seed, each job in a process of its own.
-
-    Ctrl-C lets the jobs that run come to their end, once more stops them; what is done is kept.
-
-    Arguments:
-        options, keywords: as for `femubench.rank`; seeds may be listed, and `options` may say that
-            there is no timeout.
-        executor: what runs the jobs, from `open_executor`; None for what the keywords say.
-        store: keeps the results.
-        progress: called with (result, jobs done, jobs in all).
-        starts: the nominal models, the cases as given where left out; what runs with them.
-
-    Raises:
-        InputError: for two of one name, no worker, or a run that another process works on.
-        ModelError: when the nominal model of a case cannot be solved.
-    """
-    check_keywords(keywords, RunKeywords)
-    given, where = split_keywords(keywords)
-    asked = replace(options or RunOptions(), **given)
-    plan = Plan(cases, strategies, asked, starts or Starts())
-    with open_executor(where) if executor is None else nullcontext(executor) as place:
-        return plan.run(place, Receivers(store, progress))
 
 
 def _check_names(**given: Sequence[Case] | Sequence[Strategy]) -> None:

@@ -164,7 +164,7 @@ def _newton(
     """Return gradient, Newton step and Newton decrement squared."""
     assert family.cores is not None
     room = family.relative_cores(x) - FLOOR * np.eye(family.cores.shape[-1])
-    tilted = np.linalg.solve(room[:, None], family.cores)  # e, a, q, q
+    tilted = np.asarray(np.linalg.solve(room[:, None], family.cores), dtype=float)  # e, a, q, q
     pull = np.einsum("eaqq->ea", tilted)
     flat = tilted.reshape(*tilted.shape[:2], -1)
     bend = flat @ np.swapaxes(tilted, 2, 3).reshape(flat.shape).swapaxes(1, 2)

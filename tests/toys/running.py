@@ -1,0 +1,34 @@
+"""A run by its parts: what `rank` does, with an executor, starts and a store of the test's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from typing import Any
+
+from femubench.core.case.case import Case
+from femubench.core.roles import Strategy
+from femubench.core.run.executor import Executor, open_executor
+from femubench.core.run.runner import Plan, Receivers
+from femubench.core.run.starts import Starts
+from femubench.core.run.store import Store
+from femubench.core.schema.results import Run
+from femubench.core.schema.run_options import RunOptions, split_keywords
+
+
+def run_jobs(
+    cases: Sequence[Case],
+    strategies: Sequence[Strategy],
+    options: RunOptions | None = None,
+    *,
+    executor: Executor | None = None,
+    store: Store | None = None,
+    progress: Callable[..., None] | None = None,
+    starts: Starts | None = None,
+    **keywords: Any,
+) -> Run:
+    """Run every strategy on every case with every seed; keywords as of `rank`."""
+    given, where = split_keywords(keywords, options)
+    plan = Plan(cases, strategies, RunOptions(**given), starts or Starts())
+    with open_executor(where) if executor is None else nullcontext(executor) as place:
+        return plan.run(place, Receivers(store, progress))
