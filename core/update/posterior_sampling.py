@@ -388,12 +388,12 @@ def _normal_result(target: Target, off: float, steps: float = 0.0) -> UpdateResu
         steps: of a chain that did not settle.
     """
     iteration, point = target.iteration, target.point
-    own = target.discrepancy.median
+    own, covariance = target.discrepancy.median, target.root @ target.root.T
     return UpdateResult(
         model=point.prediction.model,
         parameter_count=len(point.q),
         parameters=estimate_parameters(
-            iteration.parametric, point.q, np.sqrt(np.square(target.root).sum(axis=1))
+            iteration.parametric, point.q, np.sqrt(np.diagonal(covariance))
         ),
         diagnostics={
             "discrepancy_std": own,
@@ -402,9 +402,7 @@ def _normal_result(target: Target, off: float, steps: float = 0.0) -> UpdateResu
             "surrogate_error": off,
             "paired_modes": float(len(target.measurement)),
         },
-        uncertainty=Uncertainty.draw(
-            iteration.model_at, point.q, target.root @ target.root.T, discrepancy_std=own
-        ),
+        uncertainty=Uncertainty.draw(iteration.model_at, point.q, covariance, discrepancy_std=own),
     )
 
 
