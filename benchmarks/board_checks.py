@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +38,6 @@ VARIED = {
     "above": (1.0, 1.5),
     "same_mac": (0.7, 0.9),
 }
-TRIALS = 1000
 
 
 # What could stand in place of the mean over structures, of gains by structure and strategy.
@@ -96,7 +96,7 @@ def vary(run: Run) -> pd.DataFrame:
     return table.astype(dict.fromkeys(whole, int))
 
 
-def error_rate(gains: Mapping[str, FloatArray], true: list[str], trials: int = TRIALS) -> float:
+def error_rate(gains: Mapping[str, FloatArray], true: list[str], trials: int) -> float:
     """Return how often a difference is claimed where there is none.
 
     Arguments:
@@ -116,7 +116,7 @@ def error_rate(gains: Mapping[str, FloatArray], true: list[str], trials: int = T
     return wrong / trials
 
 
-def families(run: Run) -> pd.DataFrame:
+def families(run: Run, trials: int) -> pd.DataFrame:
     """Return the error rate of the family under complete and partial nulls."""
     table = GainTable.of(run, run.ranked, run.nominals[0])
     gains = {name: table.gains(name) for name in table.names}
@@ -124,7 +124,7 @@ def families(run: Run) -> pd.DataFrame:
     kept: dict[str, list[str]] = {"none": [], "better half": order[: len(order) // 2]}
     rows = [
         {"true_differences_of": name, "permuted": len(order) - len(true),
-         "trials": TRIALS, "error_rate": error_rate(gains, true)}
+         "trials": trials, "error_rate": error_rate(gains, true, trials)}
         for name, true in kept.items()
     ]  # fmt: skip
     return pd.DataFrame(rows)
@@ -176,7 +176,9 @@ def main() -> None:
     """Write the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--noise", metavar="FILE", help="a run of `bench run --seeds N --json`")
-    file = parser.parse_args().noise
+    parser.add_argument("--trials", type=int, default=4000, help="of an error rate")
+    words = parser.parse_args()
+    file = words.noise
     if file is not None:
         run = femubench.read_run(file)
         if len(run.meta["seeds"]) < 2:
@@ -185,7 +187,11 @@ def main() -> None:
     else:
         figures = ROOT / "docs" / "figures"
         runs = {name: femubench.read_run(figures / f"board-{name}.json") for name in BOARDS}
-        kinds = {"rules": vary, "families": families, "means": compare_means}
+        kinds = {
+            "rules": vary,
+            "families": partial(families, trials=words.trials),
+            "means": compare_means,
+        }
         made = {
             kind: pd.concat(
                 {name: make(run) for name, run in runs.items()}, names=["board"]

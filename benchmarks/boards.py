@@ -3,7 +3,7 @@
 python benchmarks/boards.py default      # README.md; minutes on two cores
 python benchmarks/boards.py suite        # docs/scenarios.md, the predictive board: docs/scoring.md
 python benchmarks/boards.py after        # docs/scenarios.md, what decides on the rule
-python benchmarks/boards.py default --from run.json    # of a run that is there
+python benchmarks/boards.py after --from suite.json    # its structures, of a run that has them
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import textwrap
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,8 @@ from typing import Any
 import femubench
 from femubench import Run
 from femubench.core.display import count_noun
+from femubench.core.library.cases import read_cases
+from femubench.core.plugin.loader import load_plugins
 from femubench.core.schema.run_options import StartModels
 from femubench.core.score.leaderboard import list_rows
 from femubench.reports.predictive import PredictiveReporter
@@ -32,6 +35,7 @@ _META = (
     *("structures", "classes", "yardstick", "yardsticks", "starts", "alike", "reference"),
     *("rule", "models"),
 )
+_BY_CASE = ("cases", "structures", "classes", "starts", "reference", "models")
 
 
 @dataclass(frozen=True)
@@ -79,11 +83,21 @@ def file_of(name: str) -> Path:
     return ROOT / "docs" / "figures" / f"board-{name}.json"
 
 
-def slim(run: Run) -> Run:
-    """Return a run with what a leaderboard rests on."""
+def slim(run: Run, cases: Collection[str]) -> Run:
+    """Return what the leaderboard of some cases of a run rests on."""
     bare = {"parameters": (), "history": (), "diagnostics": {}, "traceback": "", "key": ""}
-    kept = [replace(result, provenance={}, **bare) for result in run.results]
-    return Run({name: run.meta[name] for name in _META if name in run.meta}, tuple(kept))
+    kept = [replace(r, provenance={}, **bare) for r in run.results if r.case in cases]
+    meta = {name: run.meta[name] for name in _META if name in run.meta}
+    for name in _BY_CASE:
+        meta[name] = {case: value for case, value in meta[name].items() if case in cases}
+    return Run({**meta, "alike": [c for c in meta["alike"] if c in cases]}, tuple(kept))
+
+
+def join(one: Run, other: Run) -> Run:
+    """Return runs of the same strategies on different cases as one, by name of the case."""
+    meta = {name: dict(sorted((one.meta[name] | other.meta[name]).items())) for name in _BY_CASE}
+    alike = [*one.meta["alike"], *other.meta["alike"]]
+    return Run({**one.meta, **meta, "alike": alike}, one.results + other.results)
 
 
 def brief(data: Any) -> Any:  # noqa: ANN401 - JSON data of any form
@@ -132,7 +146,7 @@ def main() -> None:
         run = femubench.read_run(words.file)
     else:
         run = femubench.rank(board.cases, nominal=board.nominal, jobs=words.jobs)
-    run = slim(run)
+    run = slim(run, [case.name for case in read_cases(board.cases, load_plugins())])
     text = json.dumps(brief(run_to_json(run)), separators=(",", ":"))
     file_of(words.board).write_text(text.replace('{"case"', '\n{"case"') + "\n", encoding="utf-8")
     if board.which:
@@ -141,6 +155,9 @@ def main() -> None:
         text = PredictiveReporter().render(run)
         put("predictive", f"```\n{text}\n```", ROOT / "docs" / "scoring.md")
     put(board.mark, f"```\n{board_text(run)}\n```", ROOT / board.page)
+    if board.which:
+        both = join(*(femubench.read_run(file_of(name)) for name in ("suite", "after")))
+        put("both-finding", said_of("structures together", both), ROOT / board.page)
     print(f"{count_noun(len(run.results), 'job')} in {file_of(words.board)}")
 
 

@@ -60,8 +60,8 @@ def assert_board_is_that_of(run: Run, name: str, mark: str = "leaderboard") -> N
         assert sentence.replace("\u2212", "-") in words, sentence
 
 
-# Random searches and samples amplify rounding.
-_SEARCHES = frozenset({"cma-es", "multi-start", "bayesian-sampling"})
+# Random searches amplify rounding.
+_SEARCHES = frozenset({"cma-es", "multi-start"})
 
 
 def assert_same_errors(kept: Run, found: Run) -> None:

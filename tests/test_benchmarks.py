@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[1]
 # The least that a benchmark can be asked for; the seconds that it takes where they are many.
 SHORT = {
     "ablation": ("frame --jobs 1", 60),
-    "board_checks": ("", 180),
+    "board_checks": ("--trials 20", 60),
     "boards": ("default --from docs/figures/board-default.json", 0),
     "budget_score": ("portal", 0),
     "clean_sweep": ("1 --results clean.jsonl", 60),

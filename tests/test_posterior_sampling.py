@@ -56,12 +56,12 @@ def test_the_posterior_is_that_of_exact_solutions(settled: UpdateResult) -> None
     measurement, discrepancy = CASE.used_measurement(), Discrepancy(0.02, 0.01)
     strategy = BayesianSampling(discrepancy_median=0.02, discrepancy_spread=0.01)
     _, changes = strategy.pose(CASE.model, measurement)
-    target, covariance = posterior_sampling.most_probable(
+    target = posterior_sampling.most_probable(
         CASE.model, changes, measurement, discrepancy, strategy.options
     )
     rng = np.random.default_rng(0)
     z = 1.8 * rng.standard_normal((700, len(changes)))
-    points, values = target.predict(target.point.q + z @ np.linalg.cholesky(covariance).T)
+    points, values = target.predict(target.at(z))
     assert len(points) == len(z)
     log, _, _ = target.data
     misfit = np.square((log - values) / target.std(np.zeros(1))).sum(axis=1)
@@ -98,6 +98,15 @@ def test_the_generator_alone_decides_on_the_result(settled: UpdateResult) -> Non
     assert again.parameters == settled.parameters
     assert again.diagnostics == settled.diagnostics
     assert (again.model.stiffness != settled.model.stiffness).nnz == 0
+
+
+@pytest.mark.slow(3)
+def test_rounding_does_not_grow_along_the_chain(settled: UpdateResult) -> None:
+    measurement = CASE.used_measurement()
+    moved = replace(measurement, frequencies=measurement.frequencies * [1.0, 1.0 + 1e-13, 1.0])
+    again = sampled(moved, discrepancy_median=0.02, discrepancy_spread=0.01)
+    for one, other in zip(again.parameters, settled.parameters, strict=True):
+        assert (one.after, one.std) == pytest.approx((other.after, other.std), rel=1e-8)
 
 
 def chain_of(density: Callable[[FloatArray], FloatArray], steps: int, **options: Any) -> Any:

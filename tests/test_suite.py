@@ -13,6 +13,7 @@ from printed_boards import as_printed, assert_board_is_that_of, assert_same_erro
 
 import femubench
 from benchmarks.board_checks import weigh_noise
+from benchmarks.boards import join
 from femubench import Run, read_case
 from femubench.core.score.leaderboard import leaderboard, list_rows
 from femubench.core.score.scoring import reference_of
@@ -104,6 +105,20 @@ def test_what_the_documents_say_of_the_board() -> None:
             words = text_of(page).replace("\u2212", "-")
             for sentence in finding(run, list_rows(run)):
                 assert sentence.replace("\u2212", "-") in words, (page, sentence)
+    both = join(stored("suite"), stored("after"))
+    assert set(both.meta["cases"]) == {f"suite/{name}" for name in NAMES}
+    for sentence in finding(both, list_rows(both)):
+        assert sentence.replace("\u2212", "-") in text_of("docs/scenarios.md"), sentence
+    rows = {row["strategy"]: row for row in list_rows(both)}
+    own, other, line = (rows[n] for n in ("dynamic-residual", "eigensensitivity", "shifted"))
+    interval = f"{own['gain']:.3f} (95 % interval {own['gain_low']:.3f} to {own['gain_high']:.3f})"
+    words = f"gains {interval}, the ratios carried on {line['gain']:.3f}, and it leaves "
+    words += f"{own['used_percent']:.1f} % of the given frequencies in the median. It is good for "
+    words += "caution: it makes a model worse by more than a quarter on "
+    words += f"{100.0 * own['worse_share']:.0f} % of the structures, `eigensensitivity` with the "
+    assert f"{words}same factors on {100.0 * other['worse_share']:.0f} %" in text_of(
+        "docs/strategies.md"
+    )
     rows = {row["strategy"]: row for row in list_rows(stored("after"))}
     said = re.search(
         r"`diagnosed` is second with a gain of (\S+) \((\S+) to (\S+)\), "

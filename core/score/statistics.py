@@ -127,17 +127,15 @@ def flip_signs(differences: FloatArray) -> FloatArray:
     else:
         drawn = np.random.default_rng(0).integers(0, 2, (_RESAMPLES, n))
         signs = np.vstack([np.ones(n), 2.0 * drawn - 1.0])
-    # With the sum of squares as it is, |t| grows with the mean, and both have the same order.
+    # Student's t grows with the mean over the root of the mean square: both have the same order.
     squares = np.square(found).sum(axis=0)
-    scale = np.sqrt(np.where(squares > 0.0, squares * n, 1.0))
-    sizes = np.abs(signs @ found) / scale
-    sizes = sizes * np.sqrt((n - 1) / np.maximum(1.0 - np.square(sizes), 1e-12))
-    order = np.argsort(-sizes[0], kind="stable")
-    largest = np.maximum.accumulate(sizes[:, order[::-1]], axis=1)[:, ::-1]
-    own = sizes[0, order] * (1.0 - 1e-9)
-    p = np.maximum.accumulate((largest >= own).mean(axis=0))
+    units = found / np.sqrt(np.where(squares > 0.0, squares * n, 1.0))
+    order = np.argsort(np.abs(units.sum(axis=0)), kind="stable")
+    sizes = np.abs(signs @ units[:, order])
+    largest = np.maximum.accumulate(sizes, axis=1)  # of a comparison and of those still in
+    p = (largest >= sizes[0] * (1.0 - 1e-9)).mean(axis=0)
     corrected = np.ones(k)
-    corrected[order] = p
+    corrected[order] = np.maximum.accumulate(p[::-1])[::-1]
     return np.where(squares > 0.0, corrected, 1.0)
 
 

@@ -60,14 +60,32 @@ class Target:
     Arguments:
         iteration: parameters and their priors.
         point: the most probable ones at the prior median of the discrepancy.
+        centre: its q, off the bounds, at which there is no density, (p,).
+        root: Cholesky factor of the covariance of q about it, (p, p).
         measurement: the modes that have a partner there.
         discrepancy: its prior.
     """
 
     iteration: Iteration
     point: Iterate
+    centre: FloatArray
+    root: FloatArray
     measurement: Measurement
     discrepancy: Discrepancy
+
+    def at(self, z: FloatArray) -> FloatArray:
+        """Return q, (n, p), at coordinates z in which it is nearly standard normal, (n, p).
+
+        Chains are of z. A move of theirs stretches differences of positions, by 1.3 in the rms, so
+        that the last digit of a start decides on all of it after some hundred moves. Draws of z are
+        the same on every processor, those of q would follow its rounding of point and root.
+        """
+        return self.centre + z @ self.root.T
+
+    def inside(self, q: FloatArray) -> BoolArray:
+        """Return which points (n, p) are within the bounds, (n,)."""
+        parametric = self.iteration.parametric
+        return np.asarray(((q > parametric.lower) & (q < parametric.upper)).all(axis=1))
 
     @property
     def data(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -128,18 +146,17 @@ class Target:
         return np.asarray((apart * solved).sum(axis=1) + np.linalg.slogdet(covariance)[1])
 
     def log_density(self, fit: QuadraticFit) -> Callable[[FloatArray], FloatArray]:
-        """Return a function from (n, p + 1) to ln of the density, (n,)."""
+        """Return a function from z and v, (n, p + 1), to ln of the density, (n,)."""
         log, std, own = self.data
         known = np.square(std) + np.square(fit.error)
-        parametric = self.iteration.parametric
+        precision = self.iteration.parametric.precision
 
         def density(at: FloatArray) -> FloatArray:
-            q, v = at[:, :-1], at[:, -1]
+            q, v = self.at(at[:, :-1]), at[:, -1]
             variance = known + np.square(self.discrepancy.std(v))[:, None] * own
             misfit = self._misfit(log - fit(q), variance)
-            prior = np.square(q) @ parametric.precision + np.square(v)
-            inside = ((q > parametric.lower) & (q < parametric.upper)).all(axis=1)
-            return np.where(inside, -0.5 * (misfit + prior), -np.inf)
+            prior = np.square(q) @ precision + np.square(v)
+            return np.where(self.inside(q), -0.5 * (misfit + prior), -np.inf)
 
         return density
 
@@ -226,41 +243,37 @@ def sample_posterior(
         >>> len(found.uncertainty.samples)
         40
     """
-    target, covariance = most_probable(
-        source, changes, measurement, Discrepancy(*discrepancy), options
-    )
-    sampler, off, rough = _fitted(target, np.asarray(np.linalg.cholesky(covariance)), rng)
+    target = most_probable(source, changes, measurement, Discrepancy(*discrepancy), options)
+    sampler, off, rough = _fitted(target, rng)
     if sampler is None:
-        return _normal_result(target, covariance, off)
+        return _normal_result(target, off)
     try:
         chain, found = _settled(sampler)
     except StrategyFailure:
         if not rough:
             raise
-        return _normal_result(target, covariance, off, float(sampler.iteration))
+        return _normal_result(target, off, float(sampler.iteration))
+    chain[:, :-1] = target.at(chain[:, :-1])
     drawn = chain[rng.choice(len(chain), _SAMPLES, replace=False), :-1]
     return _result(target, chain, drawn, {**found, "surrogate_error": off})
 
 
-def _fitted(target: Target, root: FloatArray, rng: np.random.Generator) -> tuple[Any, float, bool]:
+def _fitted(target: Target, rng: np.random.Generator) -> tuple[Any, float, bool]:
     """Return a sampler after its first steps, the largest error of the polynomials, if too large.
 
     No sampler where the polynomials are useless.
-
-    Arguments:
-        root: of the covariance about the most probable parameters, (p, p).
     """
-    count = int(np.ceil(_POINTS * coefficients_of(len(root))))
-    start = target.point.q + rng.standard_normal((count, len(root))) @ root.T * _WIDER
-    points, values = target.predict(start)
+    size = len(target.centre)
+    count = int(np.ceil(_POINTS * coefficients_of(size)))
+    points, values = target.predict(target.at(_WIDER * rng.standard_normal((count, size))))
     for _ in range(_ROUNDS):
         fit = QuadraticFit.of(points, values)
         if (fit.error > _USELESS * target.std(np.zeros(1))).any():
             return None, float(fit.error.max()), True
-        sampler = _started(target, fit, root, rng)
+        sampler = _started(target, fit, rng)
         drawn = sampler.get_chain(discard=_BLOCK // 2, flat=True)
         drawn = drawn[rng.choice(len(drawn), count, replace=False)]
-        more, exact = target.predict(drawn[:, :-1])
+        more, exact = target.predict(target.at(drawn[:, :-1]))
         off = np.sqrt(np.mean(np.square(fit(more) - exact), axis=0))
         rough = not (off <= _OFF * target.std(drawn[:, -1])).all()
         if not rough:
@@ -275,8 +288,8 @@ def most_probable(
     measurement: Measurement,
     discrepancy: Discrepancy,
     options: UpdateOptions,
-) -> tuple[Target, FloatArray]:
-    """Return the posterior about its mode at the median discrepancy, and the covariance of q there.
+) -> Target:
+    """Return the posterior about its mode at the median discrepancy.
 
     Arguments:
         source, changes, measurement, discrepancy, options: as for `sample_posterior`.
@@ -298,24 +311,21 @@ def most_probable(
     assert covariance is not None
     pairs = zip(measurement.numbers, point.prediction.partner, strict=True)
     kept = measurement.select([number for number, partner in pairs if partner >= 0])
-    return Target(iteration, point, kept, discrepancy), covariance
+    low, high = parametric.lower, parametric.upper
+    centre = np.clip(point.q, np.where(low < 0.0, 0.99 * low, 0.01 * high), 0.99 * high)
+    root = np.asarray(np.linalg.cholesky(covariance))
+    return Target(iteration, point, centre, root, kept, discrepancy)
 
 
-def _started(target: Target, fit: QuadraticFit, root: FloatArray, rng: np.random.Generator) -> Any:  # noqa: ANN401 - emcee's sampler, which has no types
-    """Return an `emcee.EnsembleSampler` of q and v after its first steps.
-
-    Arguments:
-        root: of the covariance about the most probable parameters, (p, p).
-    """
+def _started(target: Target, fit: QuadraticFit, rng: np.random.Generator) -> Any:  # noqa: ANN401 - emcee's sampler, which has no types
+    """Return an `emcee.EnsembleSampler` of z and v after its first steps."""
     import emcee
 
-    size = len(root) + 1
+    size = len(target.centre) + 1
     walkers = max(_WALKERS * size, _FEWEST_WALKERS)
     near = rng.standard_normal((walkers, size))
-    near[:, :-1] = target.point.q + near[:, :-1] @ root.T
-    low, high = target.iteration.parametric.lower, target.iteration.parametric.upper
-    # At a bound there is no density.
-    near[:, :-1] = np.clip(near[:, :-1], np.where(low < 0.0, 0.99 * low, 0.01 * high), 0.99 * high)
+    while (outside := ~target.inside(target.at(near[:, :-1]))).any():
+        near[outside] /= 2.0
     density = target.log_density(fit)
     sampler = emcee.EnsembleSampler(walkers, size, density, vectorize=True, moves=StretchMove())
     sampler.random_state = np.random.RandomState(int(rng.integers(2**32))).get_state()
@@ -324,7 +334,7 @@ def _started(target: Target, fit: QuadraticFit, root: FloatArray, rng: np.random
 
 
 def _settled(sampler: Any) -> tuple[FloatArray, dict[str, float]]:  # noqa: ANN401 - emcee's
-    """Return draws of q and v, (n, p + 1), after so many steps as they need, and how many.
+    """Return draws of z and v, (n, p + 1), after so many steps as they need, and how many.
 
     Raises:
         StrategyFailure: when the longest chain is too short for its autocorrelation.
@@ -370,19 +380,15 @@ def autocorrelation_time(chain: FloatArray) -> float:
     return float(np.max(times))
 
 
-def _normal_result(
-    target: Target, covariance: FloatArray, off: float, steps: float = 0.0
-) -> UpdateResult:
+def _normal_result(target: Target, off: float, steps: float = 0.0) -> UpdateResult:
     """Return the most probable model and the normal approximation about it.
 
     Arguments:
-        covariance: of scaled parameters there, (p, p).
         off: largest error of the polynomials that were tried.
         steps: of a chain that did not settle.
     """
     iteration, point = target.iteration, target.point
-    own = target.discrepancy.median
-    covariance = 0.5 * (covariance + covariance.T)
+    own, covariance = target.discrepancy.median, target.root @ target.root.T
     return UpdateResult(
         model=point.prediction.model,
         parameter_count=len(point.q),

@@ -100,7 +100,6 @@ class Strategy(ABC):
         yardstick: of one that is a line of every board and has no rank, what it stands for; empty
             for all others.
         cost_reference: whether `bench plugins check` compares time and memory with its own.
-        on_request: whether it runs only where it is named.
     """
 
     name: ClassVar[str]
@@ -111,7 +110,6 @@ class Strategy(ABC):
     baseline: ClassVar[bool] = False
     yardstick: ClassVar[str] = ""
     cost_reference: ClassVar[bool] = False
-    on_request: ClassVar[bool] = False
 
     @abstractmethod
     def update(

@@ -54,7 +54,6 @@ class DynamicResidual(ParametricStrategy):
         "to minimize modal dynamic residuals, Struct. Control Health Monit. 25, e2263"
     )
     needs: ClassVar[frozenset[str]] = frozenset({"shapes", "parts"})
-    on_request: ClassVar[bool] = True  # until the kept runs of the boards are made anew
 
     readings: str = "weighted"
     error: float = 0.02
