@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -39,6 +39,10 @@ class Antiresonances:
 
     def __len__(self) -> int:
         return len(self.frequencies)
+
+    def take(self, kept: BoolArray | IntArray) -> Antiresonances:
+        """Return some of them."""
+        return Antiresonances(*(getattr(self, f.name)[kept] for f in fields(self)))
 
     def pair(self, other: Antiresonances) -> IntArray:
         """Return which of others is each: the one as high between the same resonances; else -1.
