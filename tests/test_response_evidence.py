@@ -62,8 +62,7 @@ def test_their_density_is_that_given_the_frequencies() -> None:
     assert (witness.rows.shares.sum(axis=1) > 0.0).all()
     weighed = weigh_by_antiresonances(seen, test.responses)
     assert weighed.antiresonances == len(witness)
-    gained = weighed.posterior.nothing.fit.log_evidence - nothing.fit.log_evidence
-    assert gained == pytest.approx(-0.5 * rest @ rest)
+    assert weighed.posterior.nothing.further == pytest.approx(-0.5 * rest @ rest)
     assert weigh_by_antiresonances(seen, None) is seen
 
 

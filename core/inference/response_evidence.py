@@ -248,8 +248,5 @@ def weigh_by_antiresonances(seen: Examination, responses: FrequencyResponses | N
     if not np.isfinite(found).any():
         return seen
     gains = np.where(np.isfinite(found), found, np.nanmin(found))
-    weighed = [
-        replace(e, fit=replace(e.fit, log_evidence=e.fit.log_evidence + float(gain)))
-        for e, gain in zip(explanations, gains, strict=True)
-    ]
+    weighed = [replace(e, further=float(gain)) for e, gain in zip(explanations, gains, strict=True)]
     return replace(seen, posterior=Posterior.of(weighed), antiresonances=len(present))

@@ -12,6 +12,7 @@ from femubench.core.modal.frf import FrequencyResponses, receptance
 from femubench.core.modal.receptances import PredictedResponses, receptance_slopes
 from femubench.core.typing import AnyArray, BoolArray, FloatArray, IntArray
 
+SAME = 1.25  # ratio of frequencies within which two may be the same one
 _SIDE = 4  # lines on each side of a change of sign that say where the zero is
 _REACH = 1.15  # ratio of frequencies within which they lie
 _SHARP = 0.01  # of the frequency: one whose deviation is larger says nothing
@@ -47,14 +48,15 @@ class Antiresonances:
     def pair(self, other: Antiresonances) -> IntArray:
         """Return which of others is each: the one as high between the same resonances; else -1.
 
-        Where others have more there, or fewer, none is.
+        Where others have more there, or fewer, none is; nor where they are too far apart.
         """
         found, there = np.full(len(self), -1), other._by_place
         for place, rows in self._by_place.items():
             partners = there.get(place, [])
             if len(partners) == len(rows):
                 found[rows] = partners
-        return found
+        apart = np.abs(np.log(other.frequencies[found] / self.frequencies)) if len(other) else 0.0
+        return np.where(apart < np.log(SAME), found, -1)
 
     @cached_property
     def _by_place(self) -> dict[tuple[int, int, bytes], list[int]]:
