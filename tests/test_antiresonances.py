@@ -42,6 +42,8 @@ def test_those_of_a_point_are_the_resonances_of_the_model_held_there() -> None:
     partner = found.pair(predicted)
     assert (partner >= 0).all()
     assert len(found) >= 3
+    far = replace(predicted, frequencies=1.3 * predicted.frequencies)
+    assert (found.pair(far) == -1).all()
     off = found.frequencies - predicted.frequencies[partner]
     assert (np.abs(off) < 1e-4 * found.frequencies).all()
     assert (found.std < 1e-3 * found.frequencies).all()

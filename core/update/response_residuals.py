@@ -172,6 +172,11 @@ class AntiresonancePrediction:
         return self.modal.model
 
     @property
+    def modes(self) -> Modes:
+        """Return its modes, as of `response_modes`."""
+        return self.modal.modes
+
+    @property
     def partner(self) -> IntArray:
         """Return which of its modes belongs to every measured mode; -1 where none does, (m,)."""
         return self.modal.partner
