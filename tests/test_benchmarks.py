@@ -38,6 +38,7 @@ SHORT = {
     "open_cells": ("--quick", 120),
     "performance": ("--only mesh --within 1", 20),
     "reproduce_updates": ("", 90),
+    "response_sweep": ("1 --structures gable", 10),
     "run_cost": ("frame -s unchanged", 20),
     "scaling": ("'modes of a lattice' 3", 0),
     "store": ("--results 1000", 40),

@@ -119,7 +119,7 @@ def test_held_out_responses_are_scored_in_decibels() -> None:
     mass = case.model.mass.toarray()
     weighted = mass @ modes.shapes
     viscous = (weighted * (2.0 * ratio * np.sqrt(modes.eigenvalues))) @ weighted.T
-    pairs, noise = [], []
+    pairs, noise, turned = [], [], []
     for f, hertz in enumerate(frfs.frequencies):
         w = 2.0 * np.pi * hertz
         dynamic = case.model.stiffness.toarray() - w**2 * mass + 1j * w * viscous
@@ -129,6 +129,7 @@ def test_held_out_responses_are_scored_in_decibels() -> None:
             if known or hertz > 255.0:
                 size = abs(frfs.values[f, o, 0])
                 pairs.append((abs(found[o]), size))
+                turned.append(abs(np.angle(found[o] / frfs.values[f, o, 0])))
                 noise.append(20.0 / np.log(10.0) * min(frfs.deviations[f, o, 0] / size, 1.0))
     scored = score_responses(case, case.model)
     assert scored is not None
@@ -137,6 +138,7 @@ def test_held_out_responses_are_scored_in_decibels() -> None:
     errors = [20.0 * np.log10(np.hypot(a, least) / np.hypot(b, least)) for a, b in pairs]
     assert scored.rms_db == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=1e-6)
     assert scored.floor_db == pytest.approx(np.sqrt(np.mean(np.square(noise))), rel=1e-6)
+    assert scored.phase_deg == pytest.approx(np.degrees(np.sqrt(np.mean(np.square(turned)))))
     assert score_responses(replace(case, split=None), case.model) is None
     truth = Changes(case.model).parameterise("members").at(np.log(FACTORS))
     best = score_responses(case, truth)
@@ -161,7 +163,8 @@ def test_unasked_it_runs_only_where_a_case_has_responses(tmp_path: Path) -> None
         plan = plan_run([tmp_path / name], (), plugins, {"nominal": "drawn"})
         ran[name] = [strategy.name for strategy in plan.strategies]
     assert ran["with"] == list(plugins.strategies)
-    assert ran["without"] == [name for name in ran["with"] if name != "response-function"]
+    own = {"response-function", "antiresonances"}
+    assert ran["without"] == [name for name in ran["with"] if name not in own]
 
 
 @pytest.mark.slow(30)

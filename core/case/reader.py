@@ -276,11 +276,16 @@ class _Building:
     def frfs(self, measured: Measurement) -> tuple[FrequencyResponses | None, ResponseSplit | None]:
         """Return the measured frequency responses, and which of them a strategy is given."""
         name, spec = self.spec.measurement.frfs, self.spec.measurement.responses
-        key, sensors = ("measurement", "frfs"), measured.sensors
         if name is None:
             if spec is not None:
                 raise BadKey(("measurement", "responses"), "no responses", "a file in frfs")
             return None, None
+        found = self.responses(("measurement", "frfs"), name, measured.sensors)
+        held_out = set(self.spec.measurement.held_out)
+        return (found, None) if spec is None else split_responses(found, spec, measured, held_out)
+
+    def responses(self, key: KeyPath, name: str, sensors: Sensors) -> FrequencyResponses:
+        """Return the responses of a file, of which one at least is at a sensor of the case."""
         with at_key(*key):
             path = self.files.path(name)
         found = read_responses(path, self.readers, sensors)
@@ -289,8 +294,7 @@ class _Building:
         if not set(found.responses.labels) & set(sensors.labels):
             expected = f"labels as in the file, e.g. {found.responses.labels[0]!r}"
             raise BadKey(key, "no response belongs to a sensor of the case", expected)
-        held_out = set(self.spec.measurement.held_out)
-        return (found, None) if spec is None else split_responses(found, spec, measured, held_out)
+        return found
 
     @property
     def reference_used(self) -> tuple[int, ...]:
@@ -314,7 +318,15 @@ class _Building:
         listed = [(("reference", key), number) for number in self.reference_used]
         check_labels(listed, found, spec.modes)
         mass = None if spec.mass is None else (spec.mass.value, spec.mass.std)
-        return replace(found, total_mass=mass)
+        found = replace(found, total_mass=mass)
+        if spec.frfs is None:
+            return found
+        if (bands := self.spec.measurement.responses) is None:
+            expected = "{used, held_out, std}, which hold for both states"
+            raise BadKey(("measurement", "responses"), "no bands of the responses", expected)
+        lines = self.responses(("reference", "frfs"), spec.frfs, sensors)
+        lines, split = split_responses(lines, bands, found, set())
+        return replace(found, responses=split.whole.given(lines))
 
     def sensors(self, site: Site) -> tuple[Sensors, bool]:
         """Return the sensors, and whether a reader plugin gave them."""

@@ -448,6 +448,7 @@ class ReferenceSpec(TomlTable):
         None, description="a list of mode numbers, one at least"
     )
     mass: WeightSpec | None = Field(None, description="{value, std} in kg")
+    frfs: FileName | None = Field(None, description="a file in the case folder")
 
 
 class RemovalSpec(TomlTable):

@@ -156,6 +156,8 @@ def _differing(one: Measurement, other: Measurement) -> str | None:
         first, second = getattr(one, f.name), getattr(other, f.name)
         if f.name == "assumed":  # what is written is stated
             continue
+        if f.name == "responses" and _same_responses(one.responses, other.responses):
+            continue
         if f.name == "shape_std":  # of what was not measured it means nothing
             first = np.where(np.isnan(first) & np.isnan(one.shapes), second, first)
         if f.name == "sensors":
@@ -294,6 +296,9 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
         files[file] = modes_csv(case.reference, share)
         content["reference"] = {"modes": file, "used": [int(n) for n in case.reference_used]}
         content["reference"] |= _weight(case.reference)
+        if case.reference.responses is not None:
+            content["reference"]["frfs"] = "reference-frfs.npz"
+            files["reference-frfs.npz"] = responses_npz(case.reference.responses)
     if tables:
         content["modification"] = tables
     settings: dict[str, tuple[float | None, float | None]] = {

@@ -46,6 +46,7 @@ from femubench.core.inference.examine import Examination, Terms, list_left_out
 from femubench.core.inference.fault_search import Inquiry, inquire
 from femubench.core.inference.model_error import class_widths
 from femubench.core.inference.posterior import Explanation
+from femubench.core.inference.response_evidence import weigh_by_antiresonances
 from femubench.core.inference.search import adequacy
 from femubench.core.inference.settings import format_value, list_changed, settings
 from femubench.core.look.localisation import locate
@@ -58,6 +59,7 @@ from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.plugin.loader import list_effects, list_faults
 from femubench.core.roles import Effect, Fault
 from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning, States
+from femubench.core.score.responses import score_responses
 from femubench.core.score.scoring import score_model
 from femubench.core.ties import in_order
 
@@ -124,6 +126,8 @@ def diagnose(
     with effort.scope(_expected(case)):
         # Faults of data and input first, then the causes that are left without them.
         inquiry = inquire(case.model, used, wrong, terms)
+        given = case.used_measurement().responses
+        inquiry = replace(inquiry, examination=weigh_by_antiresonances(inquiry.examination, given))
         repaired = correct_case(case, inquiry.repaired)
         states = None
         if repaired.reference is not None:  # what is wrong with the data is no difference
@@ -133,6 +137,8 @@ def diagnose(
             looks = _looks(case.model, repaired, (*registered, *known))
             posterior, leader = inquiry.examination.posterior, proof.leader
             differs = None if states is None else states.differs
+            if inquiry.examination.antiresonances and not differs:
+                differs = None  # modes alone agree
             decision = decide(posterior, leader, proof.test, differs)
             found = _written(repaired, inquiry, decision, proof, looks, begin)
         # With a reference both states have what the drawing lacks.
@@ -205,10 +211,11 @@ def _with_few_elements(case: Case) -> Case:
 
 
 def _use_all_modes(case: Case) -> Case:
-    """Return a case that holds no mode back: where a change is sought, every mode shows it."""
+    """Return a case that holds nothing back: where a change is sought, every mode shows it."""
     used, reference = case.measurement.numbers, case.reference
     known = () if reference is None else tuple(reference.numbers)
-    return replace(case, used=tuple(used), held_out=(), reference_used=known)
+    split = case.split and case.split.whole
+    return replace(case, used=tuple(used), held_out=(), reference_used=known, split=split)
 
 
 def _looks(drawn: Model, case: Case, effects: Iterable[Effect]) -> tuple[LookWarning, ...]:
@@ -382,8 +389,17 @@ def _notes(
     best = proof.leader
     notes: list[str] = []
     if case.band is not None and best.parts:
-        found = look_at_band(Seen(proof.model, case.measurement), case.band)
-        notes += [f"With the causes in it: {warning.what}" for warning in found]
+        warnings = look_at_band(Seen(proof.model, case.measurement), case.band)
+        notes += [f"With the causes in it: {warning.what}" for warning in warnings]
+    if (count := examination.antiresonances) > 0:
+        what = "antiresonance was" if count == 1 else "antiresonances were"
+        notes.append(f"{count} {what} weighed next to the modes, by the responses that are given.")
+    drawn, found = (score_responses(case, model) for model in (case.model, proof.model))
+    if best.parts and drawn is not None and found is not None:
+        notes.append(
+            f"At held-out lines and sensors responses are off by {drawn.rms_db:.3g} dB as drawn, "
+            f"by {found.rms_db:.3g} dB with the causes; noise is {found.floor_db:.2g} dB."
+        )
     if proof.crossed:
         notes.append(
             "The case holds nothing back: the gain is that on used modes left out in turn."

@@ -61,6 +61,7 @@ class Examination:
         modes: of the model, in the coordinates of the problem.
         error: what a beam model gets wrong, where that was asked.
         reference: as in `examine`.
+        antiresonances: how many were weighed next to the modes.
     """
 
     model: Model
@@ -72,6 +73,7 @@ class Examination:
     modes: Modes
     error: Inadequacy | None = field(default=None, repr=False)
     reference: Measurement | None = None
+    antiresonances: int = 0
 
     @cached_property
     def nominal(self) -> State:

@@ -25,6 +25,7 @@ from femubench.core.fit.discrepancy import Discrepancy
 from femubench.core.fit.modal_basis import Space, rigid_first, scatter_terms
 from femubench.core.fit.modal_fit import Problem, State, state_at
 from femubench.core.fit.noise import Noise
+from femubench.core.fit.zero_rows import ZeroRows
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import Modes
 from femubench.core.modal.group_prior import STRUCTURE_STD, GroupPriors
@@ -65,22 +66,68 @@ def error_slopes(problem: Problem, modes: Modes) -> dict[str, FloatArray]:
         "sensor gains": _gains(nominal),
         **_shapes(nominal),
     }
-    found |= _groups(nominal, rigid_first(modes).shapes)
+    shapes = rigid_first(modes).shapes
+    found |= _groups(nominal, shapes)
     if structure is not None:
         rows = scatter_slopes(problem, modes)
         count = len(structure.properties)
         found["element stiffness"], found["element mass"] = rows[:, :count], rows[:, count:]
-        local = _at_joints(structure, rigid_first(modes).shapes)
-        found["mass of joints"] = _joint_masses(nominal, structure, local)
-        stiff, heavy, types = _end_moments(structure, local)
-        values = nominal.eigenvalues[nominal.partner]
-        ends = stiff - values[:, None, None] * heavy  # (m, p, N)
-        own = np.einsum("mpN,Nm->mp", ends, nominal.vectors[: ends.shape[2], nominal.partner])
-        forces = -np.moveaxis(ends * own[:, :, None], 2, 0)
-        single = nominal.rows(forces, np.zeros(len(types)))
-        found["flexibility of joints"] = single
-        found["flexibility of joint types"] = single @ np.eye(types.max(initial=-1) + 1)[types]
+        found |= _joints(nominal, structure, shapes)
     return found
+
+
+def antiresonance_errors(state: ZeroRows, modes: Modes) -> dict[str, FloatArray]:
+    """Return the sensitivities of antiresonances to the same perturbations, (k, p_k).
+
+    Shapes as they are read have no part in them, nor have gains.
+
+    Arguments:
+        state: of the nominal model.
+        modes: of it, in the order of the coordinates.
+    """
+    near, values, space = state.vectors, state.eigenvalues, state.problem.space
+    structure, shapes = state.problem.model.structure, rigid_first(modes).shapes
+    nothing = np.zeros(1)
+    found = {
+        "stiffness of everything": state.rows(
+            (space.eigenvalues[:, None] * near)[..., None], nothing
+        ),
+        "density of everything": state.rows((-values * near)[..., None], nothing),
+        "general": general_slopes(state),
+    }
+    found |= _groups(state, shapes)
+    if structure is not None:
+        element = structure.properties
+        one, other = (
+            np.asarray(structure.gather @ (shapes @ side)).reshape(len(element), 12, -1)
+            for side in (near, state.left)
+        )
+        stiff, heavy = (
+            (other * (matrices @ one)).sum(axis=1).T
+            for matrices in (element.stiffness_matrices(), element.mass_matrices())
+        )
+        found["element stiffness"] = state.scale[:, None] * stiff
+        found["element mass"] = -(state.scale * values)[:, None] * heavy
+        found |= _joints(state, structure, shapes)
+    return found
+
+
+def _joints(
+    nominal: State | ZeroRows, structure: Structure, shapes: FloatArray
+) -> dict[str, FloatArray]:
+    """Return the slopes of masses at joints, and of the flexibility of joints and their types."""
+    local = _at_joints(structure, shapes)
+    stiff, heavy, types = _end_moments(structure, local)
+    values = nominal.eigenvalues[nominal.partner]
+    ends = stiff - values[:, None, None] * heavy  # (m, p, N)
+    own = np.einsum("mpN,Nm->mp", ends, nominal.vectors[: ends.shape[2], nominal.partner])
+    forces = -np.moveaxis(ends * own[:, :, None], 2, 0)
+    single = nominal.rows(forces, np.zeros(len(types)))
+    return {
+        "mass of joints": _joint_masses(nominal, structure, local),
+        "flexibility of joints": single,
+        "flexibility of joint types": single @ np.eye(types.max(initial=-1) + 1)[types],
+    }
 
 
 def scatter_slopes(problem: Problem, modes: Modes) -> FloatArray:
@@ -116,7 +163,7 @@ def _everything(nominal: State, sign: float, mass: float) -> FloatArray:
     return nominal.rows(forces, np.array([mass]))
 
 
-def _groups(nominal: State, shapes: FloatArray) -> dict[str, FloatArray]:
+def _groups(nominal: State | ZeroRows, shapes: FloatArray) -> dict[str, FloatArray]:
     """Return the slopes of a relative change of every group of matrices, by how well it is known.
 
     Arguments:
@@ -145,7 +192,7 @@ def _groups(nominal: State, shapes: FloatArray) -> dict[str, FloatArray]:
     return found
 
 
-def general_slopes(state: State) -> FloatArray:
+def general_slopes(state: State | ZeroRows) -> FloatArray:
     """Return the slopes of random symmetric changes sqrt(lambda_a lambda_b) g_ab, (n_data, p).
 
     Between the coordinates of the nominal model, whatever causes are in the state.
@@ -198,7 +245,7 @@ def _at_joints(structure: Structure, shapes: FloatArray) -> dict[int, FloatArray
 
 
 def _joint_masses(
-    nominal: State, structure: Structure, local: Mapping[int, FloatArray]
+    nominal: State | ZeroRows, structure: Structure, local: Mapping[int, FloatArray]
 ) -> FloatArray:
     """Return the slopes of a mass at every joint, as a share of the structure, (n_data, n).
 

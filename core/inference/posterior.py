@@ -33,11 +33,13 @@ class Explanation:
         base: textbook effects.
         fit: of the causes; its parts are the causes, none for a model that lacks nothing more.
         names: number of effects that were candidates.
+        further: ln of the density of data that the fit does not know, given those that it does.
     """
 
     base: Base
     fit: Fit
     names: int
+    further: float = 0.0
 
     @property
     def parts(self) -> tuple[Projection, ...]:
@@ -52,7 +54,7 @@ class Explanation:
     @property
     def log_likelihood(self) -> float:
         """Return ln of the probability of the data at the best fit, up to a constant of them."""
-        return self.fit.state.problem.noise.log_density - 0.5 * self.chi2
+        return self.fit.state.problem.noise.log_density - 0.5 * self.chi2 + self.further
 
     @property
     def unknowns(self) -> int:
@@ -68,6 +70,11 @@ class Explanation:
         state = self.fit.state
         drawn = state_at(replace(state.problem, offset=0.0), (), np.zeros(0))
         return max(min(added, _unpaired(state) - _unpaired(drawn)), 0)
+
+    @property
+    def log_evidence(self) -> float:
+        """Return ln of the probability of all data, up to a constant of them."""
+        return self.fit.log_evidence + self.further
 
     @cached_property
     def log_prior(self) -> float:
@@ -89,13 +96,13 @@ class Explanation:
     @property
     def log_joint(self) -> float:
         """Return ln of prior times evidence."""
-        return self.log_prior + self.fit.log_evidence
+        return self.log_prior + self.log_evidence
 
     @cached_property
     def log_weight(self) -> float:
         """Return ln of prior times evidence, the latter as far as its noise is to be trusted."""
         trust = self.fit.state.problem.noise.trust
-        return self.log_prior + trust * self.fit.log_evidence
+        return self.log_prior + trust * self.log_evidence
 
     @cached_property
     def searched(self) -> Key:
@@ -183,7 +190,7 @@ class Posterior:
             best = bare or best
         if without is None:
             return True
-        gains = best.fit.log_evidence - without.fit.log_evidence, fits_better(best, without)
+        gains = best.log_evidence - without.log_evidence, fits_better(best, without)
         return min(gains) > log(settings.earned_factor)
 
     def _first(self, effects: frozenset[str], searched: Key) -> Explanation | None:

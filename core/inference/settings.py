@@ -18,6 +18,7 @@ from typing import Literal, TypeVar, cast
 from femubench.core.case.case import SCATTER
 from femubench.core.case.modes import LARGEST_SCALE
 from femubench.core.errors import InputError
+from femubench.core.modal.antiresonances import SAME
 from femubench.core.modal.group_prior import KINDS
 
 Kind = Literal["prior", "cost", "decision"]
@@ -324,7 +325,7 @@ class Settings:
         0.25, "of the lowest used frequency", "antiresonances may lie below the first resonance"
     )
     same_antiresonance: float = _decision(
-        1.25, "ratio of frequencies", "within which two explanations mean the same one"
+        SAME, "ratio of frequencies", "within which two explanations mean the same one"
     )
 
     budget_seen: float = _decision(

@@ -108,7 +108,7 @@ class Run(results.Run):
 
         Columns: case strategy seed nominal status reason seconds; ``used_percent``, ``used_mac``
         and the same for ``higher`` and ``modified`` (nan where the case has no such block);
-        ``responses_db`` and ``responses_floor_db`` of held-out responses;
+        ``responses_db``, ``responses_floor_db`` and ``responses_deg`` of held-out responses;
         rigid_body_modes rigid_body_modes_expected negative_eigenvalues unphysical
         parameter_count evaluations gain rank. Of a study also the values of its axes:
         ``plain_case`` and ``plain_strategy``, noise, sensors_left_out, and every option as

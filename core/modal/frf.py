@@ -154,6 +154,11 @@ class ResponseSplit:
         own = [k for k, label in labels if label not in self.held_out_sensors]
         return measured.take(own).at_lines(in_bands(measured.frequencies, self.used))
 
+    @property
+    def whole(self) -> ResponseSplit:
+        """Return the same with nothing held out."""
+        return ResponseSplit((*self.used, *self.held_out))
+
     def unseen(self, measured: FrequencyResponses) -> BoolArray:
         """Tell which responses only the score sees, (n_f, n_responses)."""
         hidden = [label in self.held_out_sensors for label in measured.responses.labels]

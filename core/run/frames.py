@@ -24,7 +24,7 @@ def results_frame(run: Run) -> pd.DataFrame:
         for name, block in result.blocks.items():
             row |= {f"{name}_percent": block.rms_percent, f"{name}_mac": block.mean_mac}
         if (seen := result.responses) is not None:
-            row |= dict(zip(_RESPONSES, (seen.rms_db, seen.floor_db), strict=True))
+            row |= dict(zip(_RESPONSES, (seen.rms_db, seen.floor_db, seen.phase_deg), strict=True))
         if study is not None:
             place = study.place(result.case, result.strategy, result.nominal)
             row |= {_PLAIN.get(name, name): value for name, value in place.items()}
@@ -71,6 +71,6 @@ _COUNTS = (
     *("rigid_body_modes", "rigid_body_modes_expected", "negative_eigenvalues", "unphysical"),
     *("parameter_count", "evaluations", "gain", "rank"),
 )
-_RESPONSES = ("responses_db", "responses_floor_db")
+_RESPONSES = ("responses_db", "responses_floor_db", "responses_deg")
 _ERRORS = (*(f"{name}_{what}" for name in BLOCKS for what in ("percent", "mac")), *_RESPONSES)
 _FLOATS = ("seconds", *_ERRORS, "gain")

@@ -14,6 +14,7 @@ from femubench.core.display import Shown, count_noun
 from femubench.core.schema.bounds import (
     LONGEST_TEXT,
     Decibels,
+    Degrees,
     Figure,
     GainFigure,
     Mac,
@@ -63,11 +64,13 @@ class ResponseBlock:
         rms_db: root mean square error of the log-magnitude, 20 log10 |H|.
         floor_db: what the noise of the measurement makes of it.
         count: of responses, lines times sensors times forces.
+        phase_deg: root mean square error of the phase; None in records of before 0.2.0.
     """
 
     rms_db: Decibels
     floor_db: Decibels
     count: Whole
+    phase_deg: Degrees | None = None
 
 
 if TYPE_CHECKING:

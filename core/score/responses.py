@@ -18,7 +18,7 @@ _DECIBEL = 20.0 / np.log(10.0)
 
 
 def score_responses(case: Case, model: Model) -> ResponseBlock | None:
-    """Return the error of a model's log-magnitudes at held-out lines and sensors.
+    """Return the error of a model's log-magnitudes and phases at held-out lines and sensors.
 
     What noise exceeds is not counted. The model's modes have the damping ratios of the measured
     modes, held-out ones among them, that they are paired with: no strategy is asked for damping.
@@ -36,13 +36,14 @@ def score_responses(case: Case, model: Model) -> ResponseBlock | None:
         return None
     measured = replace(case.measurement, responses=lines)
     try:
-        predicted = np.abs(PredictedResponses.of(model, measured).receptances)
+        answer = PredictedResponses.of(model, measured).receptances[counted]
     except ModelError:
         return None
     least = _RANGE * float(size[counted].max())
-    ratio = np.hypot(predicted[counted], least) / np.hypot(size[counted], least)
+    ratio = np.hypot(np.abs(answer), least) / np.hypot(size[counted], least)
     floor = _rms(_DECIBEL * std[counted] / size[counted])
-    return ResponseBlock(_rms(_DECIBEL * np.log(ratio)), floor, int(counted.sum()))
+    phase = np.angle(answer * lines.receptances[counted].conj(), deg=True)
+    return ResponseBlock(_rms(_DECIBEL * np.log(ratio)), floor, int(counted.sum()), _rms(phase))
 
 
 def _rms(values: FloatArray) -> float:

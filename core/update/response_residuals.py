@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -11,11 +12,18 @@ import numpy as np
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
 from femubench.core.fem.slopes import MatrixSlopes
+from femubench.core.modal.antiresonances import (
+    Antiresonances,
+    antiresonance_slopes,
+    find_antiresonances,
+    predict_antiresonances,
+)
 from femubench.core.modal.eigen import Modes
 from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.receptances import PredictedResponses
 from femubench.core.typing import AnyArray, FloatArray, IntArray
+from femubench.core.update.residuals import Prediction, Targets
 
 
 @dataclass(frozen=True)
@@ -99,3 +107,97 @@ class ResponsePrediction:
     def jacobian(self, slopes: MatrixSlopes, masses: object) -> FloatArray:
         """Return d (weighted prediction) / d parameter, (n_rows, p), as of `Prediction`."""
         return self.data.weigh(self.answer.slopes(slopes))
+
+
+@dataclass(frozen=True)
+class AntiresonanceTargets:
+    """Used frequencies and the antiresonances of the given responses, weighted by deviations.
+
+    Arguments:
+        measurement: with responses and their deviations.
+    """
+
+    statistical: ClassVar[bool] = True
+    scattered: ClassVar[bool] = True
+    measurement: Measurement
+
+    @cached_property
+    def modal(self) -> Targets:
+        """Return the frequencies."""
+        return Targets(self.measurement, "frequency", statistical=True)
+
+    @cached_property
+    def zeros(self) -> Antiresonances:
+        """Return the measured antiresonances; raises NotApplicable where there is none."""
+        test = self.measurement
+        found = find_antiresonances(ResponseTargets(test).responses, test.frequencies, test.damping)
+        if not len(found):
+            raise NotApplicable("no antiresonance stands out of the noise of the given responses")
+        return found
+
+    @cached_property
+    def norm(self) -> float:
+        """Return the norm of the weighted data."""
+        return float(
+            np.hypot(self.modal.norm, np.linalg.norm(self.zeros.frequencies / self.zeros.std))
+        )
+
+    def predict(self, model: Model, previous: object, mass: float) -> AntiresonancePrediction:
+        """Return the answer of a model, as `Targets` do; raises ModelError without modes."""
+        answer = PredictedResponses.of(model, self.measurement)
+        observer = model.observe(self.measurement.sensors)
+        modal = Prediction(self.modal, model, answer.modes, answer.partner, observer, mass)
+        return AntiresonancePrediction(self, modal, answer, predict_antiresonances(answer))
+
+
+@dataclass(frozen=True)
+class AntiresonancePrediction:
+    """A model's answer to frequencies and antiresonances.
+
+    Arguments:
+        data: what it is compared with.
+        modal: its frequencies.
+        answer: its receptances.
+        zeros: its antiresonances.
+    """
+
+    data: AntiresonanceTargets
+    modal: Prediction
+    answer: PredictedResponses
+    zeros: Antiresonances
+
+    @property
+    def model(self) -> Model:
+        """Return the model."""
+        return self.modal.model
+
+    @property
+    def modes(self) -> Modes:
+        """Return its modes, as of `response_modes`."""
+        return self.modal.modes
+
+    @property
+    def partner(self) -> IntArray:
+        """Return which of its modes belongs to every measured mode; -1 where none does, (m,)."""
+        return self.modal.partner
+
+    @cached_property
+    def zero_partner(self) -> IntArray:
+        """Return which of its antiresonances belongs to every measured one; -1 for none, (k,)."""
+        return self.data.zeros.pair(self.zeros)
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """Return weighted measured minus predicted data, nan without a partner, (m + k,)."""
+        measured, partner = self.data.zeros, self.zero_partner
+        hertz = np.append(self.zeros.frequencies, np.nan)[partner]
+        apart = (measured.frequencies - hertz) / measured.std
+        return np.concatenate([self.modal.residual, apart])
+
+    def jacobian(self, slopes: MatrixSlopes, masses: Callable[[], FloatArray]) -> FloatArray:
+        """Return d (weighted prediction) / d parameter, 0 without a partner, (m + k, p)."""
+        partner, there = self.zero_partner, self.zero_partner >= 0
+        rows = np.zeros((len(partner), slopes.count))
+        own = antiresonance_slopes(self.answer, self.zeros, slopes)
+        rows[there] = own[partner[there]] / self.data.zeros.std[there, None]
+        return np.vstack([self.modal.jacobian(slopes, masses), rows])

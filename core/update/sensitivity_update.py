@@ -20,7 +20,12 @@ from femubench.core.fit.gauss_newton import Linearised
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import BoolArray, FloatArray
 from femubench.core.update.residuals import Prediction, Residual, Targets, common_rows
-from femubench.core.update.response_residuals import ResponsePrediction, ResponseTargets
+from femubench.core.update.response_residuals import (
+    AntiresonancePrediction,
+    AntiresonanceTargets,
+    ResponsePrediction,
+    ResponseTargets,
+)
 from femubench.core.update.strategy import ParameterEstimate, UpdateResult
 from femubench.core.update.uncertainty import Uncertainty, standard_normal
 
@@ -44,6 +49,8 @@ class UpdateOptions:
         responses: fit the given frequency responses, weighted by their deviations, in place of the
             modes, from the parameters that fit the frequencies: responses alone have an optimum
             of their own wherever a resonance lies on a wrong one.
+        antiresonances: fit those of the given frequency responses next to the frequencies, each
+            by its deviation, from the same start.
         damping: beta, which stands for alpha / pct^2 of the paper, as a share of z_m'W z_m: of
             what s's is for a factor on the whole stiffness.
         max_iterations: steps at most.
@@ -59,6 +66,7 @@ class UpdateOptions:
     weighting: str = "unit"
     shapes: bool = False
     responses: bool = False
+    antiresonances: bool = False
     damping: float = 1e-5
     max_iterations: int = 100
     tolerance: float = 1e-6
@@ -71,6 +79,8 @@ class UpdateOptions:
             raise ValueError(f"weighting {self.weighting!r} is neither 'unit' nor 'statistical'")
         if self.shapes and self.weighting != "statistical":
             raise ValueError("mode shapes as data need statistical weighting")
+        if self.responses and self.antiresonances:
+            raise ValueError("either responses or antiresonances are fitted, not both")
 
 
 @dataclass(frozen=True)
@@ -78,7 +88,7 @@ class Iterate:
     """Coordinates q, (p,), and what the model predicts there."""
 
     q: FloatArray
-    prediction: Prediction | ResponsePrediction
+    prediction: Prediction | ResponsePrediction | AntiresonancePrediction
 
     def cost(self, rows: BoolArray, precision: FloatArray) -> float:
         """Return r'Wr over some data plus the prior's share."""
@@ -90,7 +100,10 @@ class Iteration:
     """State of one update."""
 
     def __init__(
-        self, parametric: ParametricModel, data: Targets | ResponseTargets, options: UpdateOptions
+        self,
+        parametric: ParametricModel,
+        data: Targets | ResponseTargets | AntiresonanceTargets,
+        options: UpdateOptions,
     ) -> None:
         self.parametric, self.data, self.options = parametric, data, options
         self.history: list[Mapping[str, float]] = []
@@ -330,13 +343,13 @@ def sensitivity_update(
         raise NotApplicable("there is no parameter to update")
     options = UpdateOptions() if options is None else options
     statistical = options.weighting == "statistical"
-    data: Targets | ResponseTargets
+    data: Targets | ResponseTargets | AntiresonanceTargets
     data = Targets(measurement, options.residual, statistical, options.shapes, statistical)
     model = Model.of(source) if isinstance(source, Structure) else source
     parametric, start = ParametricModel(model, tuple(changes)), None
-    if options.responses:
+    if options.responses or options.antiresonances:
         start = Iteration(parametric, Targets(measurement, "frequency", True), options).run().q
-        data = ResponseTargets(measurement)
+        data = (ResponseTargets if options.responses else AntiresonanceTargets)(measurement)
     iteration = Iteration(parametric, data, options)
     point = iteration.run(start)
     std, uncertainty = iteration.estimate_deviations(point)

@@ -33,6 +33,7 @@ CLASSES = {
     "cma-es": "cma_es:CmaEs",
     "bayesian-sampling": "sampling:BayesianSampling",
     "response-function": "response_function:ResponseFunction",
+    "antiresonances": "antiresonances:AntiresonanceFit",
     "diagnosed": "diagnosed:Diagnosed",
 }
 

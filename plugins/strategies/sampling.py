@@ -51,9 +51,10 @@ class BayesianSampling(Bayesian):
             InputError: for shapes or responses as data, of which the likelihood knows none.
             StrategyFailure: when the chain has not converged, with the figure that says so.
         """
-        if self.options.shapes or self.options.responses:
-            key = "shapes" if self.options.shapes else "responses"
-            raise InputError("the likelihood is of frequencies alone", key=key, expected="false")
+        for key in ("shapes", "responses", "antiresonances"):
+            if getattr(self.options, key):
+                what = "the likelihood is of frequencies alone"
+                raise InputError(what, key=key, expected="false")
         return sample_posterior(
             *self.pose(model, measurement),
             measurement,
