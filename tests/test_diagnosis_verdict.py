@@ -146,6 +146,7 @@ def explained(
     """Return an explanation as far as a verdict looks at it."""
     columns = np.array(direction, dtype=float)[:, None] if names else np.zeros((3, 0))
     return SimpleNamespace(
+        log_evidence=float(np.log(probability)),
         base=SimpleNamespace(names=book, parts=book),
         tells_more=False,
         parts=names,
@@ -164,7 +165,6 @@ def explained(
                 problem=SimpleNamespace(data=NO_SHAPES),
                 partner=(),
             ),
-            log_evidence=float(np.log(probability)),
         ),
     )
 
