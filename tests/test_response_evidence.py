@@ -13,7 +13,7 @@ from femubench import InputError, read_case
 from femubench.core.case.writing import write_case
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.fit.modal_fit import state_at
-from femubench.core.fit.static_response import Basis
+from femubench.core.inference.coordinates import modes_for
 from femubench.core.inference.examine import Examination, examine, pose_problem
 from femubench.core.inference.response_evidence import (
     JointEvidence,
@@ -32,7 +32,7 @@ def test_slopes_to_every_element_are_those_of_differences() -> None:
     witness = Witness.of(model, state_at(problem, (), np.zeros(0)), test)
     assert witness is not None
     assert len(witness) > 4
-    slopes = witness.slopes(Basis.of(model, test).modes)
+    slopes = witness.slopes(modes_for(model))
     n, step = len(problem.data), 1e-4
     for word, name in (("elements", "element stiffness"), ("density", "density of everything")):
         parametric = Changes(model).parameterise(word)
