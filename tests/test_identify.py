@@ -12,8 +12,9 @@ import pytest
 
 import femubench
 from femubench import Identification, InputError, identify
-from femubench.core.case.response_files import join_files
+from femubench.core.case.response_files import join_files, locate_sensors, read_responses
 from femubench.core.identify.complexity import mean_phase_deviation, phase_collinearity
+from femubench.core.plugin.loader import load_plugins
 from femubench.modal import FrequencyResponses, TimeSignals
 from femubench.plot import mode_shape, stabilisation, synthesis
 from femubench.reports.identification import identification_html
@@ -257,6 +258,23 @@ def test_files_that_do_not_belong_together(
     done = call_bench("identify", *files, code=2)
     assert says in done.output.replace(f"{tmp_path}/", "")
     assert done.output.count("\n") == 1
+
+
+def test_forces_without_labels_need_none_where_sensors_are_listed(
+    tmp_path: Path, small: Any
+) -> None:
+    import scipy.io
+
+    held = {"freq": small.measured.frequencies, "FRF": small.measured.values}
+    scipy.io.savemat(tmp_path / "test.mat", held)
+    known, readers = sensors(13), tuple(load_plugins().readers.values())
+    read = read_responses(tmp_path / "test.mat", readers, known)
+    assert isinstance(read, FrequencyResponses)
+    assert read.responses.labels == known.labels
+    found = locate_sensors(read, known, tmp_path / "places.csv")
+    assert np.isnan(found.references.xyz).all()
+    with pytest.raises(InputError, match="13 channels without labels"):
+        read_responses(tmp_path / "test.mat", readers, known.take(range(12)))
 
 
 def test_drawings_refuse_what_they_cannot_draw(found: Identification) -> None:

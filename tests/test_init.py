@@ -131,6 +131,15 @@ def test_directions_of_sensors_that_are_wrong_are_seen_by_shapes(tmp_path: Path)
         assert "shapes are like" not in done.output
 
 
+def test_places_of_a_table_in_mm_are_seen(tmp_path: Path) -> None:
+    universal(tmp_path)
+    rows = "".join(f"{k + 1}:z,{200 * (k + 1)},0,0,z\n" for k in range(SPANS))
+    (tmp_path / "places.csv").write_text(f"label,x,y,z,direction\n{rows}")
+    done = init(tmp_path, "--sensors", str(tmp_path / "places.csv"))
+    assert "places.csv: coordinates were taken in mm" in " ".join(done.output.split())
+    assert done.output.count("1.000") == 6  # MAC
+
+
 def test_directions_alone_that_are_wrong_are_named() -> None:
     case = femubench.cases["suite/portal"]
     own = case.measurement.sensors

@@ -463,6 +463,10 @@ def test_four_commands_lead_from_a_deck_to_an_updated_one(tmp_path: Path) -> Non
     (change,) = re.findall(r"names the left joint, (-[\d.]+ ± \d+ %)", section)
     assert change in said["diagnose"]
     assert re.search(r" 1 +diagnosed ", said["run"])
+    next_one = "bench update case -s diagnosed:meet_frequencies=false -o updated"
+    assert said["run"].endswith(f"Next: {next_one}")
+    refused = call_bench("update", folder / "case", "-s", "diagnosed", "-o", folder / "new", code=2)
+    assert "diagnosed:meet_frequencies=false changes parameters alone" in refused.output
     assert re.search(r"RIGHT: 1 → 0\.\d", said["update"])
     assert (folder / "updated" / "plates.inp").is_file()
 

@@ -247,6 +247,7 @@ def test_an_updated_spring_is_written_into_its_deck(tmp_path: Path) -> None:
     ("old", "new", "match"),
     [
         ("TYPE=C3D8,", "TYPE=B31,", "elements of type B31.*C3D20R.*MATRIXSTORAGE"),
+        ("TYPE=C3D8,", "TYPE=S4R,", r"elements of type S4R \(expected S4 in its place; or C3D4"),
         ("foot, 1, 3", "foot, 1, 3\n*COUPLING, REF NODE=1, SURFACE=head", "no surface HEAD"),
         ("foot, 1, 3", f"foot, 1, 3\n{COUPLING}", "node 13 of an element has no place"),
         ("foot, 1, 3", "foot, 1, 3\n*KINEMATIC\n1, 3", "KINEMATIC is not read"),

@@ -175,6 +175,19 @@ class Placement:
         # One wrong coordinate may make any unit fit by size.
         return best if gap[best] <= _NEAR * self.size else "m"
 
+    def in_its_unit(self, file: str) -> tuple[Placement, tuple[str, ...]]:
+        """Return it in the unit that is stated or seen from its size, and what to say of that."""
+        if self.alignment.unit is not None:
+            return self, ()
+        unit = self.detect_unit()
+        found = replace(self, alignment=replace(self.alignment, unit=METRES[unit]))
+        if unit == "m":
+            return found, ()
+        why = (
+            f"in m the sensors would span {size_of(self.every) / self.size:.3g} times the structure"
+        )
+        return found, (f"{file}: coordinates were taken in {unit}, since {why}.",)
+
     def match_labels(self, labels: Sequence[str]) -> list[Match]:
         """Return the nearest place of every sensor, near enough or not."""
         points = self.alignment.moved(self.every)
@@ -400,9 +413,8 @@ def match_sensors(
         labels = tuple(read.labels[i] for i in rows)
         ways = tuple(read.directions[i] for i in rows)
         test = Placement(site, alignment, read.xyz[rows], labels, ways)
-        stated_unit, unit = alignment.unit, test.detect_unit()
-        alignment = replace(alignment, unit=stated_unit or METRES[unit])
-        test = replace(test, alignment=alignment)
+        test, taken = test.in_its_unit(file.name)
+        alignment = test.alignment
         matches = test.match_labels(labels)
         try:
             stated = test.check_span(matches, file.name)
@@ -415,11 +427,7 @@ def match_sensors(
             test.check_apart(kept)
         except Misfit as misfit:
             raise misfit.at(file) from None
-        if stated_unit is None and unit != "m":
-            ratio = size_of(test.every) / test.size
-            why = f"in m the sensors would span {ratio:.3g} times the structure."
-            stated = (f"{file.name}: coordinates were taken in {unit}, since {why}", *stated)
-        stated = (*stated, *describe_matches([match for match, _ in kept], file.name))
+        stated = (*taken, *stated, *describe_matches([match for match, _ in kept], file.name))
     if not kept:
         expected = "nodes with coordinates, in a direction that the model has (--directions AXES)"
         raise InputError("no sensor fits the structure", file=file, expected=expected)

@@ -207,16 +207,20 @@ def _parse_channel(name: str) -> tuple[str, float, str]:
 def _both_sides(
     file: Path, sides: tuple[Sensors, Sensors], known: Sensors | None
 ) -> tuple[Sensors, Sensors]:
-    """Return motions and forces; a force may do without a label, an accelerometer of several."""
-    first, second = (
-        Sensors((name,), side.xyz, ("x",))
-        if len(side) == 1 and side.labels[0].startswith("?") and (name == "force" or len(other) > 1)
-        else side
-        if not len(side) and len(other)
-        else _sensors(file, side, known)
-        for side, other, name in zip(sides, sides[::-1], _ANYWHERE, strict=True)
-    )
-    return first, second
+    """Return motions and forces; one side may do without labels where known sensors are the other.
+
+    So may a force alone, and an accelerometer alone of several forces.
+    """
+    found = []
+    for side, other, name in zip(sides, sides[::-1], _ANYWHERE, strict=True):
+        count, unnamed = len(side), side.labels[:1] and side.labels[0].startswith("?")
+        alone = count == 1 and (name == "force" or len(other) > 1)
+        if unnamed and (alone or (known is not None and len(known) == len(other) != count)):
+            more = (f"{name} {k}" for k in range(2, count + 1))
+            found.append(Sensors.unplaced([name, *more], "x"))
+        else:
+            found.append(side if not count and len(other) else _sensors(file, side, known))
+    return found[0], found[1]
 
 
 def _sensors(file: Path, side: Sensors, known: Sensors | None) -> Sensors:
@@ -333,7 +337,7 @@ def locate_sensors(measured: Responses, known: Sensors, file: Path) -> Responses
         xyz = []
         for label in sensors.labels:
             place = places.get(label, places.get(label.rpartition(":")[0]))
-            if place is None and label not in _ANYWHERE:
+            if place is None and label.partition(" ")[0] not in _ANYWHERE:
                 expected = f"a row for {label!r}"
                 raise InputError("a sensor has no place", file=file, key="label", expected=expected)
             xyz.append([np.nan] * 3 if place is None else place)

@@ -29,7 +29,7 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
     Arguments:
         file: label,x,y,z,direction or label,at,direction.
         site: the structure.
-        alignment: of coordinates and their directions; metres where it has no unit.
+        alignment: of coordinates and their directions; a unit that it lacks is seen.
 
     Raises:
         InputError: for a duplicate label, a sensor off the structure, an impossible direction.
@@ -62,6 +62,7 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
         )
     every = np.array([row.vector() for row in rows], dtype=float)
     test = Placement(site, alignment, every, tuple(labels), tuple(directions))
+    test, taken = test.in_its_unit(file.name)
     matches = tuple(test.match_labels(test.labels))
     for row, match in zip(rows, matches, strict=True):
         try:
@@ -78,7 +79,9 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
         raise misfit.at(file) from None
     xyz = np.array([match.xyz for match in matches], dtype=float)
     sensors = Sensors(tuple(labels), xyz, tuple(directions))
-    return Placed(sensors, matches, (*close, *describe_matches(matches, file.name)), alignment)
+    return Placed(
+        sensors, matches, (*taken, *close, *describe_matches(matches, file.name)), test.alignment
+    )
 
 
 def _point_at(row: CsvRow, direction: str, site: Site) -> Vector:

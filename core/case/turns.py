@@ -53,7 +53,7 @@ def propose_axes(case: Case, stated: Alignment) -> str:
         if np.abs(turned - turned.clip(*corners)).max() <= limit:
             feet = np.array([foot for _, foot in site.nearest(turned)])
             if np.linalg.norm(feet - turned, axis=1).max() <= limit:
-                ways["frame"] = _motions(case, modes, feet)
+                ways["frame"] = _motions(case, modes, feet)  # axes
         for key, moved in ways.items():
             readings = np.einsum("sd,dsm->sm", sensors.axes @ np.kron(np.eye(2), turn).T, moved)
             readings = np.where(find_seen_modes(readings), readings, 0.0)

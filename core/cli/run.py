@@ -82,7 +82,9 @@ def run(
     if len(cases) == 1 and Path(cases[0]).is_dir() and not ctx.params["quiet"]:
         rows = list_rows(outcome)
         if lead := next((r["strategy"] for r in rows if r["rank"] == 1 and r["gain"] > 0.0), None):
-            click.echo(f"Next: bench update {cases[0]} -s {shlex.quote(lead)} -o updated")
+            options_of = getattr(plugins.strategies.get(lead), "writable", "")
+            lead = shlex.quote(f"{lead}:{options_of}" if options_of else lead)
+            click.echo(f"Next: bench update {cases[0]} -s {lead} -o updated")
     return code if old is None else _compare(old, outcome)
 
 

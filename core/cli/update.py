@@ -8,6 +8,7 @@ import click
 
 from femubench.core.cli import options
 from femubench.core.cli.registry import plugins_for
+from femubench.core.errors import InputError
 
 
 @click.command()
@@ -31,7 +32,15 @@ def update(ctx: click.Context, case: str, strategy: str, seed: int, output: Path
     check_new(output)
     plugins = plugins_for(ctx)
     read, model, parameters = update_case(case, strategy, seed, plugins)
-    write_updated(read, model, output, plugins)
+    try:
+        write_updated(read, model, output, plugins)
+    except InputError as fault:
+        name, _, asked = strategy.partition(":")
+        more = getattr(plugins.strategies[name], "writable", "")
+        if not more or more in asked:
+            raise
+        expected = f"{fault.expected}; {name}:{more} changes parameters alone"
+        raise InputError(fault.what, file=fault.file, expected=expected) from None
     for p in parameters:
         spread = "" if p.std is None else f" ± {p.std:.2g}"
         click.echo(f"{p.name}: {p.before:.4g} → {p.after:.4g}{spread} {p.unit}".rstrip())

@@ -32,8 +32,8 @@ def init_case(
         model, modes: files with the model and with the measured modes or responses, or the folder
             of an identification; several are repeats. Without both a commented example is written.
         stated: ``mass``, ``dofs``, ``sensors`` and ``reference``, further files; ``model_unit``,
-            ``unit``, ``tolerance``, ``origin``, ``without``, and ``frame`` and ``directions`` for
-            axes, as `bench init` has.
+            ``unit``, ``tolerance``, ``origin``, ``without``, and for axes ``frame`` and
+            ``directions``, as `bench init` has.
 
     Raises:
         InputError: when the folder holds anything or cannot be written, or for what is wrong in

@@ -100,6 +100,8 @@ class Strategy(ABC):
         yardstick: of one that is a line of every board and has no rank, what it stands for; empty
             for all others.
         cost_reference: whether `bench plugins check` compares time and memory with its own.
+        writable: options with which it changes parameters alone and no whole matrix, so that a
+            solver's files can hold its model; empty where no option decides that.
     """
 
     name: ClassVar[str]
@@ -110,6 +112,7 @@ class Strategy(ABC):
     baseline: ClassVar[bool] = False
     yardstick: ClassVar[str] = ""
     cost_reference: ClassVar[bool] = False
+    writable: ClassVar[str] = ""
 
     @abstractmethod
     def update(

@@ -22,6 +22,8 @@ _IGNORED = re.compile(
 )
 KINDS: dict[str, solid_elements.Kind | shells.Shell] = {**solid_elements.KINDS, **shells.SHELLS}
 POINTS = ("MASS", "SPRING1")
+# By reduced integration or of another formula: what is next to them here.
+_ALIKE = {"S4R": "S4", "S3R": "S3", "STRI65": "S6", "C3D8R": "C3D8I", "C3D10M": "C3D10"}
 SECTIONS = ("SOLIDSECTION", "SHELLSECTION")
 _HELD = {
     "ENCASTRE": range(6), "PINNED": range(3),
@@ -163,9 +165,9 @@ def _instance(deck: SolidDeck, block: _Block) -> None:
 def _element(deck: SolidDeck, block: _Block) -> None:
     kind, known = block.option("TYPE"), KINDS
     if kind not in known and kind not in POINTS:
-        expected = (
-            f"{', '.join(known)}, {', '.join(POINTS)}; of others {INSTEAD.partition(', or ')[2]}"
-        )
+        near = f"{_ALIKE[kind]} in its place; or " if kind in _ALIKE else ""
+        others = f"of others {INSTEAD.partition(', or ')[2]}"
+        expected = f"{near}{', '.join(known)}, {', '.join(POINTS)}; {others}"
         raise block.refuse(f"elements of type {kind}", expected)
     size = len(known[kind].places) if kind in known else 1
     own: dict[int, None] = {}

@@ -71,6 +71,7 @@ class Diagnosed(Strategy):
     textbook: bool = True
 
     settings: ClassVar[tuple[str, ...]] = ("meet_frequencies=false", "tolerance=0.01")
+    writable: ClassVar[str] = "meet_frequencies=false"
 
     def __post_init__(self) -> None:
         known = {effect.name for effect in list_effects()} if self.without else set()
