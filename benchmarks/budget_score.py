@@ -1,6 +1,7 @@
 """Compare budgets of errors with what drawings lack; write docs/diagnosis-accuracy.md.
 
-    python benchmarks/budget_score.py           # both halves: a figure a structure, and the means
+    python benchmarks/budget_score.py           # development half: means, structures, advice
+    python benchmarks/budget_score.py held      # the other half: its rows are kept unless asked
     python benchmarks/budget_score.py portal    # one structure, class by class
 
 The truths are those of `make truths ARGS="--only lacks"`; half a minute.
@@ -9,7 +10,7 @@ The truths are those of `make truths ARGS="--only lacks"`; half a minute.
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -21,13 +22,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # the truths are not install
 from sweep_data import PAGE, as_markdown, filled
 
 import femubench
-from femubench.core.diagnosis.budget import budget_of
+from femubench.core.diagnosis.budget import budget_of, frequency_slopes
 from femubench.core.plugin.loader import list_effects
 from truths.lacks_file import LACKS, Lacks, read_lacks, rms
 
 Array = npt.NDArray[np.float64]
 Class = tuple[str, str]
-MARK = "budget-score"
+MARK, ADVICE = "budget-score", "budget-advice"
 CLEAR = 1.645  # deviations of a 90 % interval
 OWN = 0.25  # of its size, by which definitions of a truth differ (five, twenty, 200 times as stiff)
 LEAST = 0.05  # % of frequency; smaller in truth and budget says nothing
@@ -122,15 +123,55 @@ class BudgetScore:
         off = np.array([(ours - true)[among] for true, ours in pairs])
         return float(np.linalg.norm(off) / np.linalg.norm([true[among] for true, _ in pairs]))
 
+    @cached_property
+    def handbook(self) -> Array:
+        """Return what handbooks leave of every mode, (m,)."""
+        book = sum(np.array(n.percent) for n in self.budget.lines if n.source == "handbook")
+        return np.array([mode.error_percent for mode in self.budget.modes]) - book
+
+    @property
+    def left(self) -> Array:
+        """Return what the extended model leaves of every mode, (m,)."""
+        return np.array([mode.left_percent for mode in self.budget.modes])
+
     @property
     def ratio(self) -> float:
         """Return the error of held-out modes left by the extended model, of the handbook's."""
-        error, left = (
-            np.array([getattr(mode, name) for mode in self.budget.modes])
-            for name in ("error_percent", "left_percent")
-        )
-        book = sum(np.array(n.percent) for n in self.budget.lines if n.source == "handbook")
-        return rms(left[~self.used]) / rms((error - book)[~self.used])
+        return rms(self.left[~self.used]) / rms(self.handbook[~self.used])
+
+    @cached_property
+    def advised(self) -> int:
+        """Return the row of the held-out mode that is known least, which is advised first."""
+        slopes = frequency_slopes(self.budget.state)
+        variance = np.einsum("mk,kl,ml->m", slopes, self.budget.covariance, slopes)
+        return int(np.argmax(np.where(self.used, -1.0, variance)))
+
+    def left_with(self, row: int) -> Array:
+        """Return what a budget leaves of every mode that has one more of them to use, (m,)."""
+        case = femubench.cases[f"suite/{self.truth.structure}"]
+        used = sorted((*case.used, self.budget.modes[row].mode))
+        found = budget_of(replace(case, used=tuple(used), held_out=()), list_effects())
+        assert found is not None
+        return np.array([mode.left_percent for mode in found.modes])
+
+    def advice(self) -> tuple[dict[str, str], int, float]:
+        """Return the row of a table, the rank of the advised mode, and the ratio with it."""
+        all_left = {int(row): self.left_with(int(row)) for row in np.flatnonzero(~self.used)}
+        after = {row: rms(left[~self.used]) for row, left in all_left.items()}
+        rank = 1 + sorted(after, key=lambda row: after[row]).index(self.advised)
+        unseen = ~self.used & (np.arange(len(self.used)) != self.advised)
+        ratio = rms(all_left[self.advised][unseen]) / rms(self.handbook[unseen])
+        cells = {
+            "structure": f"`{self.truth.structure}`",
+            "held out": str(len(after)),
+            "advised": str(self.budget.modes[self.advised].mode),
+            "its rank": str(rank),
+            "error of held-out modes without, %": f"{rms(self.left[~self.used]):.2f}",
+            "with it": f"{after[self.advised]:.2f}",
+            "with the best": f"{min(after.values()):.2f}",
+            "of those still unseen, of the handbook's": f"{ratio:.2f}",
+        }
+        return cells, rank, ratio
 
     def intervals(self) -> tuple[list[bool], list[Class]]:
         """Tell of every class whether its interval has the truth, and which signs are wrong."""
@@ -178,14 +219,33 @@ def main() -> None:
             for key in score.classes:
                 true, ours, std = score.both(key)
                 print(*key, "truth", true.round(1), "budget", ours.round(1), f"± {std:.2f}")
-    if sys.argv[1:]:
+    run = "held" if sys.argv[1:] == ["held"] else "development"
+    if sys.argv[1:] and run != "held":
         return
+    text, old = PAGE.read_text(encoding="utf-8"), {}
+    for line in text.partition(f"<!-- {MARK} -->")[2].partition("<!-- /")[0].splitlines():
+        if cells := [cell.strip() for cell in line.strip("|").split("|")]:
+            old[cells[0]] = cells
     halves = {half: [s for s in scores if s.truth.held == (half == "held")] for half in HALVES}
-    rows = [row(f"{half} ({len(own)})", own) for half, own in halves.items()]
-    rows += [row(f"`{one.truth.structure}`", [one]) for own in halves.values() for one in own]
-    text = filled(PAGE.read_text(encoding="utf-8"), as_markdown(rows), MARK)
-    PAGE.write_text(text, encoding="utf-8")
+    named = {
+        half: {f"{half} ({len(own)})": own, **{f"`{s.truth.structure}`": [s] for s in own}}
+        for half, own in halves.items()
+    }
+    fresh = {name: row(name, own) for name, own in named[run].items()}
+    keys = list(next(iter(fresh.values())))
+    order = [next(iter(names)) for names in named.values()]
+    order += [name for names in named.values() for name in list(names)[1:]]
+    rows = [fresh.get(n) or dict(zip(keys, old[n], strict=True)) for n in order]
+    text = filled(text, as_markdown(rows), MARK)
     print(as_markdown(rows))
+    if run == "development":
+        table, ranks, ratios = zip(*(score.advice() for score in halves[run]), strict=True)
+        print(as_markdown(list(table)))
+        print(
+            f"best two {np.mean(np.array(ranks) <= 2):.2f}, {np.exp(np.mean(np.log(ratios))):.2f}"
+        )
+        text = filled(text, as_markdown(list(table)), ADVICE)
+    PAGE.write_text(text, encoding="utf-8")
 
 
 HALVES = ("held", "development")

@@ -21,6 +21,7 @@ from types import SimpleNamespace
 from typing import Literal, cast
 
 import numpy as np
+import scipy.linalg as la
 from msgspec import structs
 
 from femubench.core.case.case import Case
@@ -31,7 +32,16 @@ from femubench.core.change.terms import ElementOperator, Term
 from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.textbook import textbook_values
 from femubench.core.fem.beam import BEND_XY, BEND_XZ, TWIST
-from femubench.core.fem.frame import ACTIVE, MADE, Factor, Frame, GroundSpring, Place, PointMass
+from femubench.core.fem.frame import (
+    ACTIVE,
+    MADE,
+    Factor,
+    Frame,
+    GroundSpring,
+    Place,
+    PointMass,
+    halves_of,
+)
 from femubench.core.fem.group_factors import Groups
 from femubench.core.fem.joints import half_depth, joint_groups, whole_members, without_overlaps
 from femubench.core.fem.model import Model
@@ -44,6 +54,7 @@ from femubench.core.fit.noise import Noise
 from femubench.core.fit.projection import Projection
 from femubench.core.fit.residuals import Data
 from femubench.core.inference.coordinates import modes_for, place_data
+from femubench.core.inference.model_error import general_slopes
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import zero_tolerance
 from femubench.core.modal.group_prior import GroupPriors
@@ -164,7 +175,8 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
         return None
     if out.any():
         start = _as_it_is(model, every)
-    last, drawn = log_frequencies(start), np.log(np.abs(start.frequencies[start.partner]))
+    drawn, model = np.log(np.abs(start.frequencies[start.partner])), halve_zones(model)
+    last = log_frequencies(start if model is case.model else _as_it_is(model, every))
     lines = [_line("all", "mesh", last - drawn, np.zeros((len(every),) * 2), "handbook")]
 
     def take(place: str, name: str, better: Model, share: float) -> None:
@@ -221,6 +233,7 @@ def _fit_with_tails(
     split = _split(entries)
     x = np.zeros(sum(len(entry.names) for entry in entries))
     width = np.ones(len(x))
+    problem = _with_rest(state_at(problem, parts, x))
     for _ in range(settings.scale_steps[1]):
         own = [e.root * width[at] for e, at in zip(entries, split, strict=True)]
         scaled = [replace(e, root=root).hypothesis for e, root in zip(entries, own, strict=True)]
@@ -238,6 +251,7 @@ def _fit_with_tails(
                 width[at] = np.sqrt((1.0 + size[at].sum()) / (1.0 + len(entry.names)))
         if np.allclose(width, before, rtol=settings.budget_rest[0]):
             break
+        problem = _with_rest(found.state)
     return x, covariance * excess
 
 
@@ -297,10 +311,32 @@ def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame
     springs = [replace(one, stiffness=one.stiffness * held.get(key, 1.0)) for one, key in firm]
     return replace(
         frame,
-        factors=(*frame.factors, *wanted),
+        factors=(*(factor for factor in frame.factors if factor.factor != 1.0), *wanted),
         masses=(*masses, *added),
         springs=tuple(springs),
     )
+
+
+def halve_zones(model: Model) -> Model:
+    """Return a model whose elements at joints are halves where a joint zone is no longer.
+
+    A zone as long as a coarse element would act on modes that hardly bend the joint.
+    """
+    structure = model.structure
+    if structure is None:
+        return model
+    halves: dict[str, None] = {}
+    for end in (end for ends in _ends_of_joints(structure.frame).values() for end in ends):
+        rows, reach = _zone(structure, end)
+        element = structure.labels[rows[0]]
+        # The middle of the other half lies behind the zone.
+        if 0.75 * structure.properties.length[rows[0]] > reach:
+            halves[halves_of(element)[structure.element_ends[end][1]]] = None
+    if not halves:
+        return model
+    factors = (*structure.frame.factors, Factor(_WHOLES[0], tuple(halves), 1.0))
+    halved = Model.of(structure.rebuilt(replace(structure.frame, factors=factors)))
+    return halved if halved.size <= settings.most_dofs else model
 
 
 def list_entries(model: Model) -> list[Entry]:
@@ -314,9 +350,10 @@ def list_entries(model: Model) -> list[Entry]:
     found, (unknown, passing, correlation, _) = [], settings.budget_joints
     widths = dict(zip(MADE, settings.budget_made, strict=True))
     made = {kind.type: widths[kind.made] for kind in frame.joint_kinds}
+    named = {row: at for at, own in structure.place_index.items() for row in own.tolist()}
     for (place, role), ends in _ends_of_joints(frame).items():
-        rows = np.unique(np.concatenate([_zone(structure, end) for end in ends]))
-        labels = tuple(structure.labels[row] for row in rows)
+        rows = np.unique(np.concatenate([_zone(structure, end)[0] for end in ends]))
+        labels = tuple(named[row] for row in rows.tolist())
         terms = {}
         for axis in (axis for axis in ACTIVE[frame.plane] if axis in _AXES):
             own = _AXES[axis][0]
@@ -449,8 +486,8 @@ def _ends_of_joints(frame: Frame) -> dict[tuple[str, str], list[str]]:
     return found
 
 
-def _zone(structure: Structure, end: str) -> IntArray:
-    """Return the elements of a joint at a member end, one at least, (k,).
+def _zone(structure: Structure, end: str) -> tuple[IntArray, float]:
+    """Return the elements of a joint at a member end, one at least, (k,), and its length in m.
 
     They reach half the depth of what crosses, and once the own depth, from the centre of the joint.
     """
@@ -468,13 +505,13 @@ def _zone(structure: Structure, end: str) -> IntArray:
     reach = min(reach, settings.budget_joints[3] * float(length.sum()))
     inside = np.cumsum(length) - 0.5 * length < reach
     inside[0] = True
-    return np.asarray(own[inside])
+    return np.asarray(own[inside]), reach
 
 
 def _pose(
     model: Model, measurement: Measurement, hypotheses: Sequence[Hypothesis], every: Measurement
 ) -> tuple[Problem, _Parts]:
-    """Return some modes in the coordinates of a model, with what no class of a budget is as noise.
+    """Return some modes in the coordinates of a model.
 
     Arguments:
         every: all measured modes, which the coordinates serve.
@@ -482,15 +519,26 @@ def _pose(
     modes, bias = modes_for(model), mesh_bias(model, 2 * len(every) + settings.spare_modes)
     still = modes.rigid | (modes.eigenvalues <= zero_tolerance(modes))
     data = Data(measurement, np.zeros(0) if bias is None else bias, int(still.sum()))
-    mode, _ = data.shape_rows
-    largest = np.abs(data.shapes).max(axis=0, initial=0.0)
-    rest_f, rest_s = settings.budget_rest
-    rest = np.zeros(len(data))
-    rest[: len(measurement)] = rest_f * measurement.frequencies
-    rest[len(measurement) :][: len(mode)] = rest_s * largest[mode]
-    noise = Noise(np.diag(np.hypot(1.0, rest / data.std)))
-    problem = place_data(model, data, noise, hypotheses)
+    problem = place_data(model, data, Noise(np.eye(len(data))), hypotheses)
     return problem, problem.space.projections
+
+
+def _with_rest(state: State) -> Problem:
+    """Return the problem of a state with what no class of a budget is as noise.
+
+    It is in every reading, and it couples the modes, so that close ones have less certain shapes.
+    """
+    data, (rest_f, rest_s) = state.problem.data, settings.budget_rest
+    mode, _ = data.shape_rows
+    count, largest = len(data.measurement), np.abs(data.shapes).max(axis=0, initial=0.0)
+    rest = np.zeros(len(data))
+    rest[count:][: len(mode)] = rest_s * largest[mode]
+    coupled = 2.0 * rest_f * general_slopes(state)
+    total = np.diag(1.0 + np.square(rest / data.std)) + coupled @ coupled.T
+    least = 1.0 + np.square(rest_f * data.measurement.frequencies / data.std[:count])
+    at = np.arange(count)  # beyond the modes that random changes couple
+    total[at, at] = np.maximum(total[at, at], least)
+    return replace(state.problem, noise=Noise(np.asarray(la.cholesky(total, lower=True))))
 
 
 def _as_it_is(model: Model, every: Measurement) -> State:

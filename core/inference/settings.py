@@ -194,12 +194,12 @@ class Settings:
         0.1, "of what it changes", "shear coefficients and rotary inertia by handbooks are so sure"
     )
     budget_joints: tuple[float, float, float, float] = _prior(
-        (1.0, 0.5, 0.5, 1.0 / 3.0),
+        (1.5, 0.75, 0.5, 1.0 / 3.0),
         "of ln(stiffness) of a zone that ends, that passes; correlation of axes; part of a member",
         "an end is rigid or gives like a wall, bending is alike; no joint reaches farther",
     )
     budget_made: tuple[float, ...] = _prior(
-        (1.0, 1.0, 1.0, 0.6, 0.7),
+        (1.5, 1.5, 1.5, 0.9, 1.0),
         "the first of these by `made`",
         "a solid corner has little but its arm, a glued one no weld; all others as not known",
     )
