@@ -17,12 +17,12 @@ PACKAGE = ("core", "plugins", "reports", "papers", "scenarios", "femubench")
 ALL = "package"  # the rooms of PACKAGE together
 # What the rooms have now: they may shrink, and the package is to come to 73 000 lines.
 BUDGETS = {
-    ALL: 89_366,
+    ALL: 88_781,
     "core": 1_037,
     "core/advise": 677,
     "core/case": 7_391,
     "core/challenge": 2_131,
-    "core/change": 1_258,
+    "core/change": 1_228,
     "core/child": 2_006,
     "core/cli": 2_599,
     "core/conformance": 2_285,
@@ -30,7 +30,7 @@ BUDGETS = {
     "core/drawing": 1_436,
     "core/effect": 1_046,
     "core/fem": 5_422,
-    "core/fit": 2_432,
+    "core/fit": 1_877,
     "core/identify": 1_698,
     "core/inference": 3_843,
     "core/library": 2_827,
@@ -51,7 +51,7 @@ BUDGETS = {
     "papers": 3_273,
     "scenarios": 750,
     "femubench": 370,
-    "tests": 48_402,
+    "tests": 48_407,
     "truths": 14_092,
     "benchmarks": 7_763,
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from itertools import product
 
 import numpy as np
@@ -29,7 +29,6 @@ _OSCILLATOR = (0.4, 1.2, 2.2)
 _STIFF = 0.01
 _TYPICAL = 0.6
 _NOTHING = 1e-12
-_SIZES, _FREQUENCIES = (0.3, 1.5), 15
 
 
 @dataclass(frozen=True, repr=False)
@@ -131,35 +130,6 @@ class Hypothesis:
     def slopes(self, x: FloatArray) -> FloatArray:
         """Return d factors / d x at one point, (k, n_terms); one-sided where a bound is near."""
         return self.change.slopes(x)
-
-
-def magnitudes(hypothesis: Hypothesis, sizes: tuple[float, ...] = _SIZES) -> FloatArray:
-    """Return coordinates at which a hypothesis is tried, (g, k).
-
-    Arguments:
-        hypothesis: with one parameter or more.
-        sizes: positive; the second parameter of what adds dofs is its frequency, which runs over
-            its range.
-    """
-    kinds = tuple((*p.range, p.one_sided) for p in hypothesis.parameters)
-    return _magnitudes(kinds, hypothesis.change.extra > 0, sizes)
-
-
-@lru_cache(maxsize=256)  # frequencies are ranges of many oscillators
-def _magnitudes(
-    kinds: tuple[tuple[float, float, bool], ...], moves: bool, sizes: tuple[float, ...]
-) -> FloatArray:
-    """Return the same of parameters by range and side; it must not be written to."""
-    chosen = []
-    for i, (low, high, one_sided) in enumerate(kinds):
-        if moves and i:
-            chosen.append(np.linspace(low, high, _FREQUENCIES))
-        else:
-            below = () if one_sided else tuple(-size for size in sizes)
-            chosen.append(np.unique(np.clip([*below, *sizes], low, high)))
-    found = np.array(list(product(*chosen)))
-    found.flags.writeable = False
-    return found
 
 
 def combine_points(points: Sequence[Sequence[float]]) -> FloatArray:

@@ -71,17 +71,6 @@ class Projection:
         core = self.core(factors, mass=mass)
         return None if core is None else np.asarray(self.rows.T @ (core @ self.rows))
 
-    def turn(self, first: int, turn: FloatArray) -> Projection:
-        """Return the same in coordinates of which some are combinations of those here.
-
-        Arguments:
-            first: of the coordinates that change.
-            turn: the new ones from as many old ones, orthogonal, (r, r).
-        """
-        rows, own = self.rows.copy(), slice(first, first + len(turn))
-        rows[:, own] = rows[:, own] @ turn
-        return replace(self, rows=rows, whole=False)
-
     @cached_property
     def apart(self) -> bool:
         """Tell whether each coordinate is acted on by itself, where the rows are the coordinates.
@@ -102,13 +91,6 @@ class Projection:
         rows = la.block_diag(np.eye(low), left)
         return replace(self, rows=np.eye(rows.shape[1]), cores=rows.T @ self.cores @ rows)
 
-    def restrict(self, kept: IntArray) -> Projection:
-        """Return the same in some of the coordinates."""
-        if self.whole:
-            cores = self.cores[:, kept[:, None], kept]
-            return replace(self, rows=np.eye(len(kept)), cores=cores)
-        return replace(self, rows=self.rows[:, kept])
-
 
 class Projector:
     """Projects changes on given vectors.
@@ -121,7 +103,6 @@ class Projector:
     def __init__(self, model: Model, vectors: FloatArray) -> None:
         self.vectors, self.structure = vectors, model.structure
         self.wider: dict[int, FloatArray] = {0: vectors}
-        self._near: tuple[FloatArray, FloatArray] | None = None
         self.unit = heaviest_translation(model)
         if self.structure is not None:
             # What cannot move in the plane of the frame has no part in any product.
@@ -155,56 +136,6 @@ class Projector:
         weights = np.where(is_mass, known, 0.0)
         return Projection(hypothesis, rows, cores, is_mass, weights, small is None)
 
-    def widen(self, projection: Projection, added: FloatArray) -> Projection:
-        """Return a projection on further vectors as well, which stand behind those of the basis.
-
-        Arguments:
-            projection: on the basis.
-            added: the further vectors, (n, r).
-        """
-        change, known, r = projection.hypothesis.change, self.vectors.shape[1], added.shape[1]
-        if not r:
-            return projection
-        if not projection.whole:
-            touched, shared = self._acted_on(change.terms)
-            seen = [np.asarray(rows[:, : len(added)] @ added) for rows in shared.values()]
-            if touched.size:
-                seen.insert(0, self._gathered(added, touched).reshape(-1, r))
-            old = projection.rows
-            rows = np.hstack([old[:, :known], np.vstack(seen), old[:, known:]])
-            return replace(projection, rows=rows)
-        size = known + r + change.extra
-        kept, new = np.delete(np.arange(size), known + np.arange(r)), known + np.arange(r)
-        cores = np.zeros((len(change.terms), size, size))
-        cores[:, kept[:, None], kept] = projection.cores
-        found = self._next_to(change.terms, added, change.extra)
-        for core, (cross, own) in zip(cores, found, strict=True):
-            core[np.ix_(kept, new)], core[np.ix_(new, kept)] = cross, cross.T
-            core[np.ix_(new, new)] = own
-        return replace(projection, rows=np.eye(size), cores=cores)
-
-    def cross(self, terms: Sequence[Term], near: FloatArray) -> list[FloatArray]:
-        """Return each of some fixed matrices, times some vectors, in the basis, (N, m) each.
-
-        Arguments:
-            terms: that add no dofs.
-            near: combinations of the basis, (N, m).
-        """
-        found, seen = [], {}
-        for term in terms:
-            operator = term.operator
-            if isinstance(operator, ElementOperator):
-                found.append(self._pulled(operator, near))
-            elif isinstance(operator, RowOperator):
-                # Terms of one effect may share their rows.
-                if id(operator.rows) not in seen:
-                    seen[id(operator.rows)] = np.asarray(operator.rows @ self.vectors)
-                rows = seen[id(operator.rows)]
-                found.append(rows.T @ (operator.core @ (rows @ near)))
-            else:
-                found.append(self.vectors.T @ operator.apply(self.vectors @ near))
-        return found
-
     def _gathered(self, vectors: FloatArray, elements: IntArray) -> FloatArray:
         """Return the displacements of some elements that can move, (k, n_active, N)."""
         assert self.structure is not None
@@ -214,22 +145,6 @@ class Projector:
         moved = np.asarray(gather @ vectors)
         return moved.reshape(len(elements), len(self.active), -1)
 
-    def _pulled(self, operator: ElementOperator, near: FloatArray) -> FloatArray:
-        """Return element matrices, times some vectors, in the basis, (N, m)."""
-        m = near.shape[1]
-        if len(operator.elements) < len(self.local) / _MANY:
-            moved = self.local[operator.elements]
-            pulls = (self._blocks(operator) @ (moved @ near)).reshape(-1, m)
-            return np.asarray(moved.reshape(len(pulls), -1).T @ pulls)
-        assert self.structure is not None
-        if self._near is None or self._near[0] is not near:
-            self._near = near, self.local @ near
-        ends = np.zeros((len(self.local), 12, m))
-        moved = self._near[1][operator.elements]
-        ends[operator.elements[:, None], self.active] = self._blocks(operator) @ moved
-        # Fewer dofs than ends of elements.
-        return np.asarray(self.vectors.T @ (self.structure.gather.T @ ends.reshape(-1, m)))
-
     def _cores(self, terms: Sequence[Term], grown: FloatArray) -> list[FloatArray]:
         """Return terms on all vectors, (N + extra, N + extra) each."""
         found = self._between(terms, self.local, [self.local]) if self.structure is not None else {}
@@ -238,26 +153,6 @@ class Projector:
             np.pad(found[i], (0, more)) if i in found else term.operator.project(grown)
             for i, term in enumerate(terms)
         ]
-
-    def _next_to(
-        self, terms: Sequence[Term], added: FloatArray, extra: int
-    ) -> list[tuple[FloatArray, FloatArray]]:
-        """Return terms between all vectors and further ones, and between these alone."""
-        r, n_known = added.shape[1], self.vectors.shape[1]
-        found: dict[int, FloatArray] = {}
-        if any(isinstance(term.operator, ElementOperator) for term in terms):
-            moved = self._gathered(added, np.arange(len(self.local)))
-            found = self._between(terms, moved, [self.local, moved])
-        grown = np.vstack([added, np.zeros((extra, r))])
-        result = []
-        for i, term in enumerate(terms):
-            if i in found:
-                cross = np.pad(found[i][:n_known], ((0, extra), (0, 0)))
-                result.append((cross, found[i][n_known:]))
-            else:
-                force = term.operator.apply(grown)
-                result.append((self._grown(extra).T @ force, grown.T @ force))
-        return result
 
     def _between(
         self, terms: Sequence[Term], right: FloatArray, left: Sequence[FloatArray]
