@@ -167,7 +167,7 @@ def _newton(
     row = np.where(family.columns < 0, n, family.columns)  # row n collects what is no unknown
     gradient = np.bincount(row.ravel(), -pull.ravel(), n + 1)[:n]
     total = hessian.times(x - best) + barrier * gradient
-    step = -hessian.solve(barrier * bend, total)
+    step = -hessian.solve(np.asarray(barrier * bend, dtype=float), total)
     return total, step, float(-total @ step)
 
 
