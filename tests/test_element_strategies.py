@@ -369,7 +369,8 @@ def test_bounded_factors_solve_the_convex_problem() -> None:
     # With diagonal A'A and scalar cores the answer is known: every factor on its own.
     family = ElementFamily.physical(one_member(False, "out-of-plane").frame_structure)
     best = np.linspace(-3.0, 0.5, len(family))
-    x = nearest_positive(family, np.diag(np.sqrt(np.linspace(1.0, 5.0, len(family)))), best)
+    rows = sp.diags_array(np.sqrt(np.linspace(1.0, 5.0, len(family))), format="csr")
+    x = nearest_positive(family, rows, best)
     assert x == pytest.approx(np.maximum(best, FLOOR - 1.0), abs=1e-4)
 
 
@@ -399,7 +400,7 @@ def test_bounded_cores_are_the_nearest_ones() -> Any:
     def distance(x: Any) -> Any:
         return (x - best) @ normal @ (x - best)
 
-    x = nearest_positive(family, half, best)
+    x = nearest_positive(family, sp.csr_array(half), best)
     assert smallest_core_eigenvalue(family, best) < 0.0
     assert smallest_core_eigenvalue(family, x) == pytest.approx(FLOOR, abs=1e-4)
     # Convexity: no feasible direction from the optimum may lead downhill.

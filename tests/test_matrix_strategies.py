@@ -35,7 +35,7 @@ from femubench.core.update.entries import (
 )
 from femubench.core.update.promise import check_used_modes, measure_residuals
 from femubench.core.update.quasi import QuasiModes
-from femubench.fem import Frame, JointSpring, Place, Support
+from femubench.fem import FloatArray, Frame, JointSpring, Place, Support
 from femubench.plugins.strategies import baruch
 from femubench.plugins.strategies.baruch import Baruch
 from femubench.plugins.strategies.berman import Berman
@@ -417,6 +417,23 @@ def test_kabe_turns_to_least_squares_where_singular_values_do_not_converge(
 
     monkeypatch.setattr(entry_update, "smallest_change", unsolved)
     assert abs(update(KabeRigid, cases["hframe"]).model.stiffness - wanted).max() == 0.0
+
+
+def test_kabe_gives_up_an_iteration_that_leads_nowhere(
+    frame_case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = []
+
+    def idle(_: entry_update.Equations, free: FloatArray) -> tuple[FloatArray, int]:
+        calls.append(free)
+        return np.zeros(len(free)), 0
+
+    monkeypatch.setattr(entry_update, "smallest_change", idle)
+    found = update(Kabe, frame_case).model.stiffness
+    assert len(calls) == 11
+    monkeypatch.setattr(entry_update, "_STALLED", np.inf)
+    assert abs(update(Kabe, frame_case).model.stiffness - found).max() == 0.0
+    assert len(calls) == 11 + 40
 
 
 def test_kabe_tells_on_which_step_least_squares_lose_a_mode(

@@ -33,9 +33,7 @@ def smallest_core_eigenvalue(family: Family, x: FloatArray) -> float:
     return float(np.linalg.eigvalsh(family.relative_cores(x)).min())
 
 
-def nearest_positive(
-    family: Family, rows: FloatArray | SparseArray, best: FloatArray
-) -> FloatArray:
+def nearest_positive(family: Family, rows: SparseArray, best: FloatArray) -> FloatArray:
     """Return the least-squares solution among cores with eigenvalues of at least `FLOOR`.
 
     The problem is convex; a logarithmic barrier with Newton steps from the nominal model solves
@@ -43,7 +41,7 @@ def nearest_positive(
 
     Arguments:
         family: elements with cores, linear in the unknowns.
-        rows: A of the equations, (m, n).
+        rows: A of the equations, sparse (m, n).
         best: the solution of least squares without bounds, (n,).
 
     Raises:
@@ -95,18 +93,17 @@ class Hessian:
     places: IntArray
 
     @classmethod
-    def of(cls, family: Family, rows: FloatArray | SparseArray) -> Hessian:
+    def of(cls, family: Family, rows: SparseArray) -> Hessian:
         """Find an order of the unknowns of a family with a narrow band."""
-        rows = sp.csr_array(rows)
-        rows = rows / np.sqrt(max(float(rows.power(2).sum(axis=0).max()), 1e-300))
+        rows = sp.csr_array(rows / np.sqrt(max(float(rows.power(2).sum(axis=0).max()), 1e-300)))
         n = rows.shape[1]
         wide = np.diff(rows.indptr) > n // 4
         wide &= wide.sum() <= n // 4
-        thin, elements = rows[~wide], np.arange(len(family.columns))
+        thin = rows[~wide]
         used = family.columns >= 0
         own = sp.csr_array(
             (np.ones(used.sum()), (np.nonzero(used)[0], family.columns[used])),
-            shape=(len(elements), n),
+            shape=(len(used), n),
         )
         normal = sp.coo_array(thin.T @ thin + _RIDGE * sp.eye_array(n))
         order = reverse_cuthill_mckee(sp.csr_array(abs(normal) + own.T @ own), symmetric_mode=True)
@@ -131,8 +128,7 @@ class Hessian:
 
         Source: Woodbury (1950) for the rows that see many unknowns.
         """
-        count = self.band.size
-        added = np.bincount(self.places.ravel(), bend.ravel(), count + 1)[:count]
+        added = np.bincount(self.places.ravel(), bend.ravel(), self.band.size + 1)[:-1]
         band = self.band + added.reshape(self.band.shape)
         factor = _definite(band), True
         turned = la.cho_solve_banded(factor, self.wide.T)
@@ -148,14 +144,13 @@ class Hessian:
 
 def _definite(band: FloatArray) -> FloatArray:
     """Return the Cholesky factor of a band, its diagonal raised until it has one."""
-    shift = 0.0
+    band, shift = band.copy(), np.finfo(float).eps * float(band[0].max())
     while True:
-        shifted = band.copy()
-        shifted[0] += shift
         try:
-            return np.asarray(la.cholesky_banded(shifted, lower=True))
+            return np.asarray(la.cholesky_banded(band, lower=True))
         except la.LinAlgError:
-            shift = max(10.0 * shift, np.finfo(float).eps * float(band[0].max()))
+            band[0] += shift
+            shift *= 10.0
 
 
 def _newton(
@@ -172,7 +167,7 @@ def _newton(
     row = np.where(family.columns < 0, n, family.columns)  # row n collects what is no unknown
     gradient = np.bincount(row.ravel(), -pull.ravel(), n + 1)[:n]
     total = hessian.times(x - best) + barrier * gradient
-    step = -hessian.solve(barrier * bend, total)
+    step = -hessian.solve(np.asarray(barrier * bend, dtype=float), total)
     return total, step, float(-total @ step)
 
 

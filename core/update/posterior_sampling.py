@@ -367,8 +367,7 @@ def autocorrelation_time(chain: FloatArray) -> float:
 
     Source: Sokal (1997), Monte Carlo methods in statistical mechanics, section 3, for the window.
     """
-    steps, times = len(chain), []
-    padded = next_fast_len(2 * steps, real=True)
+    steps, padded, times = len(chain), next_fast_len(2 * len(chain), real=True), []
     for series in np.moveaxis(chain, 2, 0):
         apart = series - series.mean(axis=0)
         power = np.square(np.abs(rfft(apart, padded, axis=0)))
