@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as la
+from scipy.special import gammainc, gammaln
 
 from femubench.core.errors import FemubenchError
 from femubench.core.fem.model import Model
@@ -217,13 +218,32 @@ class JointEvidence:
         total[len(self.known) :, len(self.known) :] += slopes @ slopes.T
         every = np.append(self.known, apart)
         modes = total[np.ix_(self.by_modes, self.by_modes)]
-        return _log_density(every, total) - _log_density(every[self.by_modes], modes)
+        misfit, volume = _whiten(every, total)
+        of_modes, volume_of_modes = _whiten(every[self.by_modes], modes)
+        further = len(every) - len(self.by_modes)
+        return log_scaled_density(misfit - of_modes, further) - volume + volume_of_modes
 
 
-def _log_density(values: FloatArray, covariance: FloatArray) -> float:
+def _whiten(values: FloatArray, covariance: FloatArray) -> tuple[float, float]:
+    """Return chi-square of values, and half of ln of their covariance's determinant."""
     factor = la.cholesky(covariance, lower=True)
     white = la.solve_triangular(factor, values, lower=True)
-    return -0.5 * float(white @ white) - float(np.log(factor.diagonal()).sum())
+    return float(white @ white), float(np.log(factor.diagonal()).sum())
+
+
+def log_scaled_density(misfit: float, count: int) -> float:
+    """Return ln of a normal density whose deviations may all be larger by one unknown factor.
+
+    Arguments:
+        misfit: chi-square by the stated deviations.
+        count: of the data.
+
+    Source: Gelman et al. (2013), Bayesian Data Analysis, 3.2: p(s) ~ 1 / s, here for s > 1, less
+    what all data of this count have in common. Where nothing meets the data, ratios of misfits
+    count and no longer their differences.
+    """
+    shape, half = 0.5 * count, max(0.5 * misfit, 1e-9)
+    return float(gammaln(shape) + np.log(gammainc(shape, half)) - shape * np.log(half))
 
 
 def weigh_by_antiresonances(seen: Examination, responses: FrequencyResponses | None) -> Examination:
