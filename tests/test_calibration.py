@@ -7,10 +7,11 @@ from typing import Any
 from stated_probabilities import statements
 
 from femubench.core.challenge.answer import Answer
+from femubench.core.schema.validation import read_plain
 
 
 def answer(verdict: str, *causes: dict[str, Any]) -> Answer:
-    return Answer.model_validate({"verdict": verdict, "causes": causes})
+    return read_plain(Answer, {"verdict": verdict, "causes": list(causes)})
 
 
 def test_names_and_places_are_stated_apart() -> None:

@@ -159,18 +159,22 @@ def test_oblique_direction_in_a_table(tmp_path: Path) -> None:
             read_case(folder)
 
 
-def test_coordinates_in_a_table_have_the_unit_of_the_case(tmp_path: Path) -> None:
+def test_coordinates_in_a_table_in_millimetres_are_seen_and_said(tmp_path: Path) -> None:
     folder = Path(shutil.copytree(CASES / "3d", tmp_path / "case"))
     table = folder / "sensors.csv"
     table.write_text(
         "label,x,y,z,direction\nknee_x,0,0,500,x\narm_y,200,150,550,y\ntip_turn,400,300,600,-rz\n"
     )
-    with pytest.raises(InputError, match=r'sensors\.csv:2: x.*with unit = "mm" all fit'):
-        read_case(folder)
+    expected = read_case(CASES / "3d").measurement.sensors.xyz
+    seen = read_case(folder)
+    np.testing.assert_allclose(seen.measurement.sensors.xyz, expected)
+    (note,) = (note for note in seen.notes if "sensors.csv" in note)
+    assert "coordinates were taken in mm" in note
     text = (folder / "case.toml").read_text()
     (folder / "case.toml").write_text(text.replace("[measurement]", '[measurement]\nunit = "mm"'))
-    found = read_case(folder).measurement.sensors
-    np.testing.assert_allclose(found.xyz, read_case(CASES / "3d").measurement.sensors.xyz)
+    stated = read_case(folder)
+    np.testing.assert_allclose(stated.measurement.sensors.xyz, expected)
+    assert not any("were taken" in note for note in stated.notes)
 
 
 def test_a_sensor_between_nodes_reads_a_linear_field_of_its_own_body() -> None:

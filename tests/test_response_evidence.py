@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from response_problems import simulate, simulated_case
+from scipy.integrate import quad
 
 from femubench import InputError, read_case
 from femubench.core.case.writing import write_case
@@ -18,6 +19,7 @@ from femubench.core.inference.examine import Examination, examine, pose_problem
 from femubench.core.inference.response_evidence import (
     JointEvidence,
     Witness,
+    log_scaled_density,
     weigh_by_antiresonances,
 )
 from femubench.core.modal.measurement import Measurement
@@ -58,12 +60,24 @@ def test_their_density_is_that_given_the_frequencies() -> None:
     (nothing,) = seen.posterior.explanations
     apart = witness.apart(witness.drawn)
     rest = apart - witness.rows.shares @ seen.nominal.raw[: len(test)]
-    assert joint.log_evidence(nothing) == pytest.approx(-0.5 * rest @ rest, rel=1e-9)
+    expected = log_scaled_density(float(rest @ rest), len(rest))
+    assert joint.log_evidence(nothing) == pytest.approx(expected, rel=1e-9)
     assert (witness.rows.shares.sum(axis=1) > 0.0).all()
     weighed = weigh_by_antiresonances(seen, test.responses)
     assert weighed.antiresonances == len(witness)
-    assert weighed.posterior.nothing.further == pytest.approx(-0.5 * rest @ rest)
+    assert weighed.posterior.nothing.further == pytest.approx(expected)
     assert weigh_by_antiresonances(seen, None) is seen
+
+
+def test_stated_deviations_may_all_be_too_small() -> None:
+    """Against the integral over one factor s > 1 with p(s) ~ 1 / s."""
+    for misfit, count in ((0.0, 3), (5.0, 8), (300.0, 400), (4640.0, 12)):
+        half = 0.5 * misfit
+        density, _ = quad(
+            lambda u, h=half, k=count: 2.0 * np.exp(-h * u * u) * u ** (k - 1), 0.0, 1.0, epsabs=0.0
+        )
+        assert log_scaled_density(misfit, count) == pytest.approx(np.log(density), abs=1e-6)
+    assert np.isfinite(log_scaled_density(0.0, 900))
 
 
 def test_a_reference_has_responses_of_its_own(tmp_path: Path) -> None:

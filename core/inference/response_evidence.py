@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as la
-from scipy.special import gammainc, gammaln
+from scipy.special import gammainc, gammaln, hyp1f1
 
 from femubench.core.errors import FemubenchError
 from femubench.core.fem.model import Model
@@ -242,7 +242,9 @@ def log_scaled_density(misfit: float, count: int) -> float:
     what all data of this count have in common. Where nothing meets the data, ratios of misfits
     count and no longer their differences.
     """
-    shape, half = 0.5 * count, max(0.5 * misfit, 1e-9)
+    shape, half = 0.5 * count, 0.5 * misfit
+    if half < shape:  # the incomplete gamma function as a series: it may be too small to be written
+        return float(np.log(hyp1f1(1.0, shape + 1.0, half) / shape) - half)
     return float(gammaln(shape) + np.log(gammainc(shape, half)) - shape * np.log(half))
 
 

@@ -31,7 +31,7 @@ from femubench.plugins.readers.reading import DIRECTIONS, needs
 
 JOINT_SHARE = 0.02  # of the mass: a smaller set of elements is a weld, a bolt or glue
 _BETTER = {**solid_elements.BETTER, **shells.BETTER}
-_TIED = 1e4  # times what holds the nodes of a coupling as a body: how its reference node is
+_TIED = 100.0  # times what holds the nodes of a coupling as a body: how its reference node is
 _SAME = 1e-9  # of the largest entry: what rounding leaves of a factor
 _SOLVED = 10_000  # degrees of freedom up to which better elements are tried: four times as many
 
