@@ -3,7 +3,8 @@
 python benchmarks/truth_sweep.py run --jobs 2         # appends, goes on where it stopped
 python benchmarks/truth_sweep.py run --reference      # with the measurement before the defect
 python benchmarks/truth_sweep.py run --set opensees   # the second generator; shear: the third
-python benchmarks/truth_sweep.py tables               # of each run: [--reference] [--set SET]
+python benchmarks/truth_sweep.py run --drawing solid  # on another drawing, where there is one
+python benchmarks/truth_sweep.py tables               # of each run: [--reference] [--set SET] ...
 python benchmarks/truth_sweep.py ceiling              # what the data could name: [--set SET]
 """
 
@@ -36,6 +37,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # the truths are not install
 
 from blind_sweep import Record
 from ceiling import CLASSES, GROUPED, NAMEABLE, ceiling
+from drawn_truth import same_in_groups, truth_in_groups
 from stated_probabilities import (
     Statement,
     calibration_rows,
@@ -48,7 +50,7 @@ from stated_probabilities import (
 from sweep_data import DATA, PAGE, as_markdown, filled, write_rows
 from true_fit import CataloguedCause, fits_of, fits_worse, is_search_fault
 
-from femubench import read_case
+from femubench import Model, read_case
 from femubench.core.challenge.answer import Answer, AnswerCause
 from femubench.core.challenge.outcome import (
     OUTCOMES,
@@ -125,6 +127,7 @@ class Task:
         reference: whether it brings the healthy structure's measurement.
         seconds: of processor time that it may take.
         ideal: whether it is asked what its data could name, and not diagnosed.
+        drawing: whose model is diagnosed; that of `case.toml` where empty.
     """
 
     folder: Path
@@ -132,6 +135,7 @@ class Task:
     reference: bool
     seconds: float
     ideal: bool = False
+    drawing: str = ""
 
     @property
     def key(self) -> tuple[str, str]:
@@ -159,7 +163,7 @@ def diagnosed(task: Task, key: tuple[str, str]) -> Record:
         try:
             with warnings.catch_warnings(record=True) as caught, limited(task.seconds):
                 warnings.simplefilter("default")
-                case = read_case(target)
+                case = read_case(target / f"{task.drawing}.toml" if task.drawing else target)
                 if task.ideal:
                     for cells in ceiling(case, truth, load_plugins().effects):
                         record |= cells
@@ -177,12 +181,29 @@ def diagnosed(task: Task, key: tuple[str, str]) -> Record:
             record["error"] = f"{type(error).__name__}: {error}"
     record["seconds"] = round(time.process_time() - begin, 2)
     if diagnosis is not None:
+        same, truth = words_of(task.suite, truth, task.drawing)
         with suppress(TooLong), limited(task.seconds), threadpool_limits(1):
-            record |= _fits(diagnosis, truth)
+            record |= _fits(diagnosis, truth, same)
     return record
 
 
-def _fits(diagnosis: Diagnosis, truth: KnownCase) -> Record:
+@cache
+def _same_in(suite: Path, structure: str, drawing: str) -> tuple[Same, Model | None]:
+    """Return what compares places in a drawing of a structure, and that drawing in groups."""
+    model = read_case(suite / structure).model
+    if drawing:
+        drawn = read_case(suite / structure / f"{drawing}.toml").model
+        return same_in_groups(drawn, model), drawn
+    return same_place(model.structure.frame if model.structure is not None else None), None
+
+
+def words_of(suite: Path, truth: KnownCase, drawing: str) -> tuple[Same, KnownCase]:
+    """Return what compares places in a drawing, and a truth in the words of that drawing."""
+    same, drawn = _same_in(suite, truth.structure, drawing)
+    return same, truth if drawn is None else truth_in_groups(truth, drawn)
+
+
+def _fits(diagnosis: Diagnosis, truth: KnownCase, same: Same) -> Record:
     """Return how the true causes fit next to what was found; nothing where there are none."""
     if diagnosis.examination is None or truth.kind not in ("defect", "pair"):
         return {}
@@ -194,8 +215,6 @@ def _fits(diagnosis: Diagnosis, truth: KnownCase) -> Record:
         ]
         for cause in truth.causes
     ]
-    structure = diagnosis.examination.model.structure
-    same = same_place(None if structure is None else structure.frame)
     return fits_of(diagnosis.examination, causes, load_plugins().effects, same)
 
 
@@ -287,19 +306,16 @@ class Scored:
     ceiling: str = ""
 
 
-def scored(records: Mapping[str, Record], truths: Iterable[KnownCase], suite: Path) -> list[Scored]:
+def scored(
+    records: Mapping[str, Record], truths: Iterable[KnownCase], suite: Path, drawing: str = ""
+) -> list[Scored]:
     """Return what was said of every truth that has a record."""
-
-    @cache
-    def same(structure: str) -> Same:
-        model = read_case(suite / structure).model
-        return same_place(model.structure.frame if model.structure is not None else None)
 
     found = []
     for truth in truths:
         if truth.name in records:
             record = records[truth.name]
-            places = same(truth.structure)
+            places, truth = words_of(suite, truth, drawing)
             said = outcome(truth, record, places)
             sure = (record.get("probability") or 0.0) >= SURE
             worse = fits_worse(record)
@@ -548,6 +564,7 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--seconds", type=float, default=120.0, help="processor time a case")
     found.add_argument("--results", type=Path, help=f"{RESULTS.relative_to(ROOT)} by default")
     found.add_argument("--set", choices=tuple(SETS), default="solids", help="of truths")
+    found.add_argument("--drawing", default="", help="in groups; that of case.toml by default")
     found.add_argument("--suite", type=Path, help="where the structures are; that of the set")
     found.add_argument("--truths", type=Path, nargs="*", help="folders of truths; the set's")
     found.add_argument("--page", type=Path, default=PAGE)
@@ -568,13 +585,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
         known.error(f"no case {sorted(unknown)[0]!r} in {', '.join(map(str, options.truths))}")
     if options.names:
         folders = [folder for folder in folders if folder.name in options.names]
+    if options.drawing:
+        drawn = {p.parent.name for p in options.suite.glob(f"*/{options.drawing}.toml")}
+        folders = [f for f in folders if read_truth(f).structure in drawn]
     if options.reference:
         folders = [folder for folder in folders if (folder / HEALTHY).is_file()]
-    run_of = ("" if options.set == "solids" else f"-{options.set}") + (
-        "-ceiling" if ideal else "-reference" if options.reference else ""
+    drawing = options.drawing and f"-{options.drawing}"
+    run_of = (
+        ("" if options.set == "solids" else f"-{options.set}")
+        + drawing
+        + ("-ceiling" if ideal else "-reference" if options.reference else "")
     )
     results = options.results or RESULTS.with_stem(RESULTS.stem + run_of)
-    tasks = [Task(f, options.suite, options.reference, options.seconds, ideal) for f in folders]
+    on = options.suite, options.reference, options.seconds, ideal, options.drawing
+    tasks = [Task(folder, *on) for folder in folders]
     table = options.data / CEILING
     if options.what != "tables":
         run(results, tasks, options.jobs)
@@ -586,14 +610,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     keys = dict(task.key for task in tasks)
     records = read_records(results)
     records = {n: r for n, r in records.items() if n in keys and is_of(r, (n, keys[n]))}
-    cases = scored(records, truths, options.suite)
-    if options.reference and table.is_file():
+    cases = scored(records, truths, options.suite, options.drawing)
+    if (options.reference or drawing) and table.is_file():
         rows = pd.read_csv(table, dtype=str, keep_default_na=False).query("run == @options.set")
         classes = dict(zip(rows["name"], rows["class"], strict=True))
         cases = [replace(c, ceiling=classes.get(c.truth.name, "")) for c in cases]
     if not cases:
         known.error(f"no results in {results}: run the sweep first")
-    name = options.set + ("-reference" if options.reference else "")
+    name = options.set + drawing + ("-reference" if options.reference else "")
     for what, rows in tables(cases, truths).items():
         write_rows(options.data / f"sweep-{what}.csv", name, rows)
     fill(options.page, strict_table(cases), MARK + run_of)

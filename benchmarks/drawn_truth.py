@@ -1,0 +1,78 @@
+"""What a truth in the words of beams is in a drawing of the structure in groups of matrices."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from femubench import Model
+from femubench.core.challenge.outcome import Same, same_place
+from femubench.core.challenge.truth_file import KnownCase, TrueCause
+from femubench.core.effect.model_places import ModelPlaces
+from femubench.core.effect.places import split_direction
+from femubench.core.fem.group_factors import GROUP
+from femubench.core.fem.mesh import place_xyz
+
+JOINT = "joint-"  # how groups of joints begin
+STIFFNESS, MASS = "member-stiffness", "group-mass"
+# Effects of a member -> what scales in its group.
+OF_MEMBER = {
+    "local-stiffness-loss": (STIFFNESS,),
+    "member-stiffness": (STIFFNESS, MASS),
+    "wall-thickness": (STIFFNESS, MASS),
+    "member-mass": (MASS,),
+}
+AT_JOINT = ("joint-rotation", "joint-flexibility", "support-flexibility")
+
+
+def truth_in_groups(truth: KnownCase, model: Model) -> KnownCase:
+    """Return a truth whose causes also count as found in the groups of a drawing.
+
+    A loose joint or a soft foot is the joint's group, or where it has none the member that ends
+    there; a material or a wall scales stiffness and mass of the member's group.
+
+    Arguments:
+        truth: in the words of the beams.
+        model: the drawing.
+    """
+    groups = {*model.groups, *model.mass_groups}
+    return replace(truth, causes=tuple(_in_groups(cause, groups) for cause in truth.causes))
+
+
+def _in_groups(cause: TrueCause, groups: set[str]) -> TrueCause:
+    joint = cause.place.removeprefix("support:").rpartition("@")[2]
+    member = next((g for g in groups if g == cause.place.partition("/")[0]), None)
+    found: list[str] = []
+    if cause.effect in AT_JOINT:
+        zones = {g for g in groups if g == JOINT + joint or g.startswith(f"{JOINT}{joint}-")}
+        found = [f"{STIFFNESS}@{GROUP}{zone}" for zone in sorted(zones)]
+    elif member is not None:
+        found = [f"{name}@{GROUP}{member}" for name in OF_MEMBER.get(cause.effect, ())]
+    return replace(cause, also=(*cause.also, *found))
+
+
+def same_in_groups(model: Model, beams: Model) -> Same:
+    """Return what tells whether two words stand for one place of a drawing, or of its beams.
+
+    A node of the drawing is the nearest point of the beams.
+
+    Arguments:
+        model: the drawing.
+        beams: the first drawing of the structure.
+    """
+    frame, places = beams.frame_structure.frame, ModelPlaces(model).nodes
+    same, words = same_place(frame), ModelPlaces(beams).points()
+    points = np.array([place_xyz(frame, ModelPlaces(beams).point(word)) for word in words])
+
+    def on_beams(place: str) -> str:
+        head, direction = split_direction(place)
+        if head not in places:
+            return place
+        near = np.linalg.norm(points - places[head], axis=1)
+        return words[int(near.argmin())] + (f":{direction}" if direction else "")
+
+    def is_same(first: str, second: str) -> bool:
+        return first == second or same(on_beams(first), on_beams(second))
+
+    return is_same
