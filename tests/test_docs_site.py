@@ -79,3 +79,12 @@ def test_every_dependency_has_its_line() -> None:
     rows = re.findall(r"^\| ([\w.\[\], -]+?) \|", text, flags=re.MULTILINE)
     described = [name for row in rows for name in row.split(", ") if name != "package"]
     assert sorted(described) == sorted(_asked_for())
+
+
+def test_the_page_of_scenarios_links_to_every_case() -> None:
+    """Of these links the site is made: a page without one fails its build."""
+    text = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8")
+    linked = {(ROOT / "docs" / link).resolve() for link in re.findall(r"\]\(([^)#]+\.md)\)", text)}
+    pages = {page.resolve() for page in (ROOT / "scenarios").rglob("README.md")}
+    assert len(pages) > 70
+    assert pages <= linked
