@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,14 +10,19 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
-from click.testing import CliRunner
-from test_chain import FLATS, SHEETS, write_deck, write_responses, write_shells
+from test_chain import (
+    FLATS,
+    SHEETS,
+    diagnose_files,
+    write_deck,
+    write_responses,
+    write_shells,
+)
 from test_shells import FLAT, angle, shell_deck
 from test_solid_decks import read, rows_of
 
 import femubench
 from femubench import InputError, Model, fem
-from femubench.core.cli.main import bench
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.fem import FloatArray, SparseArray
 from femubench.modal import GroupPriors
@@ -465,13 +469,4 @@ def test_a_soft_foot_is_found_by_shells_on_springs(
     moduli = {name: RUBBER * (soft if name == "FOOT2" else 1.0) for name in FEET}
     truth = write_deck(Path("truth.inp"), "C3D20R", 14.0, 1.0, SHEETS | FEET, moduli)
     write_responses(Path("test.uff"), truth, FLATS, first=0)
-    for words in (
-        ("identify", "test.uff", "--output", "identified"),
-        ("init", "case", "--model", "model.bdf", "--modes", "identified"),
-        ("diagnose", "case", "--json", "found.json"),
-    ):
-        done = CliRunner().invoke(bench, list(words))
-        assert done.exit_code == 0, done.output
-    found = json.loads(Path("found.json").read_text())
-    assert found["verdict"] == verdict
-    assert [cause["place"] for cause in found["causes"]] == places
+    assert diagnose_files("model.bdf", "test.uff") == (verdict, places)

@@ -182,6 +182,18 @@ def test_the_messages_lead_from_deck_and_responses_to_an_updated_deck(
         assert modulus == pytest.approx(0.2 * 210e3, rel=0.2)
 
 
+def diagnose_files(model: str, test: str) -> tuple[str, list[str]]:
+    """Return verdict and places that files alone lead to, by the commands that users type."""
+    for words in (
+        ("identify", test, "--output", "identified"),
+        ("init", "case", "--model", model, "--modes", "identified"),
+        ("diagnose", "case", "--json", "found.json"),
+    ):
+        call_bench(*words)
+    found = json.loads(Path("found.json").read_text())
+    return found["verdict"], [cause["place"] for cause in found["causes"]]
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize(
     ("rib", "verdict", "places"), [(1.0, "none", []), (0.5, "named", ["group:RIB"])]
@@ -194,12 +206,4 @@ def test_a_soft_rib_is_found_by_a_model_of_shells(
     write_shells(Path("model.inp"))
     truth = write_deck(Path("truth.inp"), "C3D20R", 12.0, rib, SHEETS)
     write_responses(Path("test.uff"), truth, FLATS)
-    for words in (
-        ("identify", "test.uff", "--output", "identified"),
-        ("init", "case", "--model", "model.inp", "--modes", "identified"),
-        ("diagnose", "case", "--json", "found.json"),
-    ):
-        call_bench(*words)
-    found = json.loads(Path("found.json").read_text())
-    assert found["verdict"] == verdict
-    assert [cause["place"] for cause in found["causes"]] == places
+    assert diagnose_files("model.inp", "test.uff") == (verdict, places)

@@ -394,8 +394,9 @@ def _notes(
     if (count := examination.antiresonances) > 0:
         what = "antiresonance was" if count == 1 else "antiresonances were"
         notes.append(f"{count} {what} weighed next to the modes, by the responses that are given.")
-    drawn, found = (score_responses(case, model) for model in (case.model, proof.model))
-    if best.parts and drawn is not None and found is not None:
+    drawn = score_responses(case, case.model) if best.parts else None
+    found = None if drawn is None else score_responses(case, proof.model)
+    if drawn is not None and found is not None:
         notes.append(
             f"At held-out lines and sensors responses are off by {drawn.rms_db:.3g} dB as drawn, "
             f"by {found.rms_db:.3g} dB with the causes; noise is {found.floor_db:.2g} dB."
