@@ -1,6 +1,6 @@
 """The leaderboards that README and docs print: run, kept in docs/figures, put into the pages.
 
-python benchmarks/boards.py default      # README.md; minutes on two cores
+python benchmarks/boards.py default      # README.md, docs/scenarios.md; minutes on two cores
 python benchmarks/boards.py suite        # docs/scenarios.md, the predictive board: docs/scoring.md
 python benchmarks/boards.py after        # docs/scenarios.md, what decides on the rule
 python benchmarks/boards.py after --from suite.json    # its structures, of a run that has them
@@ -44,32 +44,36 @@ class Board:
 
     Arguments:
         page: where it stands, between marks of its name.
+        which: the structures, for what the README says of them.
         cases: words of `bench run`; the default set where there are none.
         nominal: the models that strategies start from.
         mark: where it stands in the page.
-        which: the structures, for what the README says of them.
     """
 
     page: str
+    which: str
     cases: tuple[str, ...] = ()
     nominal: StartModels = "both"
     mark: str = "leaderboard"
-    which: str = ""
 
 
 BOARDS = {
-    "default": Board("README.md"),
+    "default": Board(
+        "docs/scenarios.md",
+        mark="leaderboard-default",
+        which="cases of the default set ([the whole board](docs/scenarios.md#the-default-set))",
+    ),
     # What the rule was made with; those after it have the class "after the rule".
     "suite": Board(
         "docs/scenarios.md",
-        ("suite:before the rule",),
+        cases=("suite:before the rule",),
         nominal="textbook",
         which="structures of the suite that were there before the rule ([the board](docs/"
         'scenarios.md#all-strategies-on-all-structures), `bench run "suite:before the rule"`)',
     ),
     "after": Board(
         "docs/scenarios.md",
-        ("suite:after the rule",),
+        cases=("suite:after the rule",),
         nominal="textbook",
         mark="leaderboard-after",
         which="structures of other families that were made after the rule ([the board](docs/"
@@ -149,13 +153,15 @@ def main() -> None:
     run = slim(run, [case.name for case in read_cases(board.cases, load_plugins())])
     text = json.dumps(brief(run_to_json(run)), separators=(",", ":"))
     file_of(words.board).write_text(text.replace('{"case"', '\n{"case"') + "\n", encoding="utf-8")
-    if board.which:
-        put(f"{words.board}-finding", said_of(board.which, run), ROOT / "README.md")
+    put(f"{words.board}-finding", said_of(board.which, run), ROOT / "README.md")
+    if words.board == "default":  # the README has the first part of the table
+        ranking = board_text(run).partition("\n\n")[0]
+        put("leaderboard", f"```\n{ranking}\n```", ROOT / "README.md")
     if words.board == "suite":
         text = PredictiveReporter().render(run)
         put("predictive", f"```\n{text}\n```", ROOT / "docs" / "scoring.md")
     put(board.mark, f"```\n{board_text(run)}\n```", ROOT / board.page)
-    if board.which:
+    if words.board != "default":
         both = join(*(femubench.read_run(file_of(name)) for name in ("suite", "after")))
         put("both-finding", said_of("structures together", both), ROOT / board.page)
     print(f"{count_noun(len(run.results), 'job')} in {file_of(words.board)}")
