@@ -34,7 +34,8 @@ OWN = 0.25  # of its size, by which definitions of a truth differ (five, twenty,
 LEAST = 0.05  # % of frequency; smaller in truth and budget says nothing
 KINDS = {
     **dict.fromkeys(
-        ("support", "joint-stiffness", "joint stiffness", "springs to ground"), "joint"
+        ("support", "joint-stiffness", "joint stiffness", "arms of joints", "springs to ground"),
+        "joint",
     ),
     **dict.fromkeys(("joint-mass", "joint mass", "overlap of members", "added-mass"), "mass"),
     "rotary inertia of masses": "mass",

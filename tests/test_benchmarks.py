@@ -21,7 +21,6 @@ from tests.identify_score import NAMES, covered
 ROOT = Path(__file__).parents[1]
 # The least that a benchmark can be asked for; the seconds that it takes where they are many.
 SHORT = {
-    "ablation": ("frame --jobs 1", 60),
     "board_checks": ("--trials 20", 60),
     "boards": ("default --from docs/figures/board-default.json", 0),
     "budget_score": ("portal", 0),

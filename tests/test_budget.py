@@ -25,6 +25,7 @@ from femubench.core.diagnosis.budget import (
     halve_zones,
     list_entries,
     log_frequencies,
+    with_arms,
 )
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import MADE, Frame, Joint, JointKind, Material, Member
@@ -84,6 +85,8 @@ def real(drawn: Case) -> Budget:
 
 
 def test_a_soft_joint_is_found_with_its_sign_at_its_type(drawn: Case) -> None:
+    ends = [end for group in joint_groups(drawn.model.frame_structure.frame) for end in group.ends]
+    drawn = replace(drawn, model=with_arms(drawn.model, ends))
     model = halve_zones(drawn.model)
     entries, structure = list_entries(model), model.frame_structure
     x = np.array([-1.0 * (name == "branch ry") for entry in entries for name in entry.names])
@@ -104,16 +107,17 @@ def test_soft_joints_are_not_found_in_modes_that_do_not_bend_them() -> None:
     drawn = cases["suite/box-frame"]
     joints = Joints(drawn.model.frame_structure)
     (corner,) = joints.groups()
-    soft = {end: {"ry": 4e5, "rz": 4e5} for end in corner.ends}  # 27 EI/L
-    softer = joints.structure.rebuilt(joints.spring_ends(soft, dict.fromkeys(soft, 0.0)))
+    soft = {end: {"ry": 2e5, "rz": 2e5} for end in corner.ends}  # 14 EI/L, at the faces
+    faces = {end: joints.half_depth(end) for end in corner.ends}
+    softer = joints.structure.rebuilt(joints.spring_ends(soft, faces))
     found = budget_of(measured_as(drawn, Model.of(softer)), [])
     assert found is not None
     rows = [(mode.error_percent, mode.left_percent) for mode in found.modes]
     (used, _), (unused, left) = np.array(rows[:6]).T, np.array(rows[6:]).T
     # Tubes between joints that all turn have no moment there: a zone of one drawn element, a
-    # quarter of a tube, puts 2 % into them.
-    assert np.abs(used).min() > 7.0 > 0.3 > np.abs(unused).max()
-    assert np.abs(left).max() < 0.8
+    # quarter of a tube, puts 3.5 % into them.
+    assert np.abs(used).min() > 2.5 > 0.7 > np.abs(unused).max()
+    assert np.abs(left).max() < 1.2
 
 
 def test_one_heavy_joint_is_found_whole_and_nothing_else_takes_of_it() -> None:
@@ -131,12 +135,13 @@ def test_one_heavy_joint_is_found_whole_and_nothing_else_takes_of_it() -> None:
 
 def test_what_scales_show_of_a_base_plate_is_in_no_mode() -> None:
     case = cases["suite/mast-lumps"]
-    sound, mass = measured_as(case, case.model), case.model.total_mass
+    book = budget_of(case, [])
+    assert book is not None
+    sound, mass = measured_as(case, book.start), case.model.total_mass
     weighed = replace(sound.measurement, total_mass=(1.3 * mass, 0.005 * mass))
     found = budget_of(replace(sound, measurement=weighed), [])
     assert found is not None
-    # That of the overlap at the tee, which the measured model has as drawn, is 0.4.
-    assert max(abs(line.rms_percent) for line in found.lines) < 0.5
+    assert all(abs(line.rms_percent) < 0.05 for line in found.lines if line.source != "handbook")
 
 
 def test_lines_add_up_and_the_extended_model_gives_what_the_fit_does(real: Budget) -> None:

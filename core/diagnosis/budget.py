@@ -14,8 +14,10 @@ fitted together.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Literal, cast
@@ -40,16 +42,23 @@ from femubench.core.fem.frame import (
     GroundSpring,
     Place,
     PointMass,
+    RigidEnd,
     halves_of,
 )
 from femubench.core.fem.group_factors import Groups
-from femubench.core.fem.joints import half_depth, joint_groups, whole_members, without_overlaps
+from femubench.core.fem.joints import (
+    Joints,
+    half_depth,
+    joint_groups,
+    whole_members,
+    without_overlaps,
+)
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.slopes import Matrix
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.mesh_error import mesh_bias
-from femubench.core.fit.modal_fit import Problem, State, fit, state_at
+from femubench.core.fit.modal_fit import Problem, State, bounds_of, fit, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.projection import Projection
 from femubench.core.fit.residuals import Data
@@ -126,16 +135,33 @@ class Budget:
     Arguments:
         lines: by place and class, largest first.
         modes: those of the measurement.
-        extended: the drawing with the handbook, and with all that the data see.
-        state: of `extended`, on all measured modes; its parts are all that the drawing leaves open.
+        start: the drawing with the handbook.
+        entries: all that it leaves open.
+        state: on all measured modes; its parts are the entries at what the data see.
         covariance: of their coordinates, (k, k).
     """
 
     lines: tuple[BudgetLine, ...]
     modes: tuple[BudgetMode, ...]
-    extended: Model
+    start: Model
+    entries: tuple[Entry, ...]
     state: State
     covariance: FloatArray
+
+    @cached_property
+    def extended(self) -> Model:
+        """Return the drawing with the handbook, and with all that the data see."""
+        return self.model_at(self.state.x)
+
+    def model_at(self, x: FloatArray) -> Model:
+        """Return it with other coordinates of the entries, taken within their bounds, (k,)."""
+        return extend_model(self.start, self.entries, np.clip(x, *bounds_of(self.state.parts)))
+
+    @property
+    def loose(self) -> FloatArray:
+        """Return the covariance of the coordinates with what each of them idealises, (k, k)."""
+        ideal = np.square(settings.own_error_of_change * self.state.x)
+        return np.asarray(0.5 * (self.covariance + self.covariance.T) + np.diag(ideal))
 
     @property
     def hidden_percent(self) -> float:
@@ -156,7 +182,24 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
         NotApplicable: when a frequency has no standard deviation.
         ModelError: when the model has no modes.
     """
-    model, every = case.model, case.measurement
+    return budget_of_modes(case.model, case.measurement, case.used, effects)
+
+
+def budget_of_modes(
+    drawing: Model, every: Measurement, numbers: Sequence[int], effects: Iterable[Effect]
+) -> Budget | None:
+    """Return what a drawing lacks, as `budget_of`.
+
+    Arguments:
+        every: measured modes.
+        numbers: of those that are fitted.
+
+    Examples:
+        >>> found = diagnosis.budget_of_modes(model, measurement, [1, 2], diagnosis.list_effects())
+        >>> len(found.modes) == len(measurement)
+        True
+    """
+    model = drawing
     if model.structure is None and not model.groups:
         return None
     if model.structure is not None and model.structure.frame.supports:
@@ -168,15 +211,15 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
     out = start.problem.space.still(start.eigenvalues[start.partner])
     shaped = np.isfinite(every.shapes).any(axis=0)
     if shaped.any():
-        out |= ~shaped & ~np.isin(every.numbers, case.used)
+        out |= ~shaped & ~np.isin(every.numbers, numbers)
     every = every.select([n for n, without in zip(every.numbers, out, strict=True) if not without])
-    used = [number for number in case.used if number in every.numbers]
+    used = [number for number in numbers if number in every.numbers]
     if not used:
         return None
     if out.any():
         start = _as_it_is(model, every)
     drawn, model = np.log(np.abs(start.frequencies[start.partner])), halve_zones(model)
-    last = log_frequencies(start if model is case.model else _as_it_is(model, every))
+    last = log_frequencies(start if model is drawing else _as_it_is(model, every))
     lines = [_line("all", "mesh", last - drawn, np.zeros((len(every),) * 2), "handbook")]
 
     def take(place: str, name: str, better: Model, share: float) -> None:
@@ -194,6 +237,14 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
         cut = without_overlaps(model.frame_structure, group)
         if cut is not model.frame_structure:
             take(group.type, "overlap of members", Model.of(cut), settings.own_error_of_change)
+    joints = defaultdict[str, list[str]](list)
+    if model.structure:
+        for (place, role), ends in _ends_of_joints(model.structure.frame).items():
+            joints[place] += ends if role != "foot" else ()
+    for place, ends in joints.items():
+        better = with_arms(model, ends)
+        if better is not model:
+            take(place, "arms of joints", better, settings.own_error_of_change)
     entries = list_entries(model)
     hypotheses = [entry.hypothesis for entry in entries]
     problem, parts = _pose(model, every.select(used), hypotheses, every)
@@ -213,11 +264,10 @@ def budget_of(case: Case, effects: Iterable[Effect]) -> Budget | None:
     lines += fresh
     measured = np.log(every.frequencies)
     figures = 100.0 * np.column_stack([measured - drawn, measured - found, deviation])
-    numbers = zip(every.numbers, figures.tolist(), strict=True)
-    modes = tuple(BudgetMode(number, number in case.used, *row) for number, row in numbers)
-    extended = extend_model(model, entries, x)
+    rows = zip(every.numbers, figures.tolist(), strict=True)
+    modes = tuple(BudgetMode(number, number in used, *row) for number, row in rows)
     lines.sort(key=lambda line: -abs(line.rms_percent))
-    return Budget(tuple(lines), modes, extended, state, covariance)
+    return Budget(tuple(lines), modes, model, tuple(entries), state, covariance)
 
 
 def _fit_with_tails(
@@ -339,6 +389,37 @@ def halve_zones(model: Model) -> Model:
     return halved if halved.size <= settings.most_dofs else model
 
 
+def with_arms(model: Model, ends: Iterable[str]) -> Model:
+    """Return a frame with members rigid up to the faces of what they meet, and soft behind.
+
+    Under a constant moment a zone turns as drawn, so that what no data see stays as drawn; but what
+    gives does so at a face, where moments are others than at the crossing of centre lines.
+    """
+    structure = model.frame_structure
+    frame, joints, named = structure.frame, Joints(structure), _labels(structure)
+    rigid = {f"{one.member}@{one.joint}": one for one in frame.rigid_ends}
+    soft = defaultdict[float, dict[str, None]](dict)
+    for end in ends:
+        member, _, joint = end.rpartition("@")
+        there = rigid.get(end, RigidEnd(joint, member, 0.0))  # its overlap may be out
+        arm = min(joints.half_depth(end), joints.available_length(end))
+        if arm > 0.0 == there.stiffness_length:
+            rows, _ = _zone(structure, end)
+            share = round(1.0 - arm / float(structure.properties.length[rows].sum()), 6)
+            rigid[end] = replace(there, stiffness_length=arm)
+            soft[share] |= dict.fromkeys(named[row] for row in rows.tolist())
+    if not soft:
+        return model
+    factors = (Factor(_WHOLES[0], tuple(labels), share) for share, labels in soft.items())
+    changed = replace(frame, rigid_ends=tuple(rigid.values()), factors=(*frame.factors, *factors))
+    return Model.of(structure.rebuilt(changed))
+
+
+def _labels(structure: Structure) -> dict[int, str]:
+    """Return by element what the factors of a frame call it."""
+    return {row: at for at, own in structure.place_index.items() for row in own.tolist()}
+
+
 def list_entries(model: Model) -> list[Entry]:
     """Return all that a drawing leaves open: joint zones, E, masses, springs; or groups."""
     if model.structure is None:
@@ -350,7 +431,7 @@ def list_entries(model: Model) -> list[Entry]:
     found, (unknown, passing, correlation, _) = [], settings.budget_joints
     widths = dict(zip(MADE, settings.budget_made, strict=True))
     made = {kind.type: widths[kind.made] for kind in frame.joint_kinds}
-    named = {row: at for at, own in structure.place_index.items() for row in own.tolist()}
+    named = _labels(structure)
     for (place, role), ends in _ends_of_joints(frame).items():
         rows = np.unique(np.concatenate([_zone(structure, end)[0] for end in ends]))
         labels = tuple(named[row] for row in rows.tolist())

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from femubench import ParameterEstimate
 from femubench.fem import FloatArray
 from femubench.papers.hframe.meshes import frequencies
 from femubench.papers.hframe.physical import (
@@ -32,15 +33,13 @@ class ModelComparison:
     Arguments:
         what: from a short name to what the model is, from as built to the best physical one.
         errors: from the same names to errors in percent on modes 1 to 6 and 8, (7,).
-        probability: of the cause that was diagnosed.
-        causes: its effects.
+        softer: change of the stiffness of the horizontal at its joints that was diagnosed.
         physical: the model with shear and two fitted numbers.
     """
 
     what: Mapping[str, str]
     errors: Mapping[str, FloatArray]
-    probability: float
-    causes: tuple[str, ...]
+    softer: ParameterEstimate
     physical: TimoshenkoFit
 
 
@@ -53,13 +52,12 @@ def compare(bench: Workbench) -> ModelComparison:
         words = row.converged or row.updated.words
         found[row.letter] = f"{row.title}: {words}", run(bench, words).model
     found["d, EI free"] = f"as the text of (d) has it: {FREE_EI}", run(bench, FREE_EI).model
-    found["diagnosed"] = f"the most probable cause: {DIAGNOSED}", diagnosed.model
+    found["diagnosed"] = f"what the drawing lacks: {DIAGNOSED}", diagnosed.model
     found[PHYSICAL] = "Timoshenko, k_theta at the column's face and E fitted", physical.model
     return ModelComparison(
         what={name: what for name, (what, _) in found.items()},
         errors={name: shape_paired_errors(case, model) for name, (_, model) in found.items()},
-        probability=diagnosed.diagnostics["probability"],
-        causes=tuple(dict.fromkeys(p.name.split()[0] for p in diagnosed.parameters)),
+        softer=next(item for item in diagnosed.parameters if "branch" in item.name),
         physical=physical,
     )
 

@@ -70,7 +70,7 @@ def _held_out(comparison: ModelComparison) -> str:
 
 def _best(comparison: ModelComparison) -> str:
     best, errors = comparison.physical, comparison.errors[PHYSICAL]
-    named = comparison.errors["diagnosed"]
+    named, softer = comparison.errors["diagnosed"], comparison.softer
     rms = float(np.sqrt(np.mean(errors[:USED] ** 2)))
     return (
         "What the model lacks, as far as seven frequencies tell, is joint rotation and shear: with "
@@ -79,8 +79,8 @@ def _best(comparison: ModelComparison) -> str:
         f"leave {rms:.2f} % rms on the five modes and {errors[-2]:+.2f}, {errors[-1]:+.2f} % on "
         "the two held out. The factor stands for E, EI / rho A and the shear coefficient together; "
         "as a modulus of steel it would be too high. The strategy diagnosed, given the five, finds "
-        f"{', '.join(comparison.causes)} (probability {100.0 * comparison.probability:.0f} %) and "
-        "predicts "
+        f"the horizontal at its joints {-100.0 * softer.after:.0f} "
+        f"± {100.0 * (softer.std or 0.0):.0f} % softer and predicts "
         f"{named[-2]:+.2f}, {named[-1]:+.2f} %."
     )
 
