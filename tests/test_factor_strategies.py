@@ -42,6 +42,7 @@ from femubench.plugins.strategies.eigensensitivity import (
     tikhonov,
 )
 from femubench.plugins.strategies.multi_start import MultiStart
+from femubench.plugins.strategies.particle_swarm import ParticleSwarm
 from femubench.plugins.strategies.secant import Secant
 from femubench.plugins.strategies.sparse import Sparse, lasso
 from femubench.plugins.strategies.strain_energy import StrainEnergy, energy_change_index
@@ -117,6 +118,7 @@ def factors_of(strategy: Strategy, model: Model, measurement: Measurement) -> di
         (Eigensensitivity(), 1e-4),
         (MultiStart(starts=2, basis=100), 1e-4),
         (CmaEs(evaluations=1000, basis=60), 0.01),
+        (ParticleSwarm(largest=1.6), 0.02),
         (CrossModel(expansion="force"), 1e-5),
         (StrainEnergy(), 1e-4),
         (Sparse(), 0.02),
@@ -128,6 +130,40 @@ def test_a_planted_change_is_found_from_exact_modes(strategy: Strategy, within: 
     found = factors_of(strategy, model, measurement)
     assert found.pop("m-CD") == pytest.approx(FACTOR, abs=within)
     assert list(found.values()) == pytest.approx([1.0] * len(found), abs=within)
+
+
+def test_a_swarm_moves_as_its_equations_say_particle_by_particle() -> None:
+    """Clerc & Kennedy (2002), type 1", in their form of position and velocity, number by number."""
+    low, high, phi = np.array([-2.0, -1.0, 0.2]), np.array([1.0, 3.0, 4.0]), 4.1
+
+    def cost(x: np.ndarray) -> float:  # type: ignore[type-arg]
+        return float(np.square(x - [0.3, 2.9, 0.2]).sum() + np.sin(5.0 * x).sum())
+
+    swarm = ParticleSwarm(particles=5, evaluations=60)
+    found, least, history = swarm.search(cost, low, high, np.random.default_rng(4))
+    rng, chi = np.random.default_rng(4), 2.0 / abs(2.0 - phi - np.sqrt(phi**2 - 4.0 * phi))
+    assert round(chi, 4) == 0.7298
+    x = [list(low + (high - low) * row) for row in rng.random((5, 3))]
+    x[0] = [0.0, 0.0, 0.2]
+    v = [list(low + (high - low) * row - x[i]) for i, row in enumerate(rng.random((5, 3)))]
+    own = [(cost(np.array(row)), list(row)) for row in x]
+    for _ in range(11):
+        leader, drawn = min(own)[1], rng.random((2, 5, 3))
+        for i, d in np.ndindex(5, 3):
+            pull = drawn[0, i, d] * (own[i][1][d] - x[i][d]) + drawn[1, i, d] * (
+                leader[d] - x[i][d]
+            )
+            v[i][d] = chi * (v[i][d] + phi / 2.0 * pull)
+            x[i][d] += v[i][d]
+            if not low[d] <= x[i][d] <= high[d]:
+                x[i][d], v[i][d] = min(max(x[i][d], low[d]), high[d]), 0.0
+        own = [
+            min(best, (cost(np.array(row)), list(row))) for best, row in zip(own, x, strict=True)
+        ]
+    assert (len(history), least) == (11, pytest.approx(min(own)[0], rel=1e-9))
+    assert found == pytest.approx(min(own)[1], rel=1e-6)
+    with pytest.raises(InputError, match="2 at least"):
+        ParticleSwarm(particles=1)
 
 
 def test_no_equation_asks_for_what_the_expanded_shapes_cannot_have() -> None:
