@@ -35,7 +35,7 @@ BUDGETS = {
     "core/inference": 3_865,
     "core/library": 2_828,
     "core/look": 1_143,
-    "core/modal": 4_150,
+    "core/modal": 4_151,
     "core/plot": 2_871,
     "core/plugin": 1_919,
     "core/publish": 1_479,

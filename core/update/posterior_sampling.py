@@ -344,12 +344,10 @@ class _Ensemble:
             x = self._turned(at)
             return target.log_prior(x) + likelihood(x)
 
-        self.target = target
-        self.sampler: Any = emcee.EnsembleSampler(
-            walkers, size, density, vectorize=True, moves=StretchMove()
-        )
-        state = np.random.RandomState(int(rng.integers(2**32))).get_state()
-        self.sampler.random_state = state
+        own = {"vectorize": True, "moves": StretchMove()}
+        self.target, self.sampler = target, emcee.EnsembleSampler(walkers, size, density, **own)
+        seed = int(rng.integers(2**32))
+        self.sampler.random_state = np.random.RandomState(seed).get_state()
         self.sampler.run_mcmc(near, _BLOCK)
 
     @staticmethod
@@ -362,7 +360,7 @@ class _Ensemble:
 
     @property
     def steps(self) -> float:
-        """Return how many there were."""
+        """Return how many every walker made."""
         return float(self.sampler.iteration)
 
     @property
@@ -399,16 +397,15 @@ class _Transitional:
     """Samples that go from the prior to the posterior."""
 
     def __init__(self, target: Target, fit: QuadraticFit, rng: np.random.Generator) -> None:
-        prior = np.column_stack(
-            [self.first(target, rng, _DRAWN), rng.standard_normal(_DRAWN)],
-        )
-        self.found = sample_transitional(prior, target.log_prior, target.log_likelihood(fit), rng)
-        self.draws, self.steps = self.found.samples, float(self.found.stages)
-        self.constant = -0.5 * len(fit.error) * float(np.log(2.0 * np.pi))
+        prior = np.column_stack([self.first(target, rng, _DRAWN), rng.standard_normal(_DRAWN)])
+        found = sample_transitional(prior, target.log_prior, target.log_likelihood(fit), rng)
+        evidence = found.log_evidence - 0.5 * len(fit.error) * float(np.log(2.0 * np.pi))
+        self.draws, self.steps = found.samples, float(found.stages)
+        self.figures = {"log_evidence": evidence, "accepted": found.accepted}
 
     @staticmethod
     def first(target: Target, rng: np.random.Generator, count: int) -> FloatArray:
-        """Return draws of the prior, (count, p), within the bounds.
+        """Return draws of the prior within the bounds, (count, p).
 
         Raises:
             NotApplicable: when a parameter has no prior.
@@ -417,22 +414,21 @@ class _Transitional:
         for name, precision in zip(parametric.names, parametric.precision, strict=True):
             if not precision > 0.0:
                 raise NotApplicable(f"{name} has no prior, from which the samples start")
-        std = parametric.precision**-0.5
-        drawn = rng.standard_normal((count, len(std))) * std
+        drawn = np.full((count, len(parametric)), np.nan)
         while (outside := ~target.inside(drawn)).any():
-            drawn[outside] = rng.standard_normal((int(outside.sum()), len(std))) * std
+            more = rng.standard_normal((int(outside.sum()), len(parametric)))
+            drawn[outside] = more * parametric.precision**-0.5
         return drawn
 
     def settle(self) -> tuple[FloatArray, dict[str, float]]:
         """Return draws of q and v, (n, p + 1), with the evidence."""
-        return self.draws, {
-            "steps": self.steps,
-            "log_evidence": self.found.log_evidence + self.constant,
-            "accepted": self.found.accepted,
-        }
+        return self.draws, {"steps": self.steps, **self.figures}
 
 
-_SAMPLERS = {"ensemble": _Ensemble, "transitional": _Transitional}
+_SAMPLERS: dict[str, type[_Ensemble | _Transitional]] = {
+    "ensemble": _Ensemble,
+    "transitional": _Transitional,
+}
 
 
 def autocorrelation_time(chain: FloatArray) -> float:

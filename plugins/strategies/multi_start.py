@@ -58,11 +58,9 @@ class MultiStart(ParametricStrategy):
         from scipy.stats.qmc import LatinHypercube
 
         parts = self.parameterise(model)
+        weight, scaled = self.shape_weight, self.scaled
         of = partial(
-            *(ModalSpace.of, parts, measurement),
-            shape_weight=self.shape_weight,
-            scaled=self.scaled,
-            size=self.basis,
+            ModalSpace.of, parts, measurement, shape_weight=weight, scaled=scaled, size=self.basis
         )
         space = of()
         low, high = space.bounds(float(np.log(self.largest)))
