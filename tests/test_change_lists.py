@@ -33,7 +33,7 @@ WORDS = (
 )
 FAMILY = (
     *("global", "local", "spring", "offset", "bayesian", "bayesian-sampling", "sparse"),
-    *("eigensensitivity", "cma-es", "multi-start", "strain-energy", "cross-model"),
+    *("eigensensitivity", "cma-es", "multi-start", "strain-energy", "cross-model", "particle-swarm"),
 )
 
 

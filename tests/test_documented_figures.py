@@ -62,7 +62,11 @@ def only(pattern: str, *pages: str) -> tuple[str, ...]:
 
 def test_the_leaderboard(run: Run) -> None:
     plugins = load_plugins()
-    unasked = [name for name, s in plugins.strategies.items() if "responses" not in s.needs]
+    unasked = [
+        name
+        for name, s in plugins.strategies.items()
+        if not (s.on_request or "responses" in s.needs)
+    ]
     assert run.meta["strategies"] == unasked
     assert list(run.meta["cases"]) == [case.name for case in read_cases((), plugins)]
     assert_board_is_that_of(run, "docs/scenarios.md", "leaderboard-default")

@@ -30,6 +30,7 @@ from femubench.fem import (
     Section,
     Structure,
     Support,
+    matrix_model,
 )
 from femubench.modal import mac, rigid_modes_of
 from femubench.plugins.strategies.bayesian import Bayesian
@@ -41,7 +42,9 @@ from femubench.plugins.strategies.eigensensitivity import (
     l_curve_curvature,
     tikhonov,
 )
+from femubench.plugins.strategies.eigenvector_difference import EigenvectorDifference
 from femubench.plugins.strategies.multi_start import MultiStart
+from femubench.plugins.strategies.particle_swarm import ParticleSwarm
 from femubench.plugins.strategies.secant import Secant
 from femubench.plugins.strategies.sparse import Sparse, lasso
 from femubench.plugins.strategies.strain_energy import StrainEnergy, energy_change_index
@@ -117,7 +120,9 @@ def factors_of(strategy: Strategy, model: Model, measurement: Measurement) -> di
         (Eigensensitivity(), 1e-4),
         (MultiStart(starts=2, basis=100), 1e-4),
         (CmaEs(evaluations=1000, basis=60), 0.01),
+        (ParticleSwarm(largest=1.6), 0.02),
         (CrossModel(expansion="force"), 1e-5),
+        (EigenvectorDifference(starts=2, basis=100), 1e-4),
         (StrainEnergy(), 1e-4),
         (Sparse(), 0.02),
     ],
@@ -128,6 +133,40 @@ def test_a_planted_change_is_found_from_exact_modes(strategy: Strategy, within: 
     found = factors_of(strategy, model, measurement)
     assert found.pop("m-CD") == pytest.approx(FACTOR, abs=within)
     assert list(found.values()) == pytest.approx([1.0] * len(found), abs=within)
+
+
+def test_a_swarm_moves_as_its_equations_say_particle_by_particle() -> None:
+    """Clerc & Kennedy (2002), type 1", in their form of position and velocity, number by number."""
+    low, high, phi = np.array([-2.0, -1.0, 0.2]), np.array([1.0, 3.0, 4.0]), 4.1
+
+    def cost(x: np.ndarray) -> float:  # type: ignore[type-arg]
+        return float(np.square(x - [0.3, 2.9, 0.2]).sum() + np.sin(5.0 * x).sum())
+
+    swarm = ParticleSwarm(particles=5, evaluations=60)
+    found, least, history = swarm.search(cost, low, high, np.random.default_rng(4))
+    rng, chi = np.random.default_rng(4), 2.0 / abs(2.0 - phi - np.sqrt(phi**2 - 4.0 * phi))
+    assert round(chi, 4) == 0.7298
+    x = [list(low + (high - low) * row) for row in rng.random((5, 3))]
+    x[0] = [0.0, 0.0, 0.2]
+    v = [list(low + (high - low) * row - x[i]) for i, row in enumerate(rng.random((5, 3)))]
+    own = [(cost(np.array(row)), list(row)) for row in x]
+    for _ in range(11):
+        leader, drawn = min(own)[1], rng.random((2, 5, 3))
+        for i, d in np.ndindex(5, 3):
+            pull = drawn[0, i, d] * (own[i][1][d] - x[i][d]) + drawn[1, i, d] * (
+                leader[d] - x[i][d]
+            )
+            v[i][d] = chi * (v[i][d] + phi / 2.0 * pull)
+            x[i][d] += v[i][d]
+            if not low[d] <= x[i][d] <= high[d]:
+                x[i][d], v[i][d] = min(max(x[i][d], low[d]), high[d]), 0.0
+        own = [
+            min(best, (cost(np.array(row)), list(row))) for best, row in zip(own, x, strict=True)
+        ]
+    assert (len(history), least) == (11, pytest.approx(min(own)[0], rel=1e-9))
+    assert found == pytest.approx(min(own)[1], rel=1e-6)
+    with pytest.raises(InputError, match="2 at least"):
+        ParticleSwarm(particles=1)
 
 
 def test_no_equation_asks_for_what_the_expanded_shapes_cannot_have() -> None:
@@ -225,7 +264,8 @@ def test_slopes_are_those_of_differences_and_few_shapes_give_the_same_frequencie
     log, step = 0.2 * np.sin(np.arange(len(parts))), 1e-5
     whole = ModalSpace.of(parts, measurement, shape_weight=0.1)
     few = ModalSpace.of(parts, measurement, shape_weight=0.1, size=40)
-    for space in (whole, few):
+    largest = ModalSpace.of(parts, measurement, shape_weight=0.1, scaled="largest")
+    for space in (whole, few, largest):
         ahead, behind = (
             [space.fit(log + sign * step * unit).residual for unit in np.eye(len(parts))]
             for sign in (1.0, -1.0)
@@ -241,7 +281,41 @@ def test_slopes_are_those_of_differences_and_few_shapes_give_the_same_frequencie
     assert fit.residual[:3] == pytest.approx(
         1.0 - modes.natural_frequencies[:3] / measurement.frequencies, abs=1e-9
     )
+    shapes = largest.fit(log).residual[3:].reshape(3, -1)
+    at = np.abs(measurement.shapes).argmax(axis=0)
+    assert shapes[[0, 1, 2], at] == pytest.approx(np.zeros(3), abs=1e-12)
     assert few.fit(log).residual[:3] == pytest.approx(fit.residual[:3], abs=2e-3)
+
+
+# A shear frame of eighteen storeys: stiffness in 100 kN/m, weights in kN, relative changes.
+STOREYS = np.array(
+    [1155, 1092, 1073, 1028, 1028, 990, 963, 938, 876, 840, 824, 788, 712, 660, 619, 562, 491, 363]
+)
+WEIGHTS = np.repeat([208.0, 206.0, 202.0], [11, 6, 1])
+CHANGES = np.array([5, 5, -5, -10, 10, -15, 15, 25, -10, 20, 30, 25, -15, 5, -15, 10, 20, 20])  # %
+
+
+def test_the_published_changes_of_eighteen_storeys_are_found_by_eigenvectors() -> None:
+    """Of SMU's example (Wang, Dong & Li): four modes at seven floors, all digits that it prints."""
+    groups = {}
+    for k, size in enumerate(1e5 * STOREYS):
+        edge = np.zeros((1, 18))
+        edge[0, max(k - 1, 0) : k + 1] = [-1.0, 1.0] if k else [1.0]
+        groups[f"storey-{k + 1}"] = sp.csc_array(size * edge.T @ edge)
+    stiffness = sum(groups.values(), start=sp.csc_array((18, 18)))
+    mass = sp.diags_array(WEIGHTS * 1e3 / 9.8, format="csc")
+    nodes, heights = [f"n{k + 1}" for k in range(18)], np.arange(18.0)
+    xyz = np.column_stack([np.zeros((18, 2)), heights])
+    plain = matrix_model(mass, stiffness, nodes, ("x",) * 18, xyz=xyz)
+    model = replace(plain, groups=groups)
+    truth = Changes(model).parameterise("groups").at(np.log1p(CHANGES / 100.0))
+    floors = [0, 3, 6, 8, 11, 14, 17]
+    seen = Sensors(tuple(nodes[k] for k in floors), xyz[floors], ("x",) * 7)
+    measurement = modes_at(truth, seen, 4, shape_std=0.01)
+    strategy = EigenvectorDifference(starts=0, shape_weight=1.0)
+    result = strategy.update(model, measurement, np.random.default_rng(0))
+    found = [100.0 * (p.after - 1.0) for p in result.parameters]
+    assert found == pytest.approx(CHANGES, abs=0.5)
 
 
 def test_a_model_that_loses_a_mode_fits_no_better_than_before() -> None:

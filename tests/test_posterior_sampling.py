@@ -9,6 +9,7 @@ from typing import Any
 import harness_toys as toys
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from femubench import Measurement, StrategyFailure, UpdateResult
 from femubench.core.fit.discrepancy import Discrepancy
@@ -16,7 +17,9 @@ from femubench.core.typing import FloatArray
 from femubench.core.update import posterior_sampling
 from femubench.core.update.posterior_sampling import StretchMove
 from femubench.core.update.quadratic_fit import QuadraticFit, coefficients_of
+from femubench.core.update.transitional import sample_transitional
 from femubench.plugins.strategies.sampling import BayesianSampling
+from femubench.plugins.strategies.transitional import TransitionalMcmc
 
 CASE = toys.tiny_case()
 
@@ -52,9 +55,13 @@ def settled() -> UpdateResult:
 
 @pytest.mark.slow(5)
 def test_the_posterior_is_that_of_exact_solutions(settled: UpdateResult) -> None:
-    """Weighed draws of a wider distribution, every one solved, give the same mean and spread."""
+    """Weighed draws of a wider distribution, every one solved, give the same mean and spread.
+
+    And the same evidence, which the samples from the prior have.
+    """
     measurement, discrepancy = CASE.used_measurement(), Discrepancy(0.02, 0.01)
-    strategy = BayesianSampling(discrepancy_median=0.02, discrepancy_spread=0.01)
+    strategy = TransitionalMcmc(discrepancy_median=0.02, discrepancy_spread=0.01)
+    led = strategy.update(CASE.model, measurement, np.random.default_rng(1))
     _, changes = strategy.pose(CASE.model, measurement)
     target = posterior_sampling.most_probable(
         CASE.model, changes, measurement, discrepancy, strategy.options
@@ -64,17 +71,64 @@ def test_the_posterior_is_that_of_exact_solutions(settled: UpdateResult) -> None
     points, values = target.predict(target.at(z))
     assert len(points) == len(z)
     log, _, _ = target.data
-    misfit = np.square((log - values) / target.std(np.zeros(1))).sum(axis=1)
-    posterior = -0.5 * (misfit + np.square(points) @ target.iteration.parametric.precision)
-    weight = np.exp(posterior + 0.5 * np.square(z / 1.8).sum(axis=1))
+    variance = np.square(target.std(np.zeros(1)))
+    misfit = (np.square(log - values) / variance + np.log(2.0 * np.pi * variance)).sum(axis=1)
+    precision = target.iteration.parametric.precision
+    prior = np.square(points) @ precision - np.log(precision / (2.0 * np.pi)).sum()
+    wide = 1.8 * target.root
+    drawn = np.square(z / 1.8).sum(axis=1) + np.linalg.slogdet(2.0 * np.pi * wide @ wide.T)[1]
+    weight = np.exp(-0.5 * (misfit + prior - drawn))
+    assert led.diagnostics["log_evidence"] == pytest.approx(np.log(weight.mean()), abs=0.2)
     weight /= weight.sum()
     assert 1.0 / np.square(weight).sum() > 100.0
     mean = weight @ points
     std = np.sqrt(weight @ np.square(points - mean))
-    for k, parameter in enumerate(settled.parameters):
-        assert parameter.std is not None
-        assert abs(np.log(parameter.after) - mean[k]) < 0.3 * std[k]
-        assert parameter.std / parameter.after == pytest.approx(std[k], rel=0.25)
+    for found in (settled, led):
+        for k, parameter in enumerate(found.parameters):
+            assert parameter.std is not None
+            assert abs(np.log(parameter.after) - mean[k]) < 0.3 * std[k]
+            assert parameter.std / parameter.after == pytest.approx(std[k], rel=0.25)
+
+
+def gaussian(x: FloatArray) -> FloatArray:
+    return np.asarray(-0.5 * np.square(x).sum(axis=1))
+
+
+def test_samples_from_the_prior_have_the_exact_posterior_and_evidence_of_linear_data() -> None:
+    rng = np.random.default_rng(2)
+    a, y, sigma = rng.standard_normal((5, 6)), 2.0 * rng.standard_normal(5), 0.1
+    covariance = np.linalg.inv(np.eye(6) + a.T @ a / sigma**2)
+    mean, std = covariance @ a.T @ y / sigma**2, np.sqrt(np.diagonal(covariance))
+    exact = multivariate_normal(np.zeros(5), a @ a.T + sigma**2 * np.eye(5)).logpdf(y)
+
+    def likelihood(x: FloatArray) -> FloatArray:
+        return gaussian((y - x @ a.T) / sigma) - len(y) * np.log(sigma * np.sqrt(2.0 * np.pi))
+
+    found = sample_transitional(rng.standard_normal((2000, 6)), gaussian, likelihood, rng)
+    assert found.log_evidence == pytest.approx(exact, abs=0.4)
+    assert (np.abs(found.samples.mean(axis=0) - mean) < 0.15 * std).all()
+    assert found.samples.std(axis=0) == pytest.approx(std, rel=0.1)
+    assert 0.15 < found.accepted < 0.4
+
+
+def test_samples_from_the_prior_find_both_of_two_explanations_and_weigh_them() -> None:
+    """x^2 + x / 4 was measured: one of two answers is more probable by a known ratio."""
+
+    def likelihood(x: FloatArray) -> FloatArray:
+        return gaussian((x**2 + 0.25 * x - 1.0) / 0.02)
+
+    grid = np.linspace(-4.0, 4.0, 400_001)
+    density = np.exp(likelihood(grid[:, None]) + gaussian(grid[:, None])) / np.sqrt(2.0 * np.pi)
+    rng = np.random.default_rng(0)
+    found = sample_transitional(rng.standard_normal((2000, 1)), gaussian, likelihood, rng)
+    assert found.log_evidence == pytest.approx(np.log(density.sum() * 2e-5), abs=0.2)
+    above = float(density[grid > 0.0].sum() / density.sum())
+    assert 0.5 < above < 0.7
+    assert (found.samples > 0.0).mean() == pytest.approx(above, abs=0.08)
+    with pytest.raises(StrategyFailure, match="100 stages reach"):
+        sample_transitional(
+            rng.standard_normal((200, 1)), gaussian, lambda x: gaussian(1e100 * x), rng
+        )
 
 
 @pytest.mark.nightly

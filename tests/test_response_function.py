@@ -24,9 +24,10 @@ from femubench.core.score.responses import score_responses
 from femubench.core.update.response_residuals import ResponseTargets
 from femubench.core.update.sensitivity_update import Iteration
 from femubench.fem import Place, PointMass
+from femubench.plugins.strategies.bayesian_responses import BayesianResponses
 from femubench.plugins.strategies.response_function import ResponseFunction
 from femubench.reports.runs import TerminalReporter
-from femubench.update import Changes
+from femubench.update import Changes, UpdateOptions
 from tests.command import call_bench
 
 FACTORS = np.array([1.12, 0.9, 1.05])
@@ -162,7 +163,7 @@ def test_unasked_it_runs_only_where_a_case_has_responses(tmp_path: Path) -> None
     for name in ("with", "without"):
         plan = plan_run([tmp_path / name], (), plugins, {"nominal": "drawn"})
         ran[name] = [strategy.name for strategy in plan.strategies]
-    assert ran["with"] == list(plugins.strategies)
+    assert ran["with"] == [n for n, s in plugins.strategies.items() if not s.on_request]
     own = {"response-function", "antiresonances"}
     assert ran["without"] == [name for name in ran["with"] if name not in own]
 
@@ -210,3 +211,46 @@ def test_a_method_of_the_docs_passes_the_checks_and_is_ranked(
     assert after == pytest.approx(FACTORS, rel=0.04)
     levels = [found[name]["responses"]["rms_db"] for name in words]
     assert levels[0] < 0.3 * levels[1]
+
+
+def unknown_noise_off(draws: range) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+    """Return how far factors are off in their stated deviations, and these over those known."""
+    model, test = simulate(FACTORS)
+    responses, off, wider = test.responses, [], []
+    assert responses is not None
+    assert responses.deviations is not None
+    share = np.linspace(0.2, 5.0, responses.deviations.shape[1])[:, None]
+    claimed = replace(responses, deviations=responses.deviations * share)
+    for draw in draws:
+        noisy = test.with_noise(np.random.default_rng(draw))
+        assert noisy.responses is not None
+        values = replace(claimed, values=noisy.responses.values)
+        stated = []
+        for own in (values, noisy.responses):
+            found = BayesianResponses(changes="members").update(
+                model, replace(noisy, responses=own), RNG
+            )
+            stated.append(np.array([(p.after, p.std) for p in found.parameters], dtype=float).T)
+        off.append((stated[0][0] - FACTORS) / stated[0][1])
+        wider.append(stated[0][1] / stated[1][1])
+    return np.array(off), np.array(wider)
+
+
+@pytest.mark.slow(20)
+def test_noise_that_was_stated_wrongly_is_found_with_the_factors() -> None:
+    """A channel was said to be five times as noisy as another is: answers are as with the truth."""
+    off, wider = unknown_noise_off(range(10))
+    assert (np.abs(off) < 2.0).all(axis=1).sum() >= 8
+    assert wider == pytest.approx(np.ones_like(wider), rel=1e-3)
+    with pytest.raises(ValueError, match="needs responses=true"):
+        UpdateOptions(unknown_noise=True)
+
+
+@pytest.mark.nightly
+def test_deviations_of_unknown_noise_are_those_of_the_factors() -> None:
+    """Of exact ones 95 in 100 draws lie within two of a factor, and 87 or more within all three."""
+    off, _ = unknown_noise_off(range(100))
+    within = np.abs(off) < 2.0
+    assert (within.sum(axis=0) >= 91).all()
+    assert within.all(axis=1).sum() >= 80
+    assert np.sqrt(np.mean(np.square(off), axis=0)) == pytest.approx(np.ones(3), abs=0.15)

@@ -262,6 +262,7 @@ def plan_run(
     if not wanted:  # without responses, those that need them would be a line of refusals each
         missing = {"responses"} if all(case.split is None for case in read) else set()
         found = [s for s in found if not missing & set(list_declared(s, "needs"))]
+        found = [s for s in found if not getattr(s, "on_request", False)]
     plain = all(isinstance(item, (str, PathLike)) for item in words)
     request = Request(
         cases=case_words(map(str, words), plugins) if plain else tuple(c.name for c in read),

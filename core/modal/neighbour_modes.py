@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
-from femubench.core.modal.eigen import Modes
+from femubench.core.modal.eigen import Modes, count_evaluation
 from femubench.core.modal.sparse_eigen import ShiftedModel
 from femubench.core.typing import FloatArray
 
@@ -33,6 +33,7 @@ def follow_frequencies(sample: Model, modes: Modes) -> FloatArray:
     elastic = modes.eigenvalues[~modes.rigid & (modes.eigenvalues > 0.0)]
     if not len(elastic):
         raise ModelError("the updated model has no elastic mode")
+    count_evaluation()
     inertia = sample.mass_times(modes.shapes)
     basis = ShiftedModel(sample, -float(elastic[0])).solve(inertia)
     basis = basis / np.linalg.norm(basis, axis=0)

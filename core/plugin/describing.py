@@ -35,7 +35,7 @@ _WAYS = {
     ),
     "reporters": ("render_with", "render_bytes"),
 }
-_FLAGS = ("baseline", "cost_reference")
+_FLAGS = ("baseline", "cost_reference", "on_request")
 
 
 def describe_plugin(origin: Origin, _: Mapping[str, Any]) -> dict[str, Any]:

@@ -52,6 +52,7 @@ class StrategyDescription(Description):
     about: dict[str, str]
     baseline: bool = False
     cost_reference: bool = False
+    on_request: bool = False
 
 
 class ScenarioDescription(Description):

@@ -79,6 +79,8 @@ class ModalSpace:
         readings: of the shapes at the sensors, (n_sensors, r).
         shape_weight: of a shape error of 1 (MAC of 0) against a frequency error of 1 (100 %); 0 to
             leave shapes out.
+        scaled: the model's shapes by their share along the measured ones, `length`, or to agree
+            with them where these are `largest`.
     """
 
     measurement: Measurement
@@ -89,6 +91,7 @@ class ModalSpace:
     terms: FloatArray
     readings: FloatArray
     shape_weight: float
+    scaled: str = "length"
 
     @cached_property
     def spread(self) -> FloatArray:
@@ -175,15 +178,18 @@ class ModalSpace:
             if not shapes[i].any():
                 continue
             read = np.where(self._known[i], readings[:, j], 0.0)
-            # The measured shape less s times the model's.
-            square = max(float(read @ read), 1e-300)
-            scale = float(shapes[i] @ read) / square
+            # The measured shape less s times the model's: s = (a . shape) / (a . read).
+            along = read if self.scaled == "length" else self._largest[i]
+            square = float(along @ read)
+            square = np.copysign(max(abs(square), 1e-300), square)
+            scale = float(shapes[i] @ along) / square
             shape_rows[i] = shapes[i] - scale * read
             if slopes:
                 gap = eigenvalues[j] - eigenvalues
                 gap[np.abs(gap) <= _DEPENDENT * np.abs(eigenvalues[j])] = np.inf
                 turn = np.where(self._known[i][:, None], readings @ (gain / gap).T, 0.0)
-                scale_slope = ((shapes[i] - 2.0 * scale * read) @ turn) / square
+                moved = shapes[i] - 2.0 * scale * read if along is read else -scale * along
+                scale_slope = (moved @ turn) / square
                 shape_slope[i] = -scale * turn - np.outer(read, scale_slope)
         weight = self.shape_weight
         return ModalFit(
@@ -196,6 +202,12 @@ class ModalSpace:
     def _known(self) -> BoolArray:
         """Tell which components of measured shapes there are, (m, n_sensors)."""
         return np.isfinite(self.measurement.shapes).T
+
+    @cached_property
+    def _largest(self) -> FloatArray:
+        """Return 1 where a measured shape is largest, else 0, (m, n_sensors)."""
+        size = np.abs(self._unit_shapes)
+        return np.asarray(np.arange(size.shape[1]) == size.argmax(axis=1)[:, None], dtype=float)
 
     @cached_property
     def _unit_shapes(self) -> FloatArray:
@@ -280,6 +292,7 @@ class ModalSpace:
         measurement: Measurement,
         *,
         shape_weight: float,
+        scaled: str = "length",
         at: FloatArray | None = None,
         size: int | None = None,
     ) -> ModalSpace:
@@ -291,7 +304,7 @@ class ModalSpace:
         Arguments:
             parametric: the model and its changes, factors on stiffness and effects.
             measurement: the used modes.
-            shape_weight: as of `ModalSpace`.
+            shape_weight, scaled: as of `ModalSpace`.
             at: coordinates where the shapes are taken, (p,); None for the nominal model.
             size: number of shapes at most; None for all, of a large model a hundred.
 
@@ -331,7 +344,7 @@ class ModalSpace:
         for own, term, factor in zip(projected, terms, parametric.factors(x), strict=True):
             if x.any():
                 {"stiffness": nominal, "mass": mass}[term.matrix][:] -= factor * own
-        given = nominal, mass, inner, projected, observer @ basis, shape_weight
+        given = nominal, mass, inner, projected, observer @ basis, shape_weight, scaled
         space = cls(measurement, parametric, *given)
         if space.fit(x, slopes=False).paired == 0:
             raise StrategyFailure("no mode of the model looks like any measured mode")

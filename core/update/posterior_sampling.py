@@ -37,6 +37,7 @@ from femubench.core.update.sensitivity_update import (
     estimate_parameters,
 )
 from femubench.core.update.strategy import UpdateResult
+from femubench.core.update.transitional import sample_transitional
 from femubench.core.update.uncertainty import Uncertainty
 
 _MORE = 8  # modes above the highest one that was measured, which samples may mix with it
@@ -48,6 +49,7 @@ _USELESS = 5.0  # of it: with such polynomials a chain knows less than the norma
 _SAMPLES = 40
 _WALKERS, _FEWEST_WALKERS = 4, 96  # for each unknown, and in all: few take no less time
 _BLOCK, _LONGEST = 500, 8000  # steps
+_DRAWN = 2000  # samples of the transitional sampler
 _LONG_ENOUGH = 25.0  # autocorrelation times
 _WINDOW = 5.0  # of them, over which an autocorrelation is summed
 _BURN_IN = 3.0  # autocorrelation times
@@ -145,20 +147,25 @@ class Target:
         solved = np.linalg.solve(covariance, apart[..., None])[..., 0]
         return np.asarray((apart * solved).sum(axis=1) + np.linalg.slogdet(covariance)[1])
 
-    def log_density(self, fit: QuadraticFit) -> Callable[[FloatArray], FloatArray]:
-        """Return a function from z and v, (n, p + 1), to ln of the density, (n,)."""
+    def log_prior(self, x: FloatArray) -> FloatArray:
+        """Return ln of the prior density at q and v, (n, p + 1), but for a constant, (n,)."""
+        q, v = x[:, :-1], x[:, -1]
+        size = np.square(q) @ self.iteration.parametric.precision + np.square(v)
+        return np.where(self.inside(q), -0.5 * size, -np.inf)
+
+    def log_likelihood(self, fit: QuadraticFit) -> Callable[[FloatArray], FloatArray]:
+        """Return a function from q and v, (n, p + 1), to ln of the likelihood, (n,).
+
+        It lacks what depends on the number of data alone.
+        """
         log, std, own = self.data
         known = np.square(std) + np.square(fit.error)
-        precision = self.iteration.parametric.precision
 
-        def density(at: FloatArray) -> FloatArray:
-            q, v = self.at(at[:, :-1]), at[:, -1]
-            variance = known + np.square(self.discrepancy.std(v))[:, None] * own
-            misfit = self._misfit(log - fit(q), variance)
-            prior = np.square(q) @ precision + np.square(v)
-            return np.where(self.inside(q), -0.5 * (misfit + prior), -np.inf)
+        def likelihood(x: FloatArray) -> FloatArray:
+            variance = known + np.square(self.discrepancy.std(x[:, -1]))[:, None] * own
+            return -0.5 * self._misfit(log - fit(x[:, :-1]), variance)
 
-        return density
+        return likelihood
 
 
 class StretchMove:
@@ -205,6 +212,7 @@ def sample_posterior(
     *,
     discrepancy: tuple[float, float],
     options: UpdateOptions,
+    sampler: str = "ensemble",
 ) -> UpdateResult:
     """Return the model at the posterior mean, with samples of the posterior.
 
@@ -224,9 +232,12 @@ def sample_posterior(
         rng: decides on every draw.
         discrepancy: of its log-normal prior the median and the standard deviation of the logarithm.
         options: of the search for the most probable parameters; statistical weighting.
+        sampler: `ensemble` for chains from near these; `transitional` for samples from the prior,
+            which give the evidence too, by polynomials that are first fitted all over the prior.
 
     Raises:
-        NotApplicable: when a frequency has no standard deviation.
+        NotApplicable: when a frequency has no standard deviation, or, for `transitional`, a
+            parameter no prior.
         StrategyFailure: when no measured mode has a partner, too few points give a model, or the
             chain is too short for its autocorrelation though the polynomials are good.
 
@@ -244,36 +255,36 @@ def sample_posterior(
         40
     """
     target = most_probable(source, changes, measurement, Discrepancy(*discrepancy), options)
-    sampler, off, rough = _fitted(target, rng)
-    if sampler is None:
+    chain_of, off, rough = _fitted(_SAMPLERS[sampler], target, rng)
+    if chain_of is None:
         return _normal_result(target, off)
     try:
-        chain, found = _settled(sampler)
+        chain, found = chain_of.settle()
     except StrategyFailure:
         if not rough:
             raise
-        return _normal_result(target, off, float(sampler.iteration))
-    chain[:, :-1] = target.at(chain[:, :-1])
+        return _normal_result(target, off, chain_of.steps)
     drawn = chain[rng.choice(len(chain), _SAMPLES, replace=False), :-1]
     return _result(target, chain, drawn, {**found, "surrogate_error": off})
 
 
-def _fitted(target: Target, rng: np.random.Generator) -> tuple[Any, float, bool]:
+def _fitted(
+    kind: type[_Ensemble | _Transitional], target: Target, rng: np.random.Generator
+) -> tuple[Any, float, bool]:
     """Return a sampler after its first steps, the largest error of the polynomials, if too large.
 
     No sampler where the polynomials are useless.
     """
-    size = len(target.centre)
-    count = int(np.ceil(_POINTS * coefficients_of(size)))
-    points, values = target.predict(target.at(_WIDER * rng.standard_normal((count, size))))
+    count = int(np.ceil(_POINTS * coefficients_of(len(target.centre))))
+    points, values = target.predict(kind.first(target, rng, count))
     for _ in range(_ROUNDS):
         fit = QuadraticFit.of(points, values)
         if (fit.error > _USELESS * target.std(np.zeros(1))).any():
             return None, float(fit.error.max()), True
-        sampler = _started(target, fit, rng)
-        drawn = sampler.get_chain(discard=_BLOCK // 2, flat=True)
+        sampler = kind(target, fit, rng)
+        drawn = sampler.draws
         drawn = drawn[rng.choice(len(drawn), count, replace=False)]
-        more, exact = target.predict(target.at(drawn[:, :-1]))
+        more, exact = target.predict(drawn[:, :-1])
         off = np.sqrt(np.mean(np.square(fit(more) - exact), axis=0))
         rough = not (off <= _OFF * target.std(drawn[:, -1])).all()
         if not rough:
@@ -317,44 +328,107 @@ def most_probable(
     return Target(iteration, point, centre, root, kept, discrepancy)
 
 
-def _started(target: Target, fit: QuadraticFit, rng: np.random.Generator) -> Any:  # noqa: ANN401 - emcee's sampler, which has no types
-    """Return an `emcee.EnsembleSampler` of z and v after its first steps."""
-    import emcee
+class _Ensemble:
+    """Chains of emcee from near the most probable parameters, in coordinates z and v."""
 
-    size = len(target.centre) + 1
-    walkers = max(_WALKERS * size, _FEWEST_WALKERS)
-    near = rng.standard_normal((walkers, size))
-    while (outside := ~target.inside(target.at(near[:, :-1]))).any():
-        near[outside] /= 2.0
-    density = target.log_density(fit)
-    sampler = emcee.EnsembleSampler(walkers, size, density, vectorize=True, moves=StretchMove())
-    sampler.random_state = np.random.RandomState(int(rng.integers(2**32))).get_state()
-    sampler.run_mcmc(near, _BLOCK)
-    return sampler
+    def __init__(self, target: Target, fit: QuadraticFit, rng: np.random.Generator) -> None:
+        import emcee
+
+        size, likelihood = len(target.centre) + 1, target.log_likelihood(fit)
+        walkers = max(_WALKERS * size, _FEWEST_WALKERS)
+        near = rng.standard_normal((walkers, size))
+        while (outside := ~target.inside(target.at(near[:, :-1]))).any():
+            near[outside] /= 2.0
+
+        def density(at: FloatArray) -> FloatArray:
+            x = self._turned(at)
+            return target.log_prior(x) + likelihood(x)
+
+        own = {"vectorize": True, "moves": StretchMove()}
+        self.target, self.sampler = target, emcee.EnsembleSampler(walkers, size, density, **own)
+        seed = int(rng.integers(2**32))
+        self.sampler.random_state = np.random.RandomState(seed).get_state()
+        self.sampler.run_mcmc(near, _BLOCK)
+
+    @staticmethod
+    def first(target: Target, rng: np.random.Generator, count: int) -> FloatArray:
+        """Return where the model is solved first, (count, p)."""
+        return target.at(_WIDER * rng.standard_normal((count, len(target.centre))))
+
+    def _turned(self, chain: FloatArray) -> FloatArray:
+        return np.column_stack([self.target.at(chain[:, :-1]), chain[:, -1]])
+
+    @property
+    def steps(self) -> float:
+        """Return how many every walker made."""
+        return float(self.sampler.iteration)
+
+    @property
+    def draws(self) -> FloatArray:
+        """Return those of q and v after the first steps, (n, p + 1)."""
+        return self._turned(self.sampler.get_chain(discard=_BLOCK // 2, flat=True))
+
+    def settle(self) -> tuple[FloatArray, dict[str, float]]:
+        """Return draws of q and v, (n, p + 1), after so many steps as they need, and how many.
+
+        Raises:
+            StrategyFailure: when the longest chain is too short for its autocorrelation.
+        """
+        sampler = self.sampler
+        while True:
+            time = autocorrelation_time(sampler.get_chain())
+            if sampler.iteration >= _LONG_ENOUGH * time:
+                break
+            if sampler.iteration >= _LONGEST:
+                raise StrategyFailure(
+                    f"{sampler.iteration} steps are {sampler.iteration / time:.0f} autocorrelation "
+                    f"times, expected {_LONG_ENOUGH:g} at least"
+                )
+            sampler.run_mcmc(None, _BLOCK)
+        chain = sampler.get_chain(discard=int(np.ceil(_BURN_IN * time)), flat=True)
+        return self._turned(chain), {
+            "steps": self.steps,
+            "autocorrelation_time": time,
+            "effective_samples": len(chain) / time,
+        }
 
 
-def _settled(sampler: Any) -> tuple[FloatArray, dict[str, float]]:  # noqa: ANN401 - emcee's
-    """Return draws of z and v, (n, p + 1), after so many steps as they need, and how many.
+class _Transitional:
+    """Samples that go from the prior to the posterior."""
 
-    Raises:
-        StrategyFailure: when the longest chain is too short for its autocorrelation.
-    """
-    while True:
-        time = autocorrelation_time(sampler.get_chain())
-        if sampler.iteration >= _LONG_ENOUGH * time:
-            break
-        if sampler.iteration >= _LONGEST:
-            raise StrategyFailure(
-                f"{sampler.iteration} steps are {sampler.iteration / time:.0f} autocorrelation "
-                f"times, expected {_LONG_ENOUGH:g} at least"
-            )
-        sampler.run_mcmc(None, _BLOCK)
-    chain = sampler.get_chain(discard=int(np.ceil(_BURN_IN * time)), flat=True)
-    return chain, {
-        "steps": float(sampler.iteration),
-        "autocorrelation_time": time,
-        "effective_samples": len(chain) / time,
-    }
+    def __init__(self, target: Target, fit: QuadraticFit, rng: np.random.Generator) -> None:
+        prior = np.column_stack([self.first(target, rng, _DRAWN), rng.standard_normal(_DRAWN)])
+        found = sample_transitional(prior, target.log_prior, target.log_likelihood(fit), rng)
+        evidence = found.log_evidence - 0.5 * len(fit.error) * float(np.log(2.0 * np.pi))
+        self.draws, self.steps = found.samples, float(found.stages)
+        self.figures = {"log_evidence": evidence, "accepted": found.accepted}
+
+    @staticmethod
+    def first(target: Target, rng: np.random.Generator, count: int) -> FloatArray:
+        """Return draws of the prior within the bounds, (count, p).
+
+        Raises:
+            NotApplicable: when a parameter has no prior.
+        """
+        parametric = target.iteration.parametric
+        for name, precision in zip(parametric.names, parametric.precision, strict=True):
+            if not precision > 0.0:
+                raise NotApplicable(f"{name} has no prior, from which the samples start")
+        drawn = np.full((count, len(parametric)), np.nan)
+        while (outside := ~target.inside(drawn)).any():
+            more = rng.standard_normal((int(outside.sum()), len(parametric)))
+            drawn[outside] = more * parametric.precision**-0.5
+        return drawn
+
+    def settle(self) -> tuple[FloatArray, dict[str, float]]:
+        """Return draws of q and v, (n, p + 1), with the evidence."""
+        return self.draws, {"steps": self.steps, **self.figures}
+
+
+_SAMPLERS: dict[str, type[_Ensemble | _Transitional]] = {
+    "ensemble": _Ensemble,
+    "transitional": _Transitional,
+}
 
 
 def autocorrelation_time(chain: FloatArray) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -24,6 +24,8 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.receptances import PredictedResponses
 from femubench.core.typing import AnyArray, FloatArray, IntArray
 from femubench.core.update.residuals import Prediction, Targets
+
+_EXACT = 1e-3  # of stated deviations: no data are more exact
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,26 @@ class ResponseTargets:
     def norm(self) -> float:
         """Return the norm of the weighted data."""
         return float(np.linalg.norm(self.weight * np.nan_to_num(self.responses.receptances)))
+
+    def rescaled(self, answer: AnyArray) -> ResponseTargets:
+        """Return the data with deviations of every channel as wide as what a model leaves of it.
+
+        It is their most probable factor where nothing was known of it.
+
+        Arguments:
+            answer: receptances of the model, like the values.
+
+        Source: Beck & Katafygiotis (1998), the most probable variance of prediction errors.
+        """
+        known = self.weight > 0.0
+        apart = np.where(known, self.responses.receptances - answer, 0.0) * self.weight
+        count = np.maximum(2.0 * known.sum(axis=0), 1.0)
+        scale = np.sqrt(np.square(np.abs(apart)).sum(axis=0) / count)
+        responses = self.responses
+        assert responses.deviations is not None
+        wider = responses.deviations * np.where(known.any(axis=0), np.maximum(scale, _EXACT), 1.0)
+        measured = replace(self.measurement, responses=replace(responses, deviations=wider))
+        return ResponseTargets(measured)
 
     def predict(self, model: Model, previous: object, mass: float) -> ResponsePrediction:
         """Return the answer of a model, as `Targets` do; raises ModelError without modes."""

@@ -35,6 +35,7 @@ _NO_GAIN = 1e-6
 _PATIENCE = 3
 _HALVINGS = 8  # of a step that makes the cost grow
 _AWAY = 0.5  # prior deviations
+_NOISES, _SETTLED = 20, 1e-4  # estimates of unknown noise at most; q that moves by less
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,8 @@ class UpdateOptions:
             of their own wherever a resonance lies on a wrong one.
         antiresonances: fit those of the given frequency responses next to the frequencies, each
             by its deviation, from the same start.
+        unknown_noise: deviations of the responses hold but for a factor of each channel, which is
+            estimated with the parameters: it is what the model leaves.
         damping: beta, which stands for alpha / pct^2 of the paper, as a share of z_m'W z_m: of
             what s's is for a factor on the whole stiffness.
         max_iterations: steps at most.
@@ -67,6 +70,7 @@ class UpdateOptions:
     shapes: bool = False
     responses: bool = False
     antiresonances: bool = False
+    unknown_noise: bool = False
     damping: float = 1e-5
     max_iterations: int = 100
     tolerance: float = 1e-6
@@ -81,6 +85,8 @@ class UpdateOptions:
             raise ValueError("mode shapes as data need statistical weighting")
         if self.responses and self.antiresonances:
             raise ValueError("either responses or antiresonances are fitted, not both")
+        if self.unknown_noise and not self.responses:
+            raise ValueError("noise is unknown of responses: it needs responses=true")
 
 
 @dataclass(frozen=True)
@@ -352,6 +358,14 @@ def sensitivity_update(
         data = (ResponseTargets if options.responses else AntiresonanceTargets)(measurement)
     iteration = Iteration(parametric, data, options)
     point = iteration.run(start)
+    for _ in range(_NOISES * options.unknown_noise):
+        prediction, before = point.prediction, point.q
+        assert isinstance(prediction, ResponsePrediction)
+        rescaled = prediction.data.rescaled(prediction.answer.receptances)
+        iteration = Iteration(parametric, rescaled, options)
+        point = iteration.run(before)
+        if np.abs(point.q - before).max() < _SETTLED:
+            break
     std, uncertainty = iteration.estimate_deviations(point)
     return UpdateResult(
         model=point.prediction.model,

@@ -102,6 +102,7 @@ class Strategy(ABC):
         cost_reference: whether `bench plugins check` compares time and memory with its own.
         writable: options with which it changes parameters alone and no whole matrix, so that a
             solver's files can hold its model; empty where no option decides that.
+        on_request: whether it runs only where it is named.
     """
 
     name: ClassVar[str]
@@ -113,6 +114,7 @@ class Strategy(ABC):
     yardstick: ClassVar[str] = ""
     cost_reference: ClassVar[bool] = False
     writable: ClassVar[str] = ""
+    on_request: ClassVar[bool] = False
 
     @abstractmethod
     def update(

@@ -12,8 +12,8 @@ from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
-from femubench import Measurement, Model, UpdateResult
-from femubench.update import ModalSpace, ParametricStrategy
+from femubench.fem import FloatArray
+from femubench.plugins.strategies.global_search import Cost, Found, GlobalSearch
 
 
 class _Hidden(MetaPathFinder):
@@ -46,20 +46,12 @@ def _cma() -> Any:  # noqa: ANN401 - a module without types
 
 
 @dataclass(frozen=True)
-class CmaEs(ParametricStrategy):
-    """Search all factors within bounds for the least misfit of frequencies and MAC.
-
-    Unknowns are the logarithms of the factors, the cost the sum of squares of relative frequency
-    errors and weighted 1 - MAC. Nothing but costs is used, no derivative. Modes are those of a
-    reduced basis of the nominal model.
+class CmaEs(GlobalSearch):
+    """Search all factors by samples of a normal distribution that follows the better half.
 
     Arguments:
-        changes: as of `ParametricStrategy`.
-        evaluations: at most.
-        largest: bound of a factor; the least is its inverse.
+        changes, evaluations, largest, shape_weight, basis: as of `GlobalSearch`.
         spread: standard deviation of the first generation in ln(factor).
-        shape_weight: of a MAC of 0 against a frequency that is 100 % off; 0 for frequencies alone.
-        basis: shapes in the reduced basis.
 
     The author's are the method and every setting of its package but those above, which are ours.
     """
@@ -70,25 +62,12 @@ class CmaEs(ParametricStrategy):
         "strategies, Evolutionary Computation 9, 159-195; package `cma` (Hansen, Akimoto & Baudis)"
     )
 
-    evaluations: int = 1000
-    largest: float = 3.0
     spread: float = 0.2
-    shape_weight: float = 0.1
-    basis: int = 40
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
-        """Return the model with the best factors that were met.
-
-        Raises:
-            NotApplicable: when the model has no such parameters.
-            StrategyFailure: when no mode of the model looks like any measured mode.
-        """
-        cma = _cma()
-        parts = self.parameterise(model)
-        space = ModalSpace.of(parts, measurement, shape_weight=self.shape_weight, size=self.basis)
-        low, high = space.bounds(float(np.log(self.largest)))
+    def search(
+        self, cost: Cost, low: FloatArray, high: FloatArray, rng: np.random.Generator
+    ) -> Found:
+        """Return the best of all samples."""
         options = {
             "bounds": [low, high],
             "maxfevals": self.evaluations,
@@ -99,17 +78,11 @@ class CmaEs(ParametricStrategy):
             "verbose": -9,
             "verb_log": 0,
         }
-        search = cma.CMAEvolutionStrategy(np.clip(0.0, low, high), self.spread, options)
+        search = _cma().CMAEvolutionStrategy(np.clip(0.0, low, high), self.spread, options)
         history = []
         while not search.stop():
             points = search.ask()
-            costs = [space.fit(np.asarray(x), slopes=False).cost for x in points]
+            costs = [cost(np.asarray(x)) for x in points]
             search.tell(points, costs)
             history.append({"cost": float(min(costs)), "spread": float(search.sigma)})
-        log = np.asarray(search.result.xbest)
-        return self.result(
-            parts,
-            log,
-            history,
-            cost=float(search.result.fbest),
-        )
+        return np.asarray(search.result.xbest), float(search.result.fbest), history

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -37,6 +38,8 @@ class MultiStart(ParametricStrategy):
         "McKay, Beckman & Conover (1979), Technometrics 21, 239-245 (Latin hypercube)"
     )
 
+    scaled: ClassVar[str] = "length"  # of shapes, as of `ModalSpace`
+
     starts: int = 8
     largest: float = 3.0
     shape_weight: float = 0.1
@@ -55,8 +58,11 @@ class MultiStart(ParametricStrategy):
         from scipy.stats.qmc import LatinHypercube
 
         parts = self.parameterise(model)
-        weight = self.shape_weight
-        space = ModalSpace.of(parts, measurement, shape_weight=weight, size=self.basis)
+        weight, scaled = self.shape_weight, self.scaled
+        of = partial(
+            ModalSpace.of, parts, measurement, shape_weight=weight, scaled=scaled, size=self.basis
+        )
+        space = of()
         low, high = space.bounds(float(np.log(self.largest)))
         cube = LatinHypercube(len(parts), rng=rng).random(self.starts)
         starts = [
@@ -65,8 +71,7 @@ class MultiStart(ParametricStrategy):
         ]
         found = [space.fit_bounded(start, self.largest) for start in starts]
         best = min(found, key=lambda item: item[1])[0]
-        there = ModalSpace.of(parts, measurement, shape_weight=weight, at=best, size=self.basis)
-        log, cost = there.fit_bounded(best, self.largest)
+        log, cost = of(at=best).fit_bounded(best, self.largest)
         costs = np.array([item[1] for item in found])
         history = tuple({"cost": float(value)} for value in costs)
         near = float(np.mean(costs <= 1.1 * costs.min()))

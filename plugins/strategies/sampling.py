@@ -39,6 +39,8 @@ class BayesianSampling(Bayesian):
 
     settings: ClassVar[tuple[str, ...]] = tuple(s for s in Bayesian.settings if "shapes" not in s)
 
+    sampler: ClassVar[str] = "ensemble"
+
     discrepancy_median: float = 0.02
     discrepancy_spread: float = 0.69
 
@@ -61,4 +63,5 @@ class BayesianSampling(Bayesian):
             rng,
             discrepancy=(self.discrepancy_median, self.discrepancy_spread),
             options=self.options,
+            sampler=self.sampler,
         )
