@@ -46,7 +46,7 @@ BUDGETS = {
     "core/study": 621,
     "core/twin": 822,
     "core/update": 4_811,
-    "plugins": 13_253,
+    "plugins": 13_254,
     "reports": 4_163,
     "papers": 3_271,
     "scenarios": 750,

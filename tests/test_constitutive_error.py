@@ -11,6 +11,7 @@ from test_factor_strategies import FACTOR, frame_of_five, planted
 from femubench import InputError, NotApplicable
 from femubench.modal import rigid_modes_of
 from femubench.plugins.strategies.constitutive_error import ConstitutiveError
+from femubench.plugins.strategies.dynamic_residual import DynamicResidual
 from femubench.update import Changes
 
 FACTORS = np.array([1.12, 0.9, 1.05])
@@ -71,3 +72,7 @@ def test_noise_moves_the_factors_by_little_and_wrong_options_are_one_line() -> N
     bare.shapes[:] = np.nan
     with pytest.raises(NotApplicable):
         ConstitutiveError().update(model, bare, RNG)
+    exact.shape_std[:, 1] = np.nan
+    for strategy in (ConstitutiveError(), DynamicResidual()):
+        with pytest.raises(NotApplicable, match="no reading of mode 2 has a standard deviation"):
+            strategy.update(model, exact, RNG)

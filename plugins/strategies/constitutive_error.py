@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from scipy.optimize import minimize
 from scipy.sparse.linalg import splu
 
-from femubench import InputError, Measurement, Model, UpdateResult
+from femubench import InputError, Measurement, Model, NotApplicable, UpdateResult
 from femubench.fem import FloatArray
 from femubench.update import ParametricModel, ParametricStrategy, expand_measured_shapes
 
@@ -66,7 +66,7 @@ class ConstitutiveError(ParametricStrategy):
         """Return the model with the zones of largest error corrected.
 
         Raises:
-            NotApplicable: when the model has no such parameters, or a mode no shape.
+            NotApplicable: when the model has no such parameters, or a mode no shape or deviation.
         """
         parts = self.parameterise(model)
         whole = expand_measured_shapes(parts.start, measurement)
@@ -124,6 +124,9 @@ class ConstitutiveError(ParametricStrategy):
         for j, eigenvalue in enumerate(measurement.eigenvalues):
             reading, std = measurement.shapes[:, j], measurement.shape_std[:, j]
             known = np.isfinite(reading) & (std > 0.0)
+            if not known.any():
+                what = f"no reading of mode {measurement.numbers[j]} has a standard deviation"
+                raise NotApplicable(what)
             rows, reading, precision = observer[known], reading[known], std[known] ** -2.0
             precision *= 2.0 * weight * energy[j] / float(precision @ np.square(reading))
             seen, zero = rows.T @ sp.diags_array(precision), np.zeros(model.size)

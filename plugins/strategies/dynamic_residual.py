@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from scipy.optimize import lsq_linear
 from scipy.sparse.linalg import splu
 
-from femubench import InputError, Measurement, Model, StrategyFailure, UpdateResult
+from femubench import InputError, Measurement, Model, NotApplicable, StrategyFailure, UpdateResult
 from femubench.fem import FloatArray
 from femubench.update import ParametricModel, ParametricStrategy, expand_measured_shapes
 
@@ -127,6 +127,7 @@ class DynamicResidual(ParametricStrategy):
             weights: of the forces of every mode, (m,).
 
         Raises:
+            NotApplicable: when no reading of a mode has a standard deviation.
             StrategyFailure: when a measured frequency is one of the model's own.
         """
         model = parts.at(x)
@@ -134,6 +135,9 @@ class DynamicResidual(ParametricStrategy):
         observer, rows = model.observe(measurement.sensors), []
         for j, eigenvalue in enumerate(measurement.eigenvalues):
             known = np.isfinite(measurement.shapes[:, j]) & (measurement.shape_std[:, j] > 0.0)
+            if not known.any():
+                what = f"no reading of mode {measurement.numbers[j]} has a standard deviation"
+                raise NotApplicable(what)
             size = np.abs(measurement.shapes[known, j]).max()
             reading = measurement.shapes[known, j] / size
             std = measurement.shape_std[known, j] / size
