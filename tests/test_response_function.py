@@ -164,7 +164,7 @@ def test_unasked_it_runs_only_where_a_case_has_responses(tmp_path: Path) -> None
         plan = plan_run([tmp_path / name], (), plugins, {"nominal": "drawn"})
         ran[name] = [strategy.name for strategy in plan.strategies]
     assert ran["with"] == [n for n, s in plugins.strategies.items() if not s.on_request]
-    own = {"response-function", "antiresonances"}
+    own = {"response-function", "antiresonances", "bayesian-responses"}
     assert ran["without"] == [name for name in ran["with"] if name not in own]
 
 

@@ -44,7 +44,6 @@ class BayesianResponses(Bayesian):
     )
     needs: ClassVar[frozenset[str]] = Bayesian.needs | {"responses"}
     settings: ClassVar[tuple[str, ...]] = ("joint_std=0.25", "joint_std=1.0")
-    on_request: ClassVar[bool] = True  # until the kept runs of the boards have it
 
     options: UpdateOptions = field(
         default_factory=partial(

@@ -48,7 +48,6 @@ class ConstitutiveError(ParametricStrategy):
         "vibration tests, AIAA Journal 32, 1485-1491"
     )
     needs: ClassVar[frozenset[str]] = frozenset({"shapes", "parts"})
-    on_request: ClassVar[bool] = True  # until the kept runs of the boards have it
 
     confidence: float = 0.5
     localise: float = 0.8

@@ -32,5 +32,4 @@ class EigenvectorDifference(MultiStart):
         "comparison towards FE model updating, Proc. SPIE 10598; package SMU (Wang, Dong & Li)"
     )
     needs: ClassVar[frozenset[str]] = frozenset({"shapes", "parts"})
-    on_request: ClassVar[bool] = True  # until the kept runs of the boards have it
     scaled: ClassVar[str] = "largest"

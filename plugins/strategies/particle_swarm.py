@@ -42,8 +42,6 @@ class ParticleSwarm(GlobalSearch):
         "techniques, Springer"
     )
 
-    on_request: ClassVar[bool] = True  # until the kept runs of the boards have it
-
     particles: int = 20
 
     def __post_init__(self) -> None:

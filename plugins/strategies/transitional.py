@@ -35,5 +35,4 @@ class TransitionalMcmc(BayesianSampling):
         "updating, model class selection, and model averaging, J. Eng. Mech. 133, 816-832; "
         "Betz, Papaioannou & Straub (2016), J. Eng. Mech. 142, 04016016"
     )
-    on_request: ClassVar[bool] = True  # until the kept runs of the boards have it
     sampler: ClassVar[str] = "transitional"
