@@ -53,7 +53,7 @@ BUDGETS = {
     "femubench": 371,
     "tests": 48_709,
     "truths": 14_092,
-    "benchmarks": 7_773,
+    "benchmarks": 7_779,
 }
 ADVICE = (
     "shorten the room: take out what nothing calls, make one of what is there twice; where a "
