@@ -122,8 +122,9 @@ def test_an_unsure_region_or_the_whole_says_nothing(region: Region) -> None:
 
 
 def test_a_name_comes_with_sizes_and_their_deviations() -> None:
-    sizes = CauseParameter("mass", 0.3123, 0.0121, "kg"), CauseParameter(
-        "change of E", 0.42, 0.03, "", wording="change"
+    sizes = (
+        CauseParameter("mass", 0.3123, 0.0121, "kg"),
+        CauseParameter("change of E", 0.42, 0.03, "", wording="change"),
     )
     places = zip("ab", ("p", "all"), sizes, strict=True)
     causes = [Cause(name, at, (size,), 0.9, place_probability=0.8) for name, at, size in places]

@@ -14,7 +14,7 @@ from msgspec import Meta, Struct
 from femubench.core.errors import InputError
 from femubench.core.files import MIB, read_text
 from femubench.core.schema.bounds import Name, Percent, Text, Whole, read_rule_number
-from femubench.core.schema.results import BLOCKS, NOMINALS, Blocks, JobResult, Nominal, Run
+from femubench.core.schema.results import BLOCKS, NOMINALS, Blocks, JobResult, Nominal, RunData
 from femubench.core.schema.validation import read_plain
 
 LARGEST_RUN = 256 * MIB  # bytes of a file of `bench run --json`
@@ -244,7 +244,7 @@ def result_from_json(record: object, *, file: Path | str | None = None, key: str
     return read_plain(JobResult, record, file=file, key=key, hidden="blocks")
 
 
-def run_to_json(run: Run) -> dict[str, Any]:
+def run_to_json(run: RunData) -> dict[str, Any]:
     """Return a run in the JSON contract of ``bench run --json``.
 
     Examples:
@@ -261,7 +261,7 @@ def run_to_json(run: Run) -> dict[str, Any]:
     return {"meta": meta, "results": results, **({"companions": companions} if companions else {})}
 
 
-def run_from_json(data: object, *, file: Path | str | None = None) -> Run:
+def run_from_json(data: object, *, file: Path | str | None = None) -> RunData:
     """Return the run that `run_to_json` gave.
 
     Raises:
@@ -281,7 +281,7 @@ def run_from_json(data: object, *, file: Path | str | None = None) -> Run:
         for key in ("results", "companions")
     )
     check_extent(meta, results, file=file)
-    return Run(meta, results, companions)
+    return RunData(meta, results, companions)
 
 
 def meta_from_json(
@@ -306,7 +306,7 @@ def meta_from_json(
     return data
 
 
-def read_run(file: Path) -> Run:
+def read_run(file: Path) -> RunData:
     """Return the run in a file that ``bench run --json`` wrote, or somebody else.
 
     Raises:
