@@ -12,7 +12,6 @@ from femubench.core.schema.diagnosis import Cause, CauseParameter, Gain, Region
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
 
 _LACKS, _NOTHING = "The model lacks", "nothing that the model lacks"
-_MOST_SIZES = 3  # of a cause; more are for the table
 _DIFFERS, _WRONG = "What differs from the reference is", "What the model gets wrong is"
 
 
@@ -139,7 +138,7 @@ def _sure(probability: float, causes: Sequence[Cause]) -> str:
 def _fitted(cause: Cause) -> list[CauseParameter]:
     """Return the sizes that were fitted; none where they are too many for a sentence."""
     fitted = [p for p in cause.parameters if p.std and math.isfinite(p.value + p.std)]
-    return fitted if len(fitted) <= _MOST_SIZES else []
+    return fitted if len(fitted) <= settings.of_a_kind else []
 
 
 def _size(item: CauseParameter) -> str:
