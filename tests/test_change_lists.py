@@ -33,7 +33,8 @@ WORDS = (
 )
 FAMILY = (
     *("global", "local", "spring", "offset", "bayesian", "bayesian-sampling", "sparse"),
-    *("eigensensitivity", "cma-es", "multi-start", "strain-energy", "cross-model", "particle-swarm"),
+    *("eigensensitivity", "cma-es", "multi-start", "strain-energy", "cross-model"),
+    "particle-swarm",
 )
 
 
