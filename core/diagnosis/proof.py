@@ -348,12 +348,7 @@ def gain_of(before: Blocks, after: Blocks, crossed: Unseen | None) -> Gain:
 
 
 def extend_by(model: Model, explanation: Explanation) -> Model:
-    """Return the model with textbook effects and causes in it.
-
-    Examples:
-        >>> diagnosis.extend_by(model, examination.best).size == model.size
-        True
-    """
+    """Return the model with textbook effects and causes in it."""
     # The last one alone: an explanation holds all that it was fitted with.
     make = partial(_extended, model, explanation, explanation.fit.state.x)
     return keep_last(model, "extended by", explanation, make)
