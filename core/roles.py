@@ -57,7 +57,7 @@ class Result(Protocol):
 
 
 @runtime_checkable
-class Strategy(Protocol):
+class StrategyRole(Protocol):
     """A method of updating; `femubench.Strategy` is a base class for who wants one.
 
     A strategy may say more than is asked here; `declared` reads it:

@@ -23,7 +23,6 @@ The example of every function starts from these lines:
 >>> run = femubench.rank(case, [nominal, scaled], nominal="drawn")
 >>> torsion = femubench.effects["torsion-constant"]
 >>> found = femubench.diagnose(case, torsion, pairs=False)
->>> examination = diagnosis.examine(model, measurement, [torsion], tolerance=0.005)
 >>> lines, sensors = np.linspace(200.0, 300.0, 401), measurement.sensors
 >>> force = femubench.Sensors(("9Z",), sensors.xyz[8:9], sensors.directions[8:9])
 >>> curves = modal.receptance(modes, readings, readings[8:9], lines, 0.005)

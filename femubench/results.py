@@ -7,7 +7,7 @@ from femubench.core.drawing.element_change import (
 from femubench.core.run.store import Store as Store
 from femubench.core.schema.paired_modes import PairedMode as PairedMode
 from femubench.core.schema.records import run_from_json as run_from_json, run_to_json as run_to_json
-from femubench.core.schema.results import JobResult as JobResult, Run as Run
+from femubench.core.schema.results import JobResult as JobResult, RunData as RunData
 from femubench.core.score.bounded_gain import Rule as Rule
 from femubench.core.score.leaderboard import Standings as Standings
 from femubench.core.score.predictive import PredictiveBoard as PredictiveBoard

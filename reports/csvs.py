@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import femubench
-from femubench.results import Run
+from femubench.results import RunData
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,7 +19,7 @@ class CsvReporter:
 
     name, suffix, table = "csv", ".csv", "table"
 
-    def render(self, run: Run) -> str:
+    def render(self, run: RunData) -> str:
         """Return the rows as CSV."""
         return harmless_csv(getattr(femubench.Run.of(run), self.table))
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from femubench.reports.page.data import ExhibitSource, page_data
 from femubench.reports.page.document import document
-from femubench.results import Run, StudyAxes
+from femubench.results import RunData, StudyAxes
 
 if TYPE_CHECKING:
     from femubench import Identification
@@ -20,11 +20,11 @@ class HtmlReporter:
     name = "html"
     suffix = ".html"
 
-    def render(self, run: Run) -> str:
+    def render(self, run: RunData) -> str:
         """Return the page, without what only a store can add."""
         return self.render_with(run, None)
 
-    def render_with(self, run: Run, exhibits: ExhibitSource | None) -> str:
+    def render_with(self, run: RunData, exhibits: ExhibitSource | None) -> str:
         """Return the page with the drawings that the store has."""
         if StudyAxes.from_run(run) is not None:
             from femubench.reports.study import study_html

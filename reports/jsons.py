@@ -11,7 +11,7 @@ from femubench.reports.predictive import predictive_json
 from femubench.reports.summary import finding, lead
 from femubench.reports.twins import twins_by_strategy
 from femubench.results import (
-    Run,
+    RunData,
     Standings,
     StudyAxes,
     run_to_json,
@@ -34,7 +34,7 @@ class JsonReporter:
     name = "json"
     suffix = ".json"
 
-    def render(self, run: Run) -> str:
+    def render(self, run: RunData) -> str:
         """Return strict JSON: what is not a finite number is null."""
         board = board_of(run)
         said = {"lead": lead(run), "finding": finding(run, Standings.of(run).rows)}
@@ -52,7 +52,7 @@ class JsonLinesReporter:
     name = "jsonl"
     suffix = ".jsonl"
 
-    def render(self, run: Run) -> str:
+    def render(self, run: RunData) -> str:
         """Return a table of strict JSON on each line."""
         plain = run_to_json(run)
         results = [*plain["results"], *plain.get("companions", ())]
@@ -62,7 +62,7 @@ class JsonLinesReporter:
         return "\n".join(json.dumps(line, allow_nan=False) for line in lines)
 
 
-def board_of(run: Run) -> list[dict[str, Any]]:
+def board_of(run: RunData) -> list[dict[str, Any]]:
     """Return the rows of the leaderboard as plain data, best first."""
     twins, differing = twins_by_strategy(run), unsteady(run)
     return [

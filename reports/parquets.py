@@ -9,7 +9,7 @@ from typing import NoReturn
 import femubench
 from femubench import InputError
 from femubench.reports.summary import notes_of
-from femubench.results import Run
+from femubench.results import RunData
 
 
 class ParquetReporter:
@@ -18,7 +18,7 @@ class ParquetReporter:
     name = "parquet"
     suffix = ".parquet"
 
-    def render(self, run: Run) -> NoReturn:
+    def render(self, run: RunData) -> NoReturn:
         """Refuse: this is no text.
 
         Raises:
@@ -26,7 +26,7 @@ class ParquetReporter:
         """
         raise InputError("format parquet is not a text format", expected="a file")
 
-    def render_bytes(self, run: Run) -> bytes:
+    def render_bytes(self, run: RunData) -> bytes:
         """Return the results; run and notes are in the file's metadata under ``femubench``.
 
         Raises:

@@ -8,7 +8,7 @@ from femubench.reports.blocks import Block, Column, Items, Passage, Table
 from femubench.reports.cells import NOTHING, interval
 from femubench.reports.page.rounding import clean
 from femubench.reports.terminal import to_terminal
-from femubench.results import PredictiveBoard, Run
+from femubench.results import PredictiveBoard, RunData
 
 _COLUMNS = {
     "name": Column("strategy", 18, left=True),
@@ -40,12 +40,12 @@ class PredictiveReporter:
     name = "predictive"
     suffix = ".predictive.txt"
 
-    def render(self, run: Run) -> str:
+    def render(self, run: RunData) -> str:
         """Return the table in 80 columns."""
         return to_terminal([Passage("", predictive_blocks(run))])
 
 
-def predictive_blocks(run: Run) -> list[Block]:
+def predictive_blocks(run: RunData) -> list[Block]:
     """Return the predictive board and what its columns mean, or why there is none."""
     board = PredictiveBoard.of(run)
     rows: list[dict[str, Any]] = [
@@ -63,7 +63,7 @@ def predictive_blocks(run: Run) -> list[Block]:
     return [table, Items(list(_LEGEND.items())), _describe_common(board)]
 
 
-def predictive_json(run: Run) -> dict[str, Any]:
+def predictive_json(run: RunData) -> dict[str, Any]:
     """Return the predictive board as plain data."""
     board = PredictiveBoard.of(run)
     common = {band: list(map(clean, ends)) for band, ends in board.common.items()}

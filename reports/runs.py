@@ -34,7 +34,7 @@ from femubench.reports.twins import MEANING, describe_twins, suspicions
 from femubench.results import (
     JobResult,
     PairedMode,
-    Run,
+    RunData,
     Standings,
     StudyAxes,
     twin_gains,
@@ -92,7 +92,7 @@ class TerminalReporter:
     name = "terminal"
     suffix = ".txt"
 
-    def render(self, run: Run) -> str:
+    def render(self, run: RunData) -> str:
         """Return the ranking, the failures and what the columns mean."""
         if StudyAxes.from_run(run) is not None:
             return to_terminal(study.sections_of(run))
@@ -100,11 +100,11 @@ class TerminalReporter:
         stated = [*failed, *_notes(run)]
         return to_terminal([*_board(run), *(Passage("", [block]) for block in stated)])
 
-    def notes(self, run: Run) -> list[str]:
+    def notes(self, run: RunData) -> list[str]:
         """Return what a reader has to know of a run, where a format has no room for it."""
         return notes_of(run)
 
-    def shortfalls(self, run: Run) -> list[str]:
+    def shortfalls(self, run: RunData) -> list[str]:
         """Return why the ranks of a run may not hold, where its report is not shown."""
         return shortfalls(run)
 
@@ -145,7 +145,7 @@ class MarkdownReporter:
     name = "markdown"
     suffix = ".md"
 
-    def render(self, run: Run) -> str:
+    def render(self, run: RunData) -> str:
         """Return the report."""
         if StudyAxes.from_run(run) is not None:
             sections = [*study.sections_of(run), study.about_axes(run)]
@@ -176,7 +176,7 @@ class MarkdownReporter:
         return "\n".join([f"# {escape(title)}", *(f"- {escape(line)}" for line in lines)])
 
 
-def board_text(run: Run) -> str:
+def board_text(run: RunData) -> str:
     """Return the ranking, what its columns mean, and which strategies differ from the best."""
     return to_terminal(_board(run))
 
@@ -200,7 +200,7 @@ def _cells(row: Mapping[Any, Any]) -> dict[str, Cell]:
     }
 
 
-def _board(run: Run, title: str = "") -> Iterator[Passage]:
+def _board(run: RunData, title: str = "") -> Iterator[Passage]:
     """Yield the leaderboard, what its columns mean, and what the run shows."""
     standings = Standings.of(run)
     rows, bare = standings.rows, unconfined(run)
@@ -237,7 +237,7 @@ def _board(run: Run, title: str = "") -> Iterator[Passage]:
         yield Passage("Twins" if title else "", twins)
 
 
-def _twins(run: Run) -> Iterator[Block]:
+def _twins(run: RunData) -> Iterator[Block]:
     """Yield the gains on twins next to those on their cases, and who may know these."""
     found = sorted(twin_gains(run).items(), key=lambda entry: -entry[1].original_gain)
     if found:
@@ -251,7 +251,7 @@ def _twins(run: Run) -> Iterator[Block]:
     yield from (f"?: {stated}" for stated in suspicions(run))
 
 
-def _notes(run: Run) -> Iterator[str]:
+def _notes(run: RunData) -> Iterator[str]:
     """Yield what else a reader of the screen has to know."""
     yield from (f"Note: {note}." for note in notes_of(run))
     yield from _moving(run)
@@ -260,7 +260,7 @@ def _notes(run: Run) -> Iterator[str]:
         yield f"Not applicable, counted as the model that was given: {named}: {reason}."
 
 
-def _moving(run: Run) -> Iterator[str]:
+def _moving(run: RunData) -> Iterator[str]:
     moving = Counter(
         result.strategy
         for result in run.results
@@ -271,7 +271,7 @@ def _moving(run: Run) -> Iterator[str]:
         yield f"Still moving at their last iteration (jobs): {named}."
 
 
-def _document(run: Run) -> Iterator[Passage]:
+def _document(run: RunData) -> Iterator[Passage]:
     notes = [("Note", note) for note in notes_of(run)]
     about = Table([Column("", 9, left=True)] * 2, list(header(run)))
     yield Passage("", [about, *([Items(notes)] if notes else [])])
@@ -289,7 +289,11 @@ def _document(run: Run) -> Iterator[Passage]:
     for title, fine in (("Failures", False), ("Not applicable", True)):
         ended = failures(troubles(run.results, fine=fine))
         yield Passage(title, ended or ["None."], level=3)
-    drawn, papers, ranked = list_drawn_frequencies(run), papers_of(run), Run(run.meta, run.ranked)
+    drawn, papers, ranked = (
+        list_drawn_frequencies(run),
+        papers_of(run),
+        RunData(run.meta, run.ranked),
+    )
     for case in cases_of(run):
         start, printed = drawn.get(case, {}), papers.get(case, {})
         others = (("from the model as drawn", start), ("as the paper prints it", printed))
@@ -300,7 +304,7 @@ def _document(run: Run) -> Iterator[Passage]:
 
 
 def _case(
-    run: Run, case: str, others: Iterable[tuple[str, Mapping[str, Mapping[int, float | None]]]]
+    run: RunData, case: str, others: Iterable[tuple[str, Mapping[str, Mapping[int, float | None]]]]
 ) -> Iterator[Block]:
     """Yield the frequencies of one case, a strategy a row, as the papers tabulate them.
 
@@ -360,7 +364,7 @@ def _mac(modes: Iterable[PairedMode]) -> float | None:
     return sum(values) / len(values) if values else None
 
 
-def _changes(run: Run) -> Iterator[Passage]:
+def _changes(run: RunData) -> Iterator[Passage]:
     """Yield the errors after every design change, a table a scenario, a strategy a row."""
     modes, seed = femubench.Run.of(run).modes, first_seed(run)
     modes = modes[(modes["block"] == "modified") & (modes["seed"] == seed)]

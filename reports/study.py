@@ -11,7 +11,7 @@ from femubench import InputError
 from femubench.reports.blocks import Block, Column, Drawing, Items, Passage, Table
 from femubench.reports.cells import NOTHING, format_fixed, interval, plain
 from femubench.reports.summary import failures, header, lead, notes_of, troubles
-from femubench.results import Run, StudyAxes
+from femubench.results import RunData, StudyAxes
 
 _MOST_ON_SCREEN = 60  # cells
 _MOST_COLUMNS = 9
@@ -27,7 +27,7 @@ _PICTURE = (
 )
 
 
-def study_html(run: Run) -> str:
+def study_html(run: RunData) -> str:
     """Return a study as one HTML document that needs no other file."""
     from femubench.reports.html import to_html
 
@@ -36,12 +36,12 @@ def study_html(run: Run) -> str:
     return to_html(sections, title=f"femubench: {title}", heading=title)
 
 
-def title_of(run: Run) -> str:
+def title_of(run: RunData) -> str:
     """Return the title of a study."""
     return plain(StudyAxes.of(run).title) or f"Study {plain(run.meta.get('run', ''))}"
 
 
-def sections_of(run: Run, *drawing: Block) -> Iterator[Passage]:
+def sections_of(run: RunData, *drawing: Block) -> Iterator[Passage]:
     """Yield what every form of the report has; `drawing` where there is one."""
     known = StudyAxes.of(run)
     x, y = known.pictured
@@ -55,14 +55,14 @@ def sections_of(run: Run, *drawing: Block) -> Iterator[Passage]:
         yield Passage("Notes", [Items(notes)])
 
 
-def about_axes(run: Run) -> Passage:
+def about_axes(run: RunData) -> Passage:
     """Return the axes with their values, and how the study was run."""
     known = StudyAxes.of(run)
     axes = [(name, ", ".join(map(StudyAxes.text_of, known.values(name)))) for name in known.names]
     return Passage("Study", [Items([*axes, *header(run)])])
 
 
-def _drawing(run: Run) -> Block:
+def _drawing(run: RunData) -> Block:
     from femubench.plot import heat_map, svg
 
     known = StudyAxes.of(run)
@@ -78,7 +78,7 @@ def _drawing(run: Run) -> Block:
     return Drawing(title, _PICTURE, found)
 
 
-def _grid(run: Run, known: StudyAxes, x: str, y: str) -> Block:
+def _grid(run: RunData, known: StudyAxes, x: str, y: str) -> Block:
     """Return the heat map as numbers, a value of y a row."""
     columns, rows = known.values(x), known.values(y)
     if len(columns) > _MOST_COLUMNS:

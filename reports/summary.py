@@ -9,7 +9,7 @@ from typing import Any
 
 from femubench.reports.blocks import Block, Column, Table
 from femubench.reports.cells import first_of, format_fixed, interval, join_names, plain
-from femubench.results import JobResult, PairedMode, Rule, Run, Standings, Store
+from femubench.results import JobResult, PairedMode, Rule, RunData, Standings, Store
 
 FINE = ("ok", "not-applicable")
 _HEADER = (
@@ -68,23 +68,23 @@ def group_reasons(results: Iterable[JobResult]) -> dict[str, list[str]]:
     return reasons
 
 
-def first_seed(run: Run) -> int:
+def first_seed(run: RunData) -> int:
     """Return the lowest seed of a run, the one whose frequencies are shown."""
     return min((result.seed for result in run.results), default=0)
 
 
-def cases_of(run: Run) -> list[str]:
+def cases_of(run: RunData) -> list[str]:
     """Return the cases in the order in which they were run."""
     return list(dict.fromkeys([*run.meta.get("cases", ()), *(r.case for r in run.results)]))
 
 
-def strategies_of(run: Run) -> list[str]:
+def strategies_of(run: RunData) -> list[str]:
     """Return the strategies in the order in which they were run."""
     named = run.meta.get("strategies", ())
     return list(dict.fromkeys([*named, *(result.strategy for result in run.results)]))
 
 
-def header(run: Run) -> Iterator[tuple[str, str]]:
+def header(run: RunData) -> Iterator[tuple[str, str]]:
     """Return what a reader needs to repeat a run: seeds, versions, machine."""
     meta = run.meta
     for key in _HEADER:
@@ -100,7 +100,7 @@ def _spoken(value: Any) -> str:  # noqa: ANN401 - plain data of any kind
     return plain(value)
 
 
-def measured_modes(run: Run, case: str) -> list[tuple[str, PairedMode]]:
+def measured_modes(run: RunData, case: str) -> list[tuple[str, PairedMode]]:
     """Return the measured modes of a case as tested with their blocks, from any of its results."""
     found: dict[tuple[str, int], PairedMode] = {}
     for result in run.results:
@@ -111,7 +111,7 @@ def measured_modes(run: Run, case: str) -> list[tuple[str, PairedMode]]:
     return [(name, mode) for (name, _), mode in found.items()]
 
 
-def lead(run: Run) -> str:
+def lead(run: RunData) -> str:
     """Return what the gain of a run says, and from where its strategies started."""
     models = "textbook" if run.meta.get("yardstick") == "textbook" else "nominal"
     stated = [
@@ -136,13 +136,13 @@ def lead(run: Run) -> str:
     return " ".join(stated) + f" Rule {rule}."
 
 
-def unconfined(run: Run) -> frozenset[str]:
+def unconfined(run: RunData) -> frozenset[str]:
     """Return the strategies of which a job ran without a sandbox."""
     usual, jobs = run.meta.get("sandbox"), (*run.results, *run.companions)
     return frozenset(r.strategy for r in jobs if r.provenance.get("sandbox", usual) == "none")
 
 
-def _doubts(run: Run) -> Iterator[str]:
+def _doubts(run: RunData) -> Iterator[str]:
     if Standings.basis_of(run) == "unseen" and not (run.meta.get("twins") or {}).get("of"):
         yield "no twins ran, so that memory of the cases is not excluded"
     if unconfined(run):
@@ -151,7 +151,7 @@ def _doubts(run: Run) -> Iterator[str]:
         yield f"strategies ran without a sandbox{why} and could read what they were not given"
 
 
-def shortfalls(run: Run) -> list[str]:
+def shortfalls(run: RunData) -> list[str]:
     """Return why the ranks of a run may not hold: no twins, no sandbox, jobs that are not there."""
     jobs = (*run.results, *run.companions)
     ended = [f"{t.strategy} on {t.case} ({t.status})" for t in troubles(jobs)]
@@ -161,7 +161,7 @@ def shortfalls(run: Run) -> list[str]:
     return [*_doubts(run), *([plain(missing)] if missing else []), *map(plain, failed)]
 
 
-def finding(run: Run, board: Sequence[Mapping[Any, Any]]) -> list[str]:
+def finding(run: RunData, board: Sequence[Mapping[Any, Any]]) -> list[str]:
     """Return what a run shows, in sentences made from its figures; the first is the headline.
 
     Arguments:
@@ -253,7 +253,7 @@ def _percent(value: float) -> str:
     return f"{value:.1f} %"
 
 
-def notes_of(run: Run) -> list[str]:
+def notes_of(run: RunData) -> list[str]:
     """Return what a reader has to know before anything else: what was left out, what is missing."""
     stated = run.meta.get("notes")
     notes = [plain(note) for note in stated] if isinstance(stated, (list, tuple)) else []
@@ -262,6 +262,6 @@ def notes_of(run: Run) -> list[str]:
     return list(dict.fromkeys(notes))
 
 
-def seeds_of(run: Run) -> list[int]:
+def seeds_of(run: RunData) -> list[int]:
     """Return the seeds that were asked for and those that are there, in order."""
     return sorted({*run.meta.get("seeds", ()), *(result.seed for result in run.results)})

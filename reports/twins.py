@@ -6,7 +6,7 @@ from typing import Any
 
 from femubench.reports.cells import first_of, plain
 from femubench.reports.page.rounding import clean
-from femubench.results import Run, twin_gains, unsteady
+from femubench.results import RunData, twin_gains, unsteady
 
 MEANING = (
     "Twins are other structures under other names, drawn from a seed when the run began: similar "
@@ -17,7 +17,7 @@ MEANING = (
 )
 
 
-def twins_by_strategy(run: Run) -> dict[str, dict[str, Any]]:
+def twins_by_strategy(run: RunData) -> dict[str, dict[str, Any]]:
     """Return by strategy, in plain data, its gain on twins and on their cases, and what is odd."""
     keys = ("gain", "original_gain", "p", "suspicious")
     return {
@@ -26,7 +26,7 @@ def twins_by_strategy(run: Run) -> dict[str, dict[str, Any]]:
     }
 
 
-def describe_twins(run: Run) -> str:
+def describe_twins(run: RunData) -> str:
     """Return how many twins there were, and from which seed."""
     stated = run.meta.get("twins") or {}
     twins = stated.get("of") or {}
@@ -37,7 +37,7 @@ def describe_twins(run: Run) -> str:
     )
 
 
-def suspicions(run: Run) -> list[str]:
+def suspicions(run: RunData) -> list[str]:
     """Return a sentence for every strategy that may know the cases, or that gave two answers."""
     stated = [
         f"{plain(name)} knows the cases? gain {found.original_gain:.3f} on them, "

@@ -9,6 +9,7 @@ import numpy as np
 
 from femubench import Model, Sensors, solve_modes
 from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.change.tabulated import change_of
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.fem.model import Dofs
 from femubench.core.modal.eigen import solve_dense
@@ -80,7 +81,7 @@ def compare(
     nominal = once_for(model, "elastic modes", lambda: solve_modes(model).elastic)
     floor = 1e-4 * nominal.eigenvalues[0]
     sensors = joint_sensors(model)
-    change = effect.change(model, place)  # type: ignore[attr-defined]
+    change = change_of(effect, model, place)
     eigenvalues, shapes = solve_dense(*changed_matrices(model, change, values))
     elastic = np.abs(eigenvalues) > floor
     eigenvalues, shapes = eigenvalues[elastic][:count], shapes[:, elastic][:, :count]
@@ -111,7 +112,7 @@ def check_exact(
 def check_neutral(effect: Effect, model: Model, place: str) -> None:
     """Check that both ways leave the model as it is at the neutral values."""
     neutral = [p.neutral for p in effect.parameters(model, place)]
-    mass, stiffness = changed_matrices(model, effect.change(model, place), neutral)  # type: ignore[attr-defined]
+    mass, stiffness = changed_matrices(model, change_of(effect, model, place), neutral)
     extended = effect.extend(model, place, neutral)
     for own, changed, rebuilt in (
         (model.mass, mass, extended.mass),

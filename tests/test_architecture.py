@@ -17,10 +17,6 @@ ROOT = Path(__file__).parents[1]
 FOLDERS = ("core", "papers", "plugins", "reports", "scenarios")
 FILES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
 FACADE = sorted((ROOT / "femubench").glob("*.py"))
-# Names that two classes of the package have; no more come. Strategy is a protocol of `core.roles`
-# and a base class; `femubench.Run` is a `femubench.results.Run` with tables.
-REPEATED = {2: "Run Strategy"}
-
 # The rooms of `core/`: each may import those before it, and nothing after it.
 ROOMS = (
     *(
@@ -185,7 +181,7 @@ def test_nothing_prints() -> None:
 
 
 def test_a_class_name_stands_once() -> None:
-    """Two things are called the same, or one thing is there twice; the list only gets shorter."""
+    """Else two things are called the same, or one thing is there twice."""
     names = Counter(
         node.name
         for path in FILES
@@ -193,12 +189,8 @@ def test_a_class_name_stands_once() -> None:
         for node in nodes_of(path)
         if isinstance(node, ast.ClassDef)
     )
-    known = {name: times for times, listed in REPEATED.items() for name in listed.split()}
-    found = {name: times for name, times in names.items() if times > 1}
-    more = {name: times for name, times in found.items() if times > known.get(name, 1)}
+    more = {name: times for name, times in names.items() if times > 1}
     assert more == {}, "a class of that name is there already: use it, or find a better name"
-    fewer = {name: known[name] for name in known if found.get(name, 1) < known[name]}
-    assert fewer == {}, "take these off REPEATED, or write there how often they still stand"
 
 
 def made_tree(root: Path) -> Path:

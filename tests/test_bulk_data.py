@@ -702,15 +702,17 @@ def test_a_case_has_all_its_files_and_says_what_of_them_does_not_count(tmp_path:
         "MDLPRM (1), PARAM (1), PSHELL (1)",
         "truss.bdf: nothing is reduced or held by ASET1 (1): all directions stay",
         "truss.bdf: J of PROD is left out: a joint of rods alone takes up no twist",
-        "truss.bdf: masses are consistent; the file asks for lumped ones (COUPMASS)",
+        "truss.bdf: masses are consistent; Nastran lumps them by default",
     )
     plain = tmp_path / "plain.bdf"
     plain.write_text(TRUSS)
     assert near(case.model, READER.read_model(plain), 0.0)
     part.write_text(idle + "MAT1,9,7.+10,,.3\n")
     assert femubench.read_case(tmp_path, readers=(READER,)).digest != case.digest
-    plain.write_text(CLAMPED + "PARAM,COUPMASS,1\n")
-    assert READER.read_remarks(plain) == ("cards left out: PARAM (1)",)
+    for asked, note in (("1", ()), ("-1", ("the file asks for lumped ones (COUPMASS)",))):
+        plain.write_text(CLAMPED + f"PARAM,COUPMASS,{asked}\n")
+        said = tuple(f"masses are consistent; {what}" for what in note)
+        assert READER.read_remarks(plain) == ("cards left out: PARAM (1)", *said)
 
 
 FOREIGN = {

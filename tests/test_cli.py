@@ -518,7 +518,7 @@ class Faulty:
 def test_a_reporter_that_raises_is_named() -> None:
     from femubench.core.errors import PluginError
     from femubench.core.library.report import render_report
-    from femubench.core.schema.results import Run
+    from femubench.core.schema.results import RunData
 
     with pytest.raises(PluginError, match="reporter 'faulty' failed: ZeroDivisionError"):
-        render_report(Faulty(), Run({}, ()))
+        render_report(Faulty(), RunData({}, ()))

@@ -26,7 +26,7 @@ from femubench.core.score.leaderboard import leaderboard
 from femubench.fem import Frame, GroundSpring, Place, Preload
 from femubench.modal import rigid_modes_of
 from femubench.plugins.strategies.diagnosed import Diagnosed
-from femubench.results import Run
+from femubench.results import RunData
 from femubench.scenarios import HERE
 from femubench.update import with_measured_frequencies
 from tests.simulated import modes_at
@@ -203,7 +203,7 @@ def _case(name: str, nominal: Model, measurement: Measurement) -> Case:
 
 
 @pytest.fixture(scope="module")
-def harness_run(nominal: Model, truth: Frame) -> Run:
+def harness_run(nominal: Model, truth: Frame) -> RunData:
     """Two cases that differ in what is held out, and a solid twin, run in a worker process."""
     honest = measured(truth, ALL)
     scrambled = replace(
@@ -221,7 +221,7 @@ def harness_run(nominal: Model, truth: Frame) -> Run:
     return run_jobs(cases, [known[name] for name in names], jobs=1)
 
 
-def test_held_out_modes_cannot_influence_it(harness_run: Run) -> None:
+def test_held_out_modes_cannot_influence_it(harness_run: RunData) -> None:
     """Other held-out data, the same answer to the last digit; other predictions would be right."""
     found = {r.case: r for r in harness_run.results if r.strategy == "diagnosed"}
     one, two = found["honest"], found["scrambled"]
@@ -232,11 +232,11 @@ def test_held_out_modes_cannot_influence_it(harness_run: Run) -> None:
     assert one.blocks["higher"].rms_percent < 5.0 < two.blocks["higher"].rms_percent
 
 
-def test_the_solid_twin_is_predicted_where_others_are_not(harness_run: Run) -> None:
+def test_the_solid_twin_is_predicted_where_others_are_not(harness_run: RunData) -> None:
     chosen = [r for r in harness_run.results if r.case == "frame-solid"]
     errors = harness_run.meta["reference"]["frame-solid"]
     meta = {**harness_run.meta, "reference": {"frame-solid": errors}}
-    board = leaderboard(Run(meta, tuple(chosen))).set_index("strategy")
+    board = leaderboard(RunData(meta, tuple(chosen))).set_index("strategy")
     assert board.index[0] == "diagnosed"
     assert board["gain"].idxmax() == "diagnosed"
     assert not board["unphysical"]["diagnosed"]

@@ -52,8 +52,8 @@ def test_a_modulus_that_is_low_is_named_whatever_shapes_the_pair_has(
 ) -> None:
     truth = catalogue()["youngs-modulus"].extend(MODEL, "all", (-0.1,))
     test = measured(truth, FRAME, count=5, shapes=5, rng=np.random.default_rng(1))
-    case = case_of(MODEL, turned(test, angle), 5)
-    found = diagnose(case, effects_named(*NAMES), pairs=False, tolerance=tolerance)
+    case = replace(case_of(MODEL, turned(test, angle), 5), tolerance=tolerance)
+    found = diagnose(case, effects_named(*NAMES), pairs=False)
     assert found.verdict == "named"
     assert [cause.effect for cause in found.causes] == ["youngs-modulus"]
     assert found.adequacy_p > 0.05

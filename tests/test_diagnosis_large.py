@@ -25,7 +25,7 @@ from femubench.core.fem.model import Dofs
 from femubench.core.fem.sections import Section
 from femubench.core.fit.projection import Projector
 from femubench.core.inference.coordinates import modes_for
-from femubench.core.inference.settings import settings
+from femubench.core.inference.settings import overridden, settings
 from femubench.core.modal.eigen import DENSE_LIMIT, count_evaluations, modes_of
 from femubench.core.roles import Effect
 from femubench.fem import Frame
@@ -138,7 +138,10 @@ def test_a_large_frame_is_diagnosed_on_fewer_elements(
     assert found.extended.size == 186
 
 
-def test_too_many_degrees_of_freedom_are_refused() -> None:
+def test_too_many_degrees_of_freedom_are_refused(model: Model) -> None:
+    alike = r"543 degrees of freedom, with as few elements.* 500 at most.*members that lie in line"
+    with overridden({"most_dofs": 500}), pytest.raises(NotApplicable, match=alike):
+        modes_for(model)
     n = settings.most_dofs + 1
     dofs = Dofs(np.arange(n), ("z",) * n, np.zeros((n, 3)))
     geometry = MatrixGeometry(tuple(map(str, range(n))), dofs)

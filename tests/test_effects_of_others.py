@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -103,9 +104,14 @@ def test_it_is_named_with_its_clause_caution_and_size_in_percent(
     blind: BlindCase, found: Diagnosis
 ) -> None:
     assert found.verdict == "named"
-    assert found.sentence.startswith("The model lacks stiff-skin (probability ")
     (cause,) = found.causes
     (size,) = cause.parameters
+    stated = r"The model lacks stiff-skin \(([^;]*) \+([\d.]+) ± ([\d.]+) %; probability "
+    begin = re.match(stated, found.sentence)
+    assert begin is not None
+    assert begin[1] == size.name.removeprefix("change of ")
+    numbers = [float(text) / 100.0 for text in begin.groups()[1:]]
+    assert numbers == pytest.approx([size.value, size.std], rel=0.06)
     assert (cause.effect, cause.summary, size.wording) == (Skin.name, SUMMARY, "change")
     assert size.value == pytest.approx(blind.truth.causes[0].values[0], abs=0.02)
     assert CAUTION in found.notes

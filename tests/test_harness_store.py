@@ -17,7 +17,7 @@ from femubench.core.run.frames import modes_frame
 from femubench.core.run.store import Store
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.records import run_from_json, run_to_json
-from femubench.core.schema.results import Block, JobResult, Run, Status
+from femubench.core.schema.results import Block, JobResult, RunData, Status
 from femubench.core.score.ranking import rank_results
 from tests.command import run_python
 
@@ -230,7 +230,7 @@ def test_many_writers_do_not_mix_their_records(tmp_path: Path) -> None:
 
 def test_json_is_the_contract_and_comes_back() -> None:
     meta = with_models()
-    run = Run(meta, rank_results([GOOD, BAD], meta))
+    run = RunData(meta, rank_results([GOOD, BAD], meta))
     data = run_to_json(run)
     text = json.dumps(data, allow_nan=False)
     first, second = json.loads(text)["results"]
@@ -246,7 +246,7 @@ def test_json_is_the_contract_and_comes_back() -> None:
 
 def test_numbers_that_json_does_not_know_become_null() -> None:
     odd = replace(BAD, diagnostics={"condition": np.inf}, history=({"residual": np.nan},))
-    data = run_to_json(Run({"limit": float("nan")}, (odd,)))
+    data = run_to_json(RunData({"limit": float("nan")}, (odd,)))
     json.dumps(data, allow_nan=False)
     assert data["meta"] == {"limit": None}
     assert data["results"][0]["diagnostics"] == {"condition": None}
@@ -259,7 +259,7 @@ def test_numbers_that_json_does_not_know_become_null() -> None:
     [({"status": "fine"}, "status"), ({"seed": None}, "seed"), ({"gain": "high"}, "gain")],
 )
 def test_wrong_json_is_refused_with_its_place(change: dict[str, Any], key: str) -> None:
-    data = run_to_json(Run(META, (GOOD, BAD)))
+    data = run_to_json(RunData(META, (GOOD, BAD)))
     data["results"][1].update(change)
     with pytest.raises(InputError, match=rf"run\.json: results\[1\]\.{key}: "):
         run_from_json(data, file="run.json")
@@ -268,10 +268,10 @@ def test_wrong_json_is_refused_with_its_place(change: dict[str, Any], key: str) 
 
 
 def test_one_row_a_mode() -> None:
-    frame = modes_frame(Run(META, (GOOD, BAD)))
+    frame = modes_frame(RunData(META, (GOOD, BAD)))
     assert frame["block"].tolist() == ["used", "used", "modified"]
     assert frame["error_percent"].tolist()[0] == pytest.approx(3.0)
     assert frame["error_percent"].isna().tolist() == [False, True, True]
     assert frame["counted_percent"].tolist() == pytest.approx([3.0, 100.0, 100.0])
     assert frame["modification"].tolist()[2] == "mass at C"
-    assert len(modes_frame(Run({}, ()))) == 0
+    assert len(modes_frame(RunData({}, ()))) == 0

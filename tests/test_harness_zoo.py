@@ -25,7 +25,7 @@ from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.schedule import Workload, _Bench
 from femubench.core.run.slots import Slot, Start
 from femubench.core.schema.records import result_from_json, result_to_json
-from femubench.core.schema.results import JobResult, Run
+from femubench.core.schema.results import JobResult, RunData
 
 pytestmark = pytest.mark.slow(20)
 
@@ -41,7 +41,7 @@ def small(seconds: float | None, memory: int | None, **others: Any) -> Limits:
 @pytest.fixture(
     scope="module", params=["namespaces", pytest.param("none", marks=pytest.mark.nightly)]
 )
-def runs(request: pytest.FixtureRequest) -> Iterator[dict[str, Run]]:
+def runs(request: pytest.FixtureRequest) -> Iterator[dict[str, RunData]]:
     """One run with the zoo and one without, both in a sandbox or both on a machine without."""
     with pytest.MonkeyPatch.context() as patch, ExitStack() as stack:
         patch.setattr(runner, "Limits", small)
@@ -74,7 +74,7 @@ def targets(stack: ExitStack) -> dict[str, Any]:
     }
 
 
-def both(how: str) -> dict[str, Run]:
+def both(how: str) -> dict[str, RunData]:
     case = toys.tiny_case()
     options: dict[str, Any] = {"timeout": 6.0, "memory": MEMORY, "seeds": (0, 1)}
     calm = run_jobs([case], GOOD, jobs=1, **options)
@@ -89,13 +89,13 @@ def ends(animal: type[zoo.Animal], how: str) -> tuple[str, str] | None:
     return animal.ends if how == "namespaces" or animal.loose == ("same", "") else animal.loose
 
 
-def found(run: Run, strategy: str) -> JobResult:
+def found(run: RunData, strategy: str) -> JobResult:
     return next(item for item in run.results if (item.strategy, item.seed) == (strategy, 0))
 
 
 @pytest.mark.parametrize("animal", zoo.ANIMALS, ids=lambda animal: animal.name)
 def test_every_animal_is_known_by_its_status(
-    runs: dict[str, Run], animal: type[zoo.Animal]
+    runs: dict[str, RunData], animal: type[zoo.Animal]
 ) -> None:
     expected = ends(animal, runs["wild"].meta["sandbox"])
     if expected is None:
@@ -106,14 +106,16 @@ def test_every_animal_is_known_by_its_status(
     assert "\n" not in result.reason
 
 
-def test_the_good_have_the_results_that_they_have_among_themselves(runs: dict[str, Run]) -> None:
+def test_the_good_have_the_results_that_they_have_among_themselves(
+    runs: dict[str, RunData],
+) -> None:
     for strategy in GOOD:
         alone, among = (found(runs[name], strategy.name) for name in ("calm", "wild"))
         same = {"seconds": 0.0, "rank": None, "provenance": {}}
         assert replace(alone, **same) == replace(among, **same)
 
 
-def test_what_they_say_can_be_stored(runs: dict[str, Run]) -> None:
+def test_what_they_say_can_be_stored(runs: dict[str, RunData]) -> None:
     for result in runs["wild"].results:
         text = json.dumps(result_to_json(result))
         assert result_from_json(json.loads(text)).status == result.status
@@ -129,7 +131,7 @@ def test_a_judgement_out_of_bounds_ends_its_job_alone() -> None:
     assert outcome.reason.startswith("its result is out of bounds: result.parameter_count")
 
 
-def test_nothing_is_left_behind(runs: dict[str, Run]) -> None:
+def test_nothing_is_left_behind(runs: dict[str, RunData]) -> None:
     assert runs["wild"].results
     assert list(zoo.leftovers()) == []
 

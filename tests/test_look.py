@@ -179,24 +179,6 @@ def test_an_assumed_shear_coefficient_is_said(hframe: FrameBuilder) -> None:
     np.testing.assert_allclose(got, expected[: len(got)], rtol=1e-9)
 
 
-def test_large_models_are_not_solved_anew(
-    ladder: FrameBuilder, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    model = Model.of(ladder())
-    exact = look(model, measured(model))
-    for module in ("look.modes", "fit.mesh_error"):
-        monkeypatch.setattr(f"femubench.core.{module}.SOLVED_LIMIT", 0)
-    quick = look(model, measured(model))
-    for effect, accuracy in (
-        ("shear-deformation", 0.02),
-        ("rotary-inertia", 0.03),
-        ("torsion-constant", 0.06),
-    ):
-        expected = np.array([p for _, p in of_effect(exact, effect).changes])
-        got = np.array([p for _, p in of_effect(quick, effect).changes])
-        np.testing.assert_allclose(got, expected, rtol=accuracy, atol=0.02)
-
-
 def test_stubby_members_are_named(hframe: FrameBuilder) -> None:
     section = Section.rectangular_tube(0.05, 0.05, 0.003)
     model = Model.of(with_section(hframe(mesh=(6, 3, 5), accelerometers=False), section))

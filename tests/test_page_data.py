@@ -24,7 +24,7 @@ from femubench.reports.page.document import SCRIPTS, STYLES, asset, embed_json
 from femubench.reports.page.papers import papers_of
 from femubench.reports.page.rounding import compact_json
 from femubench.reports.runs import MarkdownReporter
-from femubench.results import JobResult, PairedMode, Rule, Run, run_to_json
+from femubench.results import JobResult, PairedMode, Rule, RunData, run_to_json
 
 SMALL = synthetic_run(6, 8, seeds=2)
 
@@ -97,7 +97,7 @@ class TestNumbers:
                 return {"key": key, "odd": math.inf, "modes": modes}
 
         result = replace(SMALL.results[0], key="k", seed=1)
-        run = Run(SMALL.meta, (result,))
+        run = RunData(SMALL.meta, (result,))
         found = data_in(HtmlReporter().render_with(run, Shelf()))
         case = found["cases"][0]
         assert case["stage"]["digest"] == SMALL.meta["cases"][case["name"]]["digest"]
@@ -105,7 +105,7 @@ class TestNumbers:
         assert found["details"]["0:0"]["exhibit"] == own
         assert "one.json: a picture was left out" in found["notes"]
         # The shape is on two nodes, the structure has one.
-        run = Run(SMALL.meta, (replace(result, key="other"),))
+        run = RunData(SMALL.meta, (replace(result, key="other"),))
         found = data_in(HtmlReporter().render_with(run, Shelf()))
         assert found["details"]["0:0"]["exhibit"] is None
 
@@ -150,7 +150,7 @@ def page_file(paper: str) -> dict[str, Any]:
     return found
 
 
-def frame_run(factor: float) -> Run:
+def frame_run(factor: float) -> RunData:
     """Return a run on the first paper's case, or on one whose frequencies are others."""
     hertz = [factor * f for f in (226.8, 275.2, 537.4, 861.5, 974.8)]
     modes = [PairedMode(n, f, 1.01 * f, 0.99) for n, f in enumerate(hertz, start=1)]
@@ -163,7 +163,7 @@ def frame_run(factor: float) -> Run:
         "rule": Rule().to_json(),
         "models": {"frame": {"drawn": scored.plain(blocks)}},
     }
-    return Run(meta, rank_results([JobResult("frame", "baruch", 0, "ok", blocks=blocks)], meta))
+    return RunData(meta, rank_results([JobResult("frame", "baruch", 0, "ok", blocks=blocks)], meta))
 
 
 class TestDocument:
@@ -186,4 +186,4 @@ class TestDocument:
         assert json.loads(text) == evil
 
     def test_a_run_of_nothing_has_a_page(self) -> None:
-        assert data_in(HtmlReporter().render(Run({}, ())))["results"] == []
+        assert data_in(HtmlReporter().render(RunData({}, ())))["results"] == []

@@ -88,7 +88,7 @@ def test_third_party_loads_next_to_broken_ones(site: Path) -> None:
     )
     # through the entry-point group of the whole environment, as `bench` does
     plugins = load_plugins()
-    assert isinstance(plugins.strategies["nothing-at-all"], roles.Strategy)
+    assert isinstance(plugins.strategies["nothing-at-all"], roles.StrategyRole)
     assert "fine_one_plugin" not in sys.modules
     assert not {"typo", "wants"} & set(plugins.strategies)
     faults = {fault.plugin: fault for fault in plugins.broken}

@@ -22,7 +22,7 @@ from femubench.core.diagnosis.region import list_atoms, list_kinds, list_regions
 from femubench.core.diagnosis.verdict import Decision
 from femubench.core.diagnosis.words import sentence_of
 from femubench.core.fit.modal_fit import state_at
-from femubench.core.schema.diagnosis import Cause, Gain, Region, RegionKind
+from femubench.core.schema.diagnosis import Cause, CauseParameter, Gain, Region, RegionKind
 
 FRAME = structure_named("ladder-asymmetric").frame
 MODEL = Model.of(FRAME)
@@ -119,6 +119,20 @@ def test_a_group_in_several_regions_is_not(other: Region | None) -> None:
 @pytest.mark.parametrize("region", [replace(END, probability=0.9), replace(END, place="all")])
 def test_an_unsure_region_or_the_whole_says_nothing(region: Region) -> None:
     assert "which: e0 at p or e1 at p" in sentence(region, region)
+
+
+def test_a_name_comes_with_sizes_and_their_deviations() -> None:
+    sizes = (
+        CauseParameter("mass", 0.3123, 0.0121, "kg"),
+        CauseParameter("change of E", 0.42, 0.03, "", wording="change"),
+    )
+    places = zip("ab", ("p", "all"), sizes, strict=True)
+    causes = [Cause(name, at, (size,), 0.9, place_probability=0.8) for name, at, size in places]
+    decision = Decision("named", (0,), 0.0)
+    assert sentence_of(decision, causes, [causes], 0.9, Gain((1.0, 1.0))) == (
+        "The model lacks a at p and b (a: mass 0.312 ± 0.012 kg; b: E +42.0 ± 3.0 %; probability "
+        "90 %; the place of a 80 %)."
+    )
 
 
 # --- whole diagnoses --------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from femubench.core.run.frames import results_frame
 from femubench.core.run.record_file import read_records, write_file
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.runs import MarkdownReporter
-from femubench.results import Run, Store, run_to_json
+from femubench.results import RunData, Store, run_to_json
 from tests.command import call_bench
 
 RUN = synthetic_run(4, 6)
@@ -33,7 +33,7 @@ GOING = f"the run has not ended: 10 of {len(RUN.results)} jobs are there"
 Report = Callable[..., Result]
 
 
-def stored(folder: Path, run: Run = RUN, *, end: bool = True) -> Path:
+def stored(folder: Path, run: RunData = RUN, *, end: bool = True) -> Path:
     """Write a run into a store and return the file."""
     store = Store(folder)
     began = {k: v for k, v in run.meta.items() if k not in ("finished", "interrupted", "notes")}
@@ -133,18 +133,18 @@ class TestDamage:
 
     def test_notes_of_an_outsider_are_shown_or_left(self) -> None:
         for notes in (5, {"a": 1}, [EVIL, None]):
-            run = Run({**RUN.meta, "notes": notes}, RUN.results)
+            run = RunData({**RUN.meta, "notes": notes}, RUN.results)
             assert EVIL not in HtmlReporter().render(run)
             assert "<script>" not in MarkdownReporter().render(run)
 
 
-def hostile() -> Run:
+def hostile() -> RunData:
     """Return a run with names that no plugin could have."""
     run = synthetic_run(4, 6, names=[EVIL, "=HYPERLINK(1)"], failing=0.0)
     first = next(iter(run.meta["cases"]))
     cases = {**run.meta["cases"], first: {"title": TITLE, "digest": "0" * 64}}
     results = (replace(run.results[0], status="failed", reason=TITLE, blocks={}), *run.results[1:])
-    return Run({**run.meta, "cases": cases}, results)
+    return RunData({**run.meta, "cases": cases}, results)
 
 
 class TestInjection:

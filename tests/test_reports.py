@@ -25,7 +25,7 @@ from femubench.reports.jsons import JsonReporter
 from femubench.reports.markdown import escape
 from femubench.reports.runs import MarkdownReporter, TerminalReporter
 from femubench.reports.summary import finding, shortfalls
-from femubench.results import JobResult, PairedMode, Rule, Run
+from femubench.results import JobResult, PairedMode, Rule, RunData
 
 
 def mode(
@@ -67,7 +67,7 @@ def result(strategy: str, factor: float = 1.0, **changes: object) -> JobResult:
     return replace(made, **changes)  # type: ignore[arg-type]
 
 
-def run_of(*results: JobResult, **meta: object) -> Run:
+def run_of(*results: JobResult, **meta: object) -> RunData:
     cases = dict.fromkeys(result.case for result in results)
     full = {
         "run": "20260101T000000Z-abcdef",
@@ -82,7 +82,7 @@ def run_of(*results: JobResult, **meta: object) -> Run:
         "reference": {case: {n: b.rms_percent for n, b in NOMINAL.items()} for case in cases},
         "citations": {"good": "A. Author 2001, (1)"},
     }
-    return Run({**full, **meta}, results)
+    return RunData({**full, **meta}, results)
 
 
 NOMINAL = result("nominal").blocks
@@ -219,7 +219,7 @@ def test_what_ranks_lack_is_said_of_every_run() -> None:
 class TestFinding:
     """The sentences on what a run shows."""
 
-    def stated(self, run: Run) -> list[str]:
+    def stated(self, run: RunData) -> list[str]:
         return finding(run, list_rows(run))
 
     def test_how_far_off_in_percent_and_how_sure_that_is(self) -> None:
@@ -257,7 +257,7 @@ class TestFinding:
         assert alone[1] == "That is better than the nominal models."
         assert "interval" not in " ".join(alone)
         assert self.stated(run_of(FAILED)) == ["No strategy gave a possible model."]
-        assert self.stated(Run({}, ())) == []
+        assert self.stated(RunData({}, ())) == []
 
 
 def test_notes_name_what_still_moves_and_what_does_not_apply() -> None:

@@ -21,7 +21,7 @@ from femubench.core.errors import InputError
 from femubench.core.run import provenance as keys, slots, store as locks
 from femubench.core.run.record_file import read_records, write_file
 from femubench.core.run.store import Store
-from femubench.core.schema.results import JobResult, Run
+from femubench.core.schema.results import JobResult, RunData
 from tests.command import run_python
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
@@ -32,16 +32,16 @@ TOYS = Path(__file__).parent / "toys"
 CASE = toys.tiny_case()
 
 
-def by_name(run: Run) -> list[JobResult]:
+def by_name(run: RunData) -> list[JobResult]:
     return sorted(run.results, key=lambda item: (item.case, item.strategy, item.seed))
 
 
-def stable(run: Run) -> list[JobResult]:
+def stable(run: RunData) -> list[JobResult]:
     """What of a run does not depend on when and how often it was interrupted."""
     return [replace(item, seconds=0.0, rank=None, gain=None) for item in by_name(run)]
 
 
-def some(store: Store, **options: Any) -> Run:
+def some(store: Store, **options: Any) -> RunData:
     strategies = [toys.Unchanged(), toys.Softer(), toys.Failing()]
     return run_jobs([CASE], strategies, jobs=2, store=store, **options)
 

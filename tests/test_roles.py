@@ -51,11 +51,11 @@ def test_a_result_plays_its_role(tmp_path: Path) -> None:
 def test_a_strategy_that_inherits_nothing_is_one() -> None:
     assert Duck.__mro__ == (Duck, object)
     found = check_strategy(Duck)
-    assert isinstance(found, roles.Strategy)
+    assert isinstance(found, roles.StrategyRole)
     assert (
         roles.list_declared(found, "needs") == roles.list_declared(found, "promises") == frozenset()
     )
-    assert not isinstance(object(), roles.Strategy)
+    assert not isinstance(object(), roles.StrategyRole)
     assert not issubclass(Duck, Strategy)
 
 

@@ -18,7 +18,7 @@ from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal import eigen
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.schema.paired_modes import PairedMode
-from femubench.core.schema.results import Run
+from femubench.core.schema.results import RunData
 from femubench.core.score.leaderboard import find_basis, leaderboard
 from femubench.core.score.ranking import rank_items, rank_results
 from femubench.core.score.scoring import (
@@ -387,7 +387,7 @@ def test_several_seeds_of_few_structures_give_an_interval_over_seeds() -> None:
 
 
 def test_a_run_without_what_its_gains_rest_on_is_to_be_run_again() -> None:
-    old = Run({"run": "old", "reference": {"a": {"higher": 2.0}}}, (result(higher=1.0),))
+    old = RunData({"run": "old", "reference": {"a": {"higher": 2.0}}}, (result(higher=1.0),))
     with pytest.raises(InputError, match=r"keeps no candidate partners of case 'a'.*run it again"):
         leaderboard(old)
     lacking = scored.run(ERRORS, [result("c", higher=1.0)])

@@ -14,7 +14,7 @@ from running import run_jobs
 from scipy.stats import t as student
 
 from femubench.core.errors import InputError
-from femubench.core.schema.results import Run
+from femubench.core.schema.results import RunData
 from femubench.core.score.comparison import Against, compare_runs
 from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.statistics import (
@@ -54,7 +54,7 @@ def judged(differences: Sequence[float]) -> Significance:
     return found
 
 
-def run_of(gains: Mapping[str, FloatArray], structures: Mapping[str, str]) -> Run:
+def run_of(gains: Mapping[str, FloatArray], structures: Mapping[str, str]) -> RunData:
     """Return a run in which every strategy has the given gains, over a textbook error of 10 %.
 
     Arguments:
@@ -163,7 +163,7 @@ def test_a_structure_counts_once_whatever_its_cases_and_seeds() -> None:
     parts = [0.5, 0.4, 0.3, 0.2, 0.1, 0.6, 0.7, -0.05]
     assert found.difference == pytest.approx(np.mean(parts), rel=1e-9)
     # What the run does not say: every case is a structure of its own.
-    silent = Run({**run.meta, "structures": {}}, run.results)
+    silent = RunData({**run.meta, "structures": {}}, run.results)
     (found,) = compare_runs(silent, silent, against=Against("a", "b")).evidence
     assert found.structures == 12
 

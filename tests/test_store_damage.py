@@ -22,7 +22,7 @@ from femubench.core.errors import InputError
 from femubench.core.run import record_file
 from femubench.core.run.store import Store
 from femubench.core.schema.paired_modes import PairedMode
-from femubench.core.schema.results import Block, JobResult, Run
+from femubench.core.schema.results import Block, JobResult, RunData
 from tests.command import call_bench
 
 FLIPS = 100
@@ -58,7 +58,7 @@ def stored(folder: Path, run_id: str = RUN) -> Store:
     return store
 
 
-def plain(run: Run) -> list[JobResult]:
+def plain(run: RunData) -> list[JobResult]:
     return [replace(result, rank=None) for result in run.results]
 
 

@@ -49,7 +49,7 @@ from femubench.core.run.companions import choose_companions
 from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
 from femubench.core.schema.records import run_from_json, run_to_json
-from femubench.core.schema.results import JobResult, Run
+from femubench.core.schema.results import JobResult, RunData
 from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.repeatability import unsteady
 from femubench.core.score.scoring import judge, reference_of
@@ -279,7 +279,7 @@ def test_the_same_seed_gives_the_same_twins_and_another_one_others() -> None:
 
 
 @pytest.fixture(scope="module")
-def run() -> Run:
+def run() -> RunData:
     case = builtin("frame-solid")
     twins = list(twins_of([case], 2, 11))
     others = choose_companions([case], twins, 2, 11)
@@ -288,7 +288,7 @@ def run() -> Run:
     return run_jobs([case], able, seeds=(0, 1), jobs=2, starts=Starts(companions=others))
 
 
-def test_who_knows_a_case_by_heart_is_marked(run: Run) -> None:
+def test_who_knows_a_case_by_heart_is_marked(run: RunData) -> None:
     found = twin_gains(run)
     assert found["memory"].original_gain > 0.8
     assert found["memory"].gain == pytest.approx(0.0, abs=1e-6)
@@ -299,13 +299,13 @@ def test_who_knows_a_case_by_heart_is_marked(run: Run) -> None:
     assert found["unchanged"].gain == pytest.approx(found["unchanged"].original_gain, abs=1e-9)
 
 
-def with_twins(here: JobResult, *there: JobResult) -> Run:
+def with_twins(here: JobResult, *there: JobResult) -> RunData:
     """Return a run of one case, of a textbook error of 3 %, with twins of it."""
     stated = scored.meta({"one": {"used": 1.0, "higher": 3.0}})
     names = {result.case: "one" for result in there}
     models = dict.fromkeys(names, stated["models"]["one"])
     twins = {"of": names, "again": {}, "models": models}
-    return Run({**stated, "twins": twins}, (here,), there)
+    return RunData({**stated, "twins": twins}, (here,), there)
 
 
 def answer(case: str, error: float, **more: Any) -> JobResult:
@@ -328,7 +328,7 @@ def test_over_many_structures_the_signs_decide() -> None:
             error = 2.0 + 0.01 * i
             results.append(scored.result(name, strategy, higher=error))
             others.append(scored.result(f"{name}~1", strategy, higher=error * factor))
-    run = Run(meta, tuple(results), tuple(others))
+    run = RunData(meta, tuple(results), tuple(others))
     found = twin_gains(run)
     assert [found[n].suspicious for n in ("knows", "none", "slightly")] == [True, False, False]
     assert found["knows"].p is not None
@@ -366,13 +366,13 @@ def test_a_job_that_was_stopped_says_nothing_of_what_a_strategy_knows() -> None:
     assert twin_gains(with_twins(own, *failed))["s"].suspicious
 
 
-def test_who_answers_otherwise_every_time_is_found(run: Run) -> None:
+def test_who_answers_otherwise_every_time_is_found(run: RunData) -> None:
     assert list(unsteady(run)) == ["chance"]
     assert "another model" in unsteady(run)["chance"]
     assert run.meta["unsteady"] == unsteady(run)
 
 
-def test_twins_lower_gains_and_are_in_no_other_figure(run: Run) -> None:
+def test_twins_lower_gains_and_are_in_no_other_figure(run: RunData) -> None:
     assert {result.case for result in run.results} == {"frame-solid"}
     assert set(run.meta["cases"]) == set(run.meta["reference"]) == {"frame-solid"}
     names = {"frame-solid~1", "frame-solid~2", "frame-solid~again"}
@@ -380,7 +380,7 @@ def test_twins_lower_gains_and_are_in_no_other_figure(run: Run) -> None:
     stated = {result.case: result.provenance for result in run.companions}
     assert stated["frame-solid~2"]["twin_of"] == "frame-solid"
     assert stated["frame-solid~again"]["again"] == "frame-solid"
-    bare = Run({k: v for k, v in run.meta.items() if k != "twins"}, run.results)
+    bare = RunData({k: v for k, v in run.meta.items() if k != "twins"}, run.results)
     alone, own = (leaderboard(one).set_index("strategy") for one in (bare, run))
     assert own["higher_percent"].equals(alone["higher_percent"].loc[own.index])
     # The lower of case and twin: what was known by heart is no gain.
@@ -389,7 +389,7 @@ def test_twins_lower_gains_and_are_in_no_other_figure(run: Run) -> None:
     assert own.loc["unchanged", "gain"] == pytest.approx(alone.loc["unchanged", "gain"], abs=1e-9)
 
 
-def test_reports_tell_of_twins(run: Run) -> None:
+def test_reports_tell_of_twins(run: RunData) -> None:
     text = " ".join(str(femubench.report(run)).split())
     assert "gain on 2 twins of 1 cases, seed 11" in text
     assert "?: memory knows the cases? gain" in text
@@ -404,14 +404,14 @@ def test_reports_tell_of_twins(run: Run) -> None:
     assert not rows["drawn"]["twins"]["suspicious"]
     assert "unsteady" in rows["chance"]
     assert "unsteady" not in rows["drawn"]
-    bare = Run({k: v for k, v in run.meta.items() if k != "twins"}, run.results)
+    bare = RunData({k: v for k, v in run.meta.items() if k != "twins"}, run.results)
     for style in ("terminal", "markdown", "html", "json"):
         for one, excluded in ((run, True), (bare, False)):
             said = " ".join(str(femubench.report(one, style=style)).split())
             assert ("memory of the cases is not excluded" not in said) == excluded, style
 
 
-def test_runs_with_twins_are_kept_read_and_resumed(run: Run, tmp_path: Path) -> None:
+def test_runs_with_twins_are_kept_read_and_resumed(run: RunData, tmp_path: Path) -> None:
     back = run_from_json(run_to_json(run))
     assert back.companions == run.companions
     store = Store(tmp_path / "store")

@@ -22,7 +22,7 @@ from femubench.core.run.answers import pack_outcome, read_report, unpack_outcome
 from femubench.core.run.jobs import Job, JobOutcome, execute, seed_words
 from femubench.core.run.judging import judge_outcome
 from femubench.core.schema.paired_modes import PairedMode, PartnerCandidate
-from femubench.core.schema.results import Block, JobResult, Run
+from femubench.core.schema.results import Block, JobResult, RunData
 from femubench.core.score.leaderboard import GainTable, leaderboard
 from femubench.core.score.predicted_spread import Spread
 from femubench.core.score.predictive import (
@@ -263,7 +263,7 @@ def drawn(sigma: float, std: float | None = None, count: int = 400, seed: int = 
     return [modes(sigma * rng.standard_normal(count), std) for _ in range(COUNT)]
 
 
-def run_with(textbook: list[Modes], **strategies: list[Modes | None]) -> Run:
+def run_with(textbook: list[Modes], **strategies: list[Modes | None]) -> RunData:
     """Return a run on a structure for each list of modes; None stands for a failure."""
     used = Block(0.0, 1.0, (PairedMode(0, 100.0, 100.0, 1.0),))
     named = {f"s{k}": {"used": used, "higher": Block(1.0, 1.0, tuple(m))}
@@ -276,10 +276,10 @@ def run_with(textbook: list[Modes], **strategies: list[Modes | None]) -> Run:
         for name, listed in strategies.items()
         for case, own in zip(named, listed, strict=True)
     ]
-    return Run({"models": models, "seeds": [0], "strategies": [*strategies]}, tuple(results))
+    return RunData({"models": models, "seeds": [0], "strategies": [*strategies]}, tuple(results))
 
 
-def board_of(run: Run) -> dict[str, dict[str, Any]]:
+def board_of(run: RunData) -> dict[str, dict[str, Any]]:
     return {row["strategy"]: row for row in PredictiveBoard.of(run).rows}
 
 

@@ -18,6 +18,7 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray
 
 TOLERANCE = 0.005
+LARGEST_TOLERANCE = 0.2
 BEAM_SHARE = 0.5
 SCATTER = (0.002, 0.02)  # of frequencies and of shapes, from one test to the next
 

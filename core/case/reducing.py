@@ -11,7 +11,7 @@ from femubench.core.case.case import Case
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Dofs, Model
-from femubench.core.modal.eigen import DENSE_LIMIT
+from femubench.core.modal.eigen import ALL_MODES_LIMIT, DENSE_LIMIT
 from femubench.core.modal.group_prior import GroupPriors
 from femubench.core.modal.grouped_reduction import GroupedReduction, reduce_groups
 from femubench.core.typing import FloatArray, IntArray, SparseArray
@@ -19,12 +19,11 @@ from femubench.core.typing import FloatArray, IntArray, SparseArray
 _INNER = "~"  # the node of coordinates that lie nowhere
 _MODES = 6  # that have to be right in addition to the measured ones
 _MOST_KEPT = DENSE_LIMIT // 2
-_LARGE = 2000  # degrees of freedom: up to here a basis takes as long as what it saves
 _SAME = 1e-9  # of the diagonal: what rounding makes of an unchanged entry
 _TOLERANCE = 1e-3
 
 
-def reduce_case(case: Case, above: int = _LARGE) -> Case:
+def reduce_case(case: Case, above: int = ALL_MODES_LIMIT) -> Case:
     """Return a case with a small model of the same groups, where its own is large and has some.
 
     The nodes of sensors and of attached masses and springs stay; what strategies and effects

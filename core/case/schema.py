@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, InstanceOf, PlainValidator
 from pydantic_core import PydanticCustomError
 
-from femubench.core.case.case import BEAM_SHARE, SCATTER, TOLERANCE
+from femubench.core.case.case import BEAM_SHARE, LARGEST_TOLERANCE, SCATTER, TOLERANCE
 from femubench.core.fem.frame import MADE, BeamTheory, BendingMass, Made, Place, Plane
 from femubench.core.modal.frf import Motion
 
@@ -492,9 +492,12 @@ class ModificationSpec(TomlTable):
 class DiagnosisSpec(TomlTable):
     """`[diagnosis]`."""
 
-    tolerance: Annotated[float, Field(strict=True, ge=0, le=0.2, allow_inf_nan=False)] = Field(
+    tolerance: Annotated[
+        float, Field(strict=True, ge=0, le=LARGEST_TOLERANCE, allow_inf_nan=False)
+    ] = Field(
         default=TOLERANCE,
-        description="a number >= 0 and <= 0.2, the relative scatter of every element",
+        description=f"a number >= 0 and <= {LARGEST_TOLERANCE}, the relative scatter of every "
+        "element",
     )
     model_error: Annotated[float, Field(strict=True, ge=0, le=10, allow_inf_nan=False)] | None = (
         Field(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
+from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,6 +19,7 @@ from femubench.core.modal.factorisation import LU
 from femubench.core.roles import Effect, EffectParameter
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
+_MATRICES: tuple[Literal["mass", "stiffness"], ...] = ("mass", "stiffness")
 _NODES = {1: 9, 2: 4}
 _WIDEST = 3.0  # deviations to either side that a table covers
 _AFFINE = 1e-9
@@ -98,8 +100,9 @@ def _affine(
         size = abs(two).max() if two.nnz else 0.0
         if size > 0.0 and abs(one / first - two / second).max() > _AFFINE * size / abs(second):
             return None
-    terms = (Term.of("mass", far[0] / second), Term.of("stiffness", far[1] / second))
-    return Change.proportional(*terms, neutral=parameter.neutral)
+    terms = zip(_MATRICES, far, strict=True)
+    own = (Term.of(matrix, part / second) for matrix, part in terms if part.nnz)
+    return Change.proportional(*own, neutral=parameter.neutral)
 
 
 def _within(parameter: EffectParameter) -> tuple[float, float]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from femubench.core.roles import Reporter
     from femubench.core.run.runner import Plan
     from femubench.core.run.store import Store
-    from femubench.core.schema.results import JobName, Run
+    from femubench.core.schema.results import JobName, RunData
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class RunOutput:
         header: Callable[[str], str],
         exhibits: object = None,
         *resumed_with: Sequence[str],
-    ) -> tuple[Run, int]:
+    ) -> tuple[RunData, int]:
         """Run what is planned and report; return the run and the exit code.
 
         Arguments:
@@ -104,7 +104,7 @@ class RunOutput:
             write_answers(name_answers(file), run, answers)
         return run, self._report(run, screen, exhibits)
 
-    def _report(self, run: Run, screen: Reporter | None, exhibits: object) -> int:
+    def _report(self, run: RunData, screen: Reporter | None, exhibits: object) -> int:
         """Write the files, then show the ranking and where the files are.
 
         A file that cannot be written keeps nobody from the ranking and the other files.

@@ -19,7 +19,7 @@ from femubench.core.roles import (
     Reader,
     Reporter,
     Scenario,
-    Strategy,
+    StrategyRole,
     list_declared,
 )
 
@@ -76,7 +76,7 @@ def _about(offered: object) -> Iterator[str]:
             yield " ".join(paragraph.split())
 
 
-def _strategy(strategy: Strategy) -> Iterator[Row]:
+def _strategy(strategy: StrategyRole) -> Iterator[Row]:
     yield "citation", strategy.citation
     yield "needs", ", ".join(sorted(list_declared(strategy, "needs"))) or "nothing but frequencies"
     if promises := list_declared(strategy, "promises"):

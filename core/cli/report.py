@@ -20,7 +20,7 @@ from femubench.core.plugin.validation import choose_names
 
 if TYPE_CHECKING:
     from femubench.core.roles import Reporter
-    from femubench.core.schema.results import Run
+    from femubench.core.schema.results import RunData
 
 _PAGE = "html"
 # Formats that tell of what was left out themselves.
@@ -122,7 +122,7 @@ def _write_diagnosis(
 
 
 def _write(
-    run: Run, exhibits: object, writers: Sequence[Reporter], folder: Path, output: Path | None
+    run: RunData, exhibits: object, writers: Sequence[Reporter], folder: Path, output: Path | None
 ) -> dict[str, Path]:
     """Write files or show texts; return the files by format."""
     from femubench.core.library.report import is_for_files, render_report, run_name, text_of

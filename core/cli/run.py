@@ -26,7 +26,7 @@ from femubench.core.version import __version__
 if TYPE_CHECKING:
     from femubench.core.plugin.loader import Plugins
     from femubench.core.run.runner import Plan
-    from femubench.core.schema.results import Run
+    from femubench.core.schema.results import RunData
 
 
 # Words that would make a run another one.
@@ -118,7 +118,7 @@ def _going_on(ctx: click.Context) -> tuple[Sequence[str], Sequence[str]]:
     )
 
 
-def _compare(old: Run, new: Run) -> int:
+def _compare(old: RunData, new: RunData) -> int:
     """Say what differs between a run and its repetition; return 1 where a result does."""
     from femubench.core.score.repeatability import environment_differences, result_differences
 

@@ -27,7 +27,7 @@ from femubench.core.conformance.trial import (
 from femubench.core.errors import harmless
 from femubench.core.plugin.foreign import is_foreign
 from femubench.core.plugin.variants import Variant
-from femubench.core.roles import Strategy, list_declared
+from femubench.core.roles import StrategyRole, list_declared
 from femubench.core.run.jobs import missing_capability, one_line, pickle_strategy
 
 Status = Literal["pass", "fail", "warn", "not-applicable"]
@@ -148,7 +148,7 @@ class Bench:
         self,
         subject: Any,  # noqa: ANN401 - any role
         *,
-        reference: Strategy | None = None,
+        reference: StrategyRole | None = None,
         cases: Sequence[UpdatingProblem] = (),
         helpers: Sequence[object] = (),
         seconds: float = SECONDS,

@@ -17,7 +17,7 @@ from femubench.core.conformance.problems import CROSSED, GROUPED, PLAIN, PROBLEM
 from femubench.core.conformance.results import PROMISES
 from femubench.core.conformance.trial import Observation, Want, promises_of
 from femubench.core.plugin.variants import Variant
-from femubench.core.roles import CAPABILITIES, Strategy, list_declared
+from femubench.core.roles import CAPABILITIES, StrategyRole, list_declared
 
 _MUCH = 100.0  # times what the reference takes
 _LEAST_SECONDS, _LEAST_BYTES = 1e-3, 1e4  # below which a ratio says nothing
@@ -128,7 +128,7 @@ for _name, _sentence in _RESULTS.items():
     first=True,
     code_alone=True,
 )
-def is_described(subject: Strategy) -> Verdict:
+def is_described(subject: StrategyRole) -> Verdict:
     """Look at citation, docstring and promises of a strategy."""
     strategy = subject.base if isinstance(subject, Variant) else subject
     if not str(strategy.citation).strip():
@@ -153,7 +153,7 @@ def is_described(subject: Strategy) -> Verdict:
     first=True,
     code_alone=True,
 )
-def names_options(subject: Strategy) -> Verdict:
+def names_options(subject: StrategyRole) -> Verdict:
     """Look for the fields of a strategy in its docstring and those of its bases."""
     strategy: Any = subject.base if isinstance(subject, Variant) else subject
     fields = dataclasses.fields(strategy) if dataclasses.is_dataclass(strategy) else ()

@@ -23,7 +23,7 @@ from femubench.core.errors import NotApplicable, StrategyFailure, harmless
 from femubench.core.fem.model import Model
 from femubench.core.plugin.foreign import import_thing
 from femubench.core.plugin.variants import Variant
-from femubench.core.roles import Result, Strategy, list_declared
+from femubench.core.roles import Result, StrategyRole, list_declared
 from femubench.core.run.answers import pack_outcome
 from femubench.core.run.jobs import JobOutcome, one_line, plain_outcome
 
@@ -132,7 +132,7 @@ def read_observation(problem: str, ending: Ending) -> tuple[Observation, bytes]:
 
 
 def _observe(trial: Trial) -> tuple[Observation, bytes]:
-    strategy: Strategy = import_subject(pickle.loads(trial.strategy))
+    strategy: StrategyRole = import_subject(pickle.loads(trial.strategy))
     problem = trial.problem
     # What is handed over may be spoilt; the problem itself is needed to judge the result.
     model, measurement = pickle.loads(pickle.dumps((problem.model, problem.measurement)))
@@ -169,7 +169,7 @@ def _inputs(given: UpdatingProblem) -> dict[str, str]:
 
 
 def _call_strategy(
-    strategy: Strategy, given: UpdatingProblem, trial: Trial
+    strategy: StrategyRole, given: UpdatingProblem, trial: Trial
 ) -> tuple[Observation, UpdateResult | None]:
     rng = np.random.default_rng(np.random.SeedSequence([0, *given.name.encode()]))
     name, start = given.name, time.perf_counter()
@@ -199,7 +199,7 @@ def _call_strategy(
     return Observation(name, "result", "", seconds, peak), cast("UpdateResult", result)
 
 
-def promises_of(strategy: Strategy) -> frozenset[str]:
+def promises_of(strategy: StrategyRole) -> frozenset[str]:
     """Return what a strategy says that it keeps, with or without options."""
     promises: object = list_declared(strategy, "promises")
     return promises if isinstance(promises, frozenset) else frozenset()

@@ -92,7 +92,6 @@ def diagnose(
     *,
     faults: Iterable[Fault] | None = None,
     pairs: bool = True,
-    tolerance: float | None = None,
     effort: Effort | None = None,
 ) -> Diagnosis:
     """Return what is missing in a case's model, where, how sure, and what it gains.
@@ -105,7 +104,6 @@ def diagnose(
         effects: what may be missing; all registered effects by default.
         faults: what may be wrong with data or input; all registered faults by default.
         pairs: whether more than one cause is sought.
-        tolerance: standard deviation of every element's relative scatter; the case's by default.
         effort: counts the fits; the search for several causes ends with its time. None: never.
 
     Raises:
@@ -120,9 +118,8 @@ def diagnose(
     registered = list_effects()
     known = registered if effects is None else tuple(effects)
     wrong = list_faults() if faults is None else tuple(faults)
-    scatter = case.tolerance if tolerance is None else tolerance
     reference, width, beam = case.used_reference, case.error_width, case.beam_share
-    terms = Terms(known, scatter, pairs, reference, width, beam, effort)
+    terms = Terms(known, case.tolerance, pairs, reference, width, beam, effort)
     with effort.scope(_expected(case)):
         # Faults of data and input first, then the causes that are left without them.
         inquiry = inquire(case.model, used, wrong, terms)

@@ -347,18 +347,8 @@ def gain_of(before: Blocks, after: Blocks, crossed: Unseen | None) -> Gain:
     return Gain(used, pair("higher"), pair("modified"), cross)  # type: ignore[arg-type]
 
 
-def extend_by(model: Model, explanation: Explanation, x: FloatArray | None = None) -> Model:
-    """Return the model with textbook effects and causes in it.
-
-    Arguments:
-        x: coordinates of the causes, taken within their bounds, (p,); None for the fitted ones.
-
-    Examples:
-        >>> diagnosis.extend_by(model, examination.best).size == model.size
-        True
-    """
-    if x is not None:  # as samples of the uncertainty have them
-        return _extended(model, explanation, np.clip(x, *bounds_of(explanation.parts)))
+def extend_by(model: Model, explanation: Explanation) -> Model:
+    """Return the model with textbook effects and causes in it."""
     # The last one alone: an explanation holds all that it was fitted with.
     make = partial(_extended, model, explanation, explanation.fit.state.x)
     return keep_last(model, "extended by", explanation, make)

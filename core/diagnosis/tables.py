@@ -62,28 +62,16 @@ def residual_rows(before: State, after: State) -> tuple[ResidualRow, ...]:
     return tuple(rows)
 
 
-def causes_in(
-    explanation: Explanation,
-    share: float,
-    earned: frozenset[str],
-    *,
-    spread: FloatArray | None = None,
-    own: float = 0.0,
+def _causes_in(
+    explanation: Explanation, earned: frozenset[str], spread: FloatArray, own: float
 ) -> list[Cause]:
-    """Return the causes of an explanation with values and deviations.
+    """Return the causes of an explanation, taken as sure, with values and deviations.
 
     Arguments:
         explanation: fitted.
-        share: probability of each.
         earned: textbook effects that are part of the name.
-        spread: standard deviations of the coordinates, (k,); those of the fit by default.
+        spread: standard deviations of the coordinates, (k,).
         own: share of what a cause changes by which it is itself in error.
-
-    Examples:
-        >>> best = examination.best
-        >>> (cause,) = diagnosis.causes_in(best, 1.0, frozenset(best.base.names))
-        >>> cause.effect == torsion.name
-        True
     """
     causes = []
     book = {part.hypothesis.name: part.hypothesis for part in explanation.base.parts}
@@ -92,10 +80,8 @@ def causes_in(
             fixed = tuple(
                 _parameter(p, float(p.textbook or 0.0), None, textbook=True) for p in h.parameters
             )
-            causes.append(Cause(h.name, h.place, fixed, share, _summary(h.effect)))
+            causes.append(Cause(h.name, h.place, fixed, 1.0, _summary(h.effect)))
     x = explanation.fit.state.x
-    if spread is None:
-        spread = np.sqrt(explanation.fit.covariance.diagonal())
     start = 0
     for part in explanation.parts:
         h = part.hypothesis
@@ -110,7 +96,7 @@ def causes_in(
                 value, std = textbook * (1.0 + value) - 1.0, textbook * std
             fitted.append(_parameter(parameter, value, std))
         start += len(h.parameters)
-        causes.append(Cause(h.effect.name, h.place, tuple(fitted), share, _summary(h.effect)))
+        causes.append(Cause(h.effect.name, h.place, tuple(fitted), 1.0, _summary(h.effect)))
     return causes
 
 
@@ -168,7 +154,7 @@ def list_causes(
     spread = find_spread(posterior, explanation)
     own = examination.own_error(explanation.fit.state)
     passengers = find_passengers(explanation.fit.state, spread)
-    causes = causes_in(explanation, 1.0, posterior.earned, spread=spread, own=own)
+    causes = _causes_in(explanation, posterior.earned, spread, own)
     first = len(causes) - len(explanation.parts)
     tied = _tied(posterior, explanation)
     found = []

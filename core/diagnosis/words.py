@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from femubench.core.diagnosis.verdict import Decision
 from femubench.core.inference.settings import settings
-from femubench.core.schema.diagnosis import Cause, Gain, Region
+from femubench.core.schema.diagnosis import Cause, CauseParameter, Gain, Region
 
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
 
@@ -122,14 +122,38 @@ def sentence_of(
 
 
 def _sure(probability: float, causes: Sequence[Cause]) -> str:
-    """Return how sure the name is, and how sure every place."""
+    """Return the sizes, how sure the name is, and how sure every place."""
+    alone = len(causes) == 1
+    sized = [(cause, ", ".join(map(_size, _fitted(cause)))) for cause in causes]
+    sizes = [text if alone else f"{cause.effect}: {text}" for cause, text in sized if text]
     placed = [(cause, where(cause)) for cause in causes]
     words = [
-        f"{'its place' if len(causes) == 1 else f'the place of {cause.effect}'} {text}"
+        f"{'its place' if alone else f'the place of {cause.effect}'} {text}"
         for cause, text in placed
         if text
     ]
-    return "; ".join([f"probability {percent(probability)}", *words])
+    return "; ".join([*sizes, f"probability {percent(probability)}", *words])
+
+
+def _fitted(cause: Cause) -> list[CauseParameter]:
+    """Return the sizes that were fitted; none where they are too many for a sentence."""
+    fitted = [p for p in cause.parameters if p.std and math.isfinite(p.value + p.std)]
+    return fitted if len(fitted) <= settings.of_a_kind else []
+
+
+def _size(item: CauseParameter) -> str:
+    """Return a fitted size to the second digit of its deviation; a ratio in percent."""
+    ratio = item.wording != "value"
+    value, std = (float(v or 0.0) * (100.0 if ratio else 1.0) for v in (item.value, item.std))
+    last = math.floor(math.log10(std)) - 1
+    if -6 <= last <= 6:
+        digits = max(0, -last)
+        sizes = [f"{round(v, -last):.{digits}f}" for v in (value, std)]
+    else:
+        sizes = [f"{value:.4g}", f"{std:.2g}"]
+    sign = "+" * (item.wording == "change" and value > 0.0)
+    name = item.name.removeprefix("change of ")
+    return f"{name} {sign}{' ± '.join(sizes)} {'%' if ratio else item.unit}".strip()
 
 
 def _either(options: Sequence[Sequence[Cause]], reference: bool) -> str:

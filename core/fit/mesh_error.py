@@ -12,7 +12,7 @@ from femubench.core.fem.frame import Frame, Place, Support
 from femubench.core.fem.model import Model, common_dofs
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import Modes, once_for
-from femubench.core.modal.frequency_changes import SOLVED_LIMIT, elastic_modes, frequency_changes
+from femubench.core.modal.frequency_changes import elastic_modes, frequency_changes
 from femubench.core.typing import FloatArray
 
 _MARGIN = 4
@@ -41,8 +41,8 @@ def refine_mesh(structure: Structure) -> Frame:
 def mesh_bias(model: Model, count: int, modes: Modes | None = None) -> FloatArray | None:
     """Return f_fine / f - 1 of the first elastic modes on a mesh twice as fine, (k,), k <= count.
 
-    Modes are paired by shape. None without a frame or better elements, for a frame beyond 5000
-    dofs, and where the finer mesh cannot be built or solved.
+    Modes are paired by shape. None without a frame or better elements, and where the finer mesh
+    cannot be built or solved.
 
     Arguments:
         model: any model.
@@ -55,7 +55,7 @@ def mesh_bias(model: Model, count: int, modes: Modes | None = None) -> FloatArra
             whole, better = model.finer()
             rows, known = slice(whole.size), elastic_modes(whole, count + _MARGIN)
             return frequency_changes(whole, known, better, count, lambda shapes: shapes[rows])
-    if structure is None or model.size > SOLVED_LIMIT:
+    if structure is None:
         return None
     try:
         coarse = elastic_modes(model, count + _MARGIN) if modes is None else modes

@@ -27,10 +27,12 @@ def modes_for(model: Model) -> Modes:
         ModelError: when the model has no modes.
     """
     if model.size > settings.most_dofs:
+        frame = model.structure is not None
+        fewest = ", with as few elements a member as it can have" if frame else ""
+        draw = "draw members that lie in line as one, or give " if frame else ""
         raise NotApplicable(
-            f"the model has {model.size} degrees of freedom, a diagnosis takes "
-            f"{settings.most_dofs} at most: matrices are reduced where the case names "
-            "[[model.groups]]"
+            f"the model has {model.size} degrees of freedom{fewest}; a diagnosis takes "
+            f"{settings.most_dofs} at most: {draw}matrices with [[model.groups]], which are reduced"
         )
     return once_for(model, "rigid first", lambda: rigid_first(all_modes(model)))
 

@@ -231,11 +231,6 @@ def examine(
     Raises:
         NotApplicable: when a used frequency has no standard deviation.
         ModelError: when the model has no modes.
-
-    Examples:
-        >>> seen = diagnosis.examine(model, measurement, [torsion], tolerance=0.005)
-        >>> seen.best.base.names == (torsion.name,)
-        True
     """
     effort = effort or Effort()
     # Thousands of small matrices: threads would wait for each other most of the time.

@@ -19,6 +19,7 @@ from femubench.core.case.case import SCATTER
 from femubench.core.case.modes import LARGEST_SCALE
 from femubench.core.errors import InputError
 from femubench.core.modal.antiresonances import SAME
+from femubench.core.modal.eigen import ALL_MODES_LIMIT
 from femubench.core.modal.group_prior import KINDS
 
 Kind = Literal["prior", "cost", "decision"]
@@ -386,7 +387,7 @@ class Settings:
     long_step: float = _cost(
         1.5, "prior deviations", "between neighbours on a grid, above which modes change places"
     )
-    most_dofs: int = _cost(2000, "dofs", "all of whose modes are solved for")
+    most_dofs: int = _cost(ALL_MODES_LIMIT, "dofs", "all of whose modes are solved for")
     fewest_elements: int = _cost(4, "elements", "a member, at least, where these are few enough")
     work_of_pieces: tuple[float, ...] = _cost(
         (0.35, 0.018, 1.0, 0.45, 1.0, 0.4, 0.35, 0.3),

@@ -12,7 +12,7 @@ from femubench.core.library.cases import as_list
 from femubench.core.library.rank import read_run
 from femubench.core.plugin.validation import choose_names
 from femubench.core.run.store import Store
-from femubench.core.schema.results import Run
+from femubench.core.schema.results import RunData
 from femubench.core.score.comparison import (
     DEFAULT_THRESHOLDS,
     METRICS,
@@ -26,8 +26,8 @@ _THRESHOLD = re.compile(r"\s*(\w+)\s*>\s*([0-9][0-9.eE+-]*)\s*")
 
 
 def compare(
-    before: Run | str | PathLike[str],
-    after: Run | str | PathLike[str] | None = None,
+    before: RunData | str | PathLike[str],
+    after: RunData | str | PathLike[str] | None = None,
     *,
     strategies: str | Iterable[str] = (),
     against: tuple[str, str] | None = None,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from femubench.core.case.case import Case
+from femubench.core.case.case import LARGEST_TOLERANCE, Case
 from femubench.core.case.writing import write_case
 from femubench.core.diagnosis.diagnose import diagnose as search
 from femubench.core.diagnosis.result import Diagnosis
@@ -100,8 +100,9 @@ def diagnosis_of(
     """
     if budget is not None and not budget >= 0.0:
         raise InputError(f"budget = {budget!r}", expected="seconds >= 0")
-    if tolerance is not None and not 0.0 <= tolerance <= 0.2:
-        raise InputError(f"tolerance = {tolerance!r}", expected="a number >= 0 and <= 0.2")
+    if tolerance is not None and not 0.0 <= tolerance <= LARGEST_TOLERANCE:
+        expected = f"a number >= 0 and <= {LARGEST_TOLERANCE}"
+        raise InputError(f"tolerance = {tolerance!r}", expected=expected)
     wanted = _effects(effects, plugins, others)
     read = one_case(case, plugins)
     if tolerance is not None:

@@ -22,15 +22,15 @@ from femubench.core.publish.publishing import Published, publish as merge
 from femubench.core.publish.rerun import Sample
 from femubench.core.publish.submissions import read_submission
 from femubench.core.publish.verification import verify
-from femubench.core.roles import Strategy
+from femubench.core.roles import StrategyRole
 from femubench.core.schema.records import run_to_json
-from femubench.core.schema.results import Run
+from femubench.core.schema.results import RunData
 from femubench.core.twin.twins import Twin
 
 
 def publish(
     folder: str | PathLike[str],
-    runs: Run | str | PathLike[str] | Iterable[Run | str | PathLike[str]],
+    runs: RunData | str | PathLike[str] | Iterable[RunData | str | PathLike[str]],
     *,
     unverified: bool = False,
     address: str | None = None,
@@ -67,8 +67,8 @@ def publish(
     with TemporaryDirectory() as scratch:
         files = []
         for number, run in enumerate(as_list(runs)):
-            file = Path(scratch, f"{number}.json") if isinstance(run, Run) else Path(str(run))
-            if isinstance(run, Run):
+            file = Path(scratch, f"{number}.json") if isinstance(run, RunData) else Path(str(run))
+            if isinstance(run, RunData):
                 file.write_text(json.dumps(run_to_json(run), allow_nan=False), encoding="utf-8")
             files.append(file)
         return merge(
@@ -108,7 +108,7 @@ class InstalledCases:
         """Return the case of which a name may be that of a drawing."""
         return name if name in self._owners else name.rpartition(DRAWN)[0]
 
-    def strategy(self, name: str) -> Strategy | None:
+    def strategy(self, name: str) -> StrategyRole | None:
         """Return a strategy by its name with its options; None where there is none."""
         known = self._plugins.strategies
         with suppress(InputError):

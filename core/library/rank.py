@@ -21,7 +21,7 @@ from femubench.core.library.cases import CaseLike, as_list, case_words, read_cas
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import check_strategy, choose_names
 from femubench.core.plugin.variants import Variant, label_variant, strategy_of
-from femubench.core.roles import Strategy, list_declared
+from femubench.core.roles import StrategyRole, list_declared
 from femubench.core.run.companions import Companions, choose_companions
 from femubench.core.run.executor import open_executor
 from femubench.core.run.frames import modes_frame, results_frame
@@ -48,7 +48,7 @@ from femubench.core.twin.twins import Twin, twins_of
 if TYPE_CHECKING:
     import pandas as pd
 
-StrategyLike = str | Strategy | type[Strategy]
+StrategyLike = str | StrategyRole | type[StrategyRole]
 DEFAULT_STORE = "femubench-results"
 
 
@@ -71,7 +71,7 @@ class Request(RunOptions):
         return plain
 
 
-def request_of(run: results.Run) -> Request:
+def request_of(run: results.RunData) -> Request:
     """Return what a stored run was asked for.
 
     Raises:
@@ -94,11 +94,11 @@ def request_of(run: results.Run) -> Request:
     return replace(found, timeouts=dict(found.timeouts))
 
 
-class Run(results.Run):
+class Run(results.RunData):
     """All results of one run, with the tables that one looks at."""
 
     @classmethod
-    def of(cls, run: results.Run) -> Run:
+    def of(cls, run: results.RunData) -> Run:
         """Return a run as one that has tables."""
         return cls(run.meta, run.results, run.companions)
 
@@ -255,7 +255,7 @@ def plan_run(
     resumed = store if store is not None and given.get("resume") and store.runs() else None
     if resumed is not None and not words and not wanted:
         return plan_again(
-            _changed(request_of(results.Run(resumed.read_start(), ())), given), plugins
+            _changed(request_of(results.RunData(resumed.read_start(), ())), given), plugins
         )
     found = _strategies(wanted, plugins)
     read = read_cases(cases, plugins, given.get("drawing", ""))
@@ -301,7 +301,7 @@ def plan_again(request: Request, plugins: Plugins) -> Plan:
 def _plan(
     request: Request,
     cases: Sequence[Case],
-    strategies: Sequence[Strategy],
+    strategies: Sequence[StrategyRole],
     plugins: Plugins,
     *,
     repeatable: bool = True,
@@ -381,7 +381,7 @@ def classes_of(plugins: Plugins) -> dict[str, tuple[str, ...]]:
     return {case: scenario.classes for scenario in listed for case in scenario.cases}
 
 
-def _strategies(given: Sequence[object], plugins: Plugins) -> list[Strategy]:
+def _strategies(given: Sequence[object], plugins: Plugins) -> list[StrategyRole]:
     """Return the strategies that are asked for, each once, all where none is given.
 
     Raises:
@@ -402,7 +402,7 @@ def _strategies(given: Sequence[object], plugins: Plugins) -> list[Strategy]:
     return found
 
 
-def name_strategy(given: object, plugins: Plugins) -> Strategy:
+def name_strategy(given: object, plugins: Plugins) -> StrategyRole:
     """Return a strategy under a name that tells its options where they are not the usual ones."""
     strategy = check_strategy(given.base if isinstance(given, Variant) else given)
     usual = plugins.strategies.get(strategy.name)
@@ -420,7 +420,7 @@ def store_in(folder: Store | str | PathLike[str] | None = None) -> Store:
 
 
 def read_run(
-    run: results.Run | str | PathLike[str] | None = None,
+    run: results.RunData | str | PathLike[str] | None = None,
     store: Store | str | PathLike[str] | None = None,
 ) -> Run:
     """Return a run.
@@ -437,7 +437,7 @@ def read_run(
         >>> femubench.read_run(file).leaderboard["gain"].round(2).tolist()
         [0.6, -0.67]
     """
-    if isinstance(run, results.Run):
+    if isinstance(run, results.RunData):
         return Run.of(run)
     if run is not None and os.path.exists(run) and not os.path.isdir(run):
         return Run.of(serial.read_run(Path(run)))

@@ -26,10 +26,10 @@ from femubench.core.reproduction.study import Study, cells_to_json
 from femubench.core.roles import Reporter
 from femubench.core.run.store import Store
 from femubench.core.schema.records import parse_json, run_from_json, to_plain
-from femubench.core.schema.results import Run
+from femubench.core.schema.results import RunData
 from femubench.core.score.comparison import Comparison
 
-Reportable = Run | Diagnosis | Comparison | Study | Sequence[Study]
+Reportable = RunData | Diagnosis | Comparison | Study | Sequence[Study]
 SUFFIXES = {"terminal": ".txt", "markdown": ".md", "html": ".html", "json": ".json"}
 _MOST_BYTES = 64 * 2**20
 _DIAGNOSIS_KEYS = frozenset({"verdict", "causes", "rivals", "smallest_visible"})
@@ -71,7 +71,7 @@ def report(
     elif what is None or isinstance(what, (str, PathLike)):
         kept = store_in(store)
         found = read_run(what, kept)
-    if isinstance(found, Run):
+    if isinstance(found, RunData):
         plugins, name = usable_plugins(), SHORT.get(style or "", style or "terminal")
         if style is None and path is not None:
             writer = reporter_for(plugins, path)
@@ -151,7 +151,7 @@ def reporter(plugins: Plugins, name: str) -> Reporter:
     return plugins.reporters[name]
 
 
-def render_report(found: Reporter, run: Run, exhibits: object = None) -> str | bytes:
+def render_report(found: Reporter, run: RunData, exhibits: object = None) -> str | bytes:
     """Return a reporter's text, or its bytes where the format is no text.
 
     Arguments:
@@ -233,6 +233,6 @@ def reporter_for(plugins: Plugins, path: Path) -> Reporter:
     )
 
 
-def run_name(run: Run) -> str:
+def run_name(run: RunData) -> str:
     """Return the run's id as it may stand in a file name."""
     return re.sub(r"[^A-Za-z0-9._-]+", "-", str(run.meta.get("run", "run"))).strip(".-") or "run"

@@ -17,7 +17,7 @@ from femubench.core.library.rank import Run, classes_of, store_in, textbook_of
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import choose_names, unknown
 from femubench.core.plugin.variants import Variant
-from femubench.core.roles import Strategy
+from femubench.core.roles import StrategyRole
 from femubench.core.run.executor import open_executor
 from femubench.core.run.recording import Progress
 from femubench.core.run.runner import Plan, Receivers
@@ -165,9 +165,11 @@ def study_plan(read: StudyFile, plugins: Plugins) -> StudyPlan:
     return plan
 
 
-def _strategies(read: StudyFile, plugins: Plugins) -> tuple[list[Strategy], dict[str, OptionSet]]:
+def _strategies(
+    read: StudyFile, plugins: Plugins
+) -> tuple[list[StrategyRole], dict[str, OptionSet]]:
     """Return every strategy with every combination of its options, and which one it is."""
-    found: list[Strategy] = []
+    found: list[StrategyRole] = []
     choices: dict[str, OptionSet] = {}
     for number, asked in enumerate(read.tables.strategies):
         with read.at("strategies", number, "name"):

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.linalg as la
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame
@@ -14,12 +13,7 @@ from femubench.core.fem.model import Model
 from femubench.core.fit.mesh_error import mesh_bias
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import Modes
-from femubench.core.modal.frequency_changes import (
-    SOLVED_LIMIT,
-    elastic_modes,
-    frequency_changes,
-    match_rows,
-)
+from femubench.core.modal.frequency_changes import elastic_modes, frequency_changes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import Pairing, pair_measured
 from femubench.core.schema.diagnosis import LookWarning
@@ -95,24 +89,16 @@ class Seen:
     def changes(self, frame: Frame) -> FloatArray | None:
         """Return the relative changes of the first `count` frequencies in another frame, (count,).
 
-        None where the frame cannot be built or solved, or has other dofs. Models beyond 5000
-        dofs are not solved anew: the other matrices are reduced to the modes at hand.
+        None where the frame cannot be built or solved, or has other dofs.
         """
         structure = self.model.frame_structure
         try:
             other = Model.of(structure.rebuilt(frame))
             if other.size != self.model.size:
                 return None
-            if self.large:
-                return self._ritz(other)
             return frequency_changes(self.model, self.modes, other, self.count)
         except ModelError:
             return None
-
-    @property
-    def large(self) -> bool:
-        """Tell whether the model is too large for another one to be solved as well."""
-        return self.model.size > SOLVED_LIMIT
 
     def notable(self, effect: str, what: str, changes: FloatArray | None) -> list[LookWarning]:
         """Return a warning about the whole structure where some mode changes notably; else none.
@@ -141,16 +127,6 @@ class Seen:
             where: members, by comma, or ``all``.
         """
         return LookWarning(what, where, effect, () if changes is None else percent(changes))
-
-    def _ritz(self, other: Model) -> FloatArray:
-        """Return the changes by Rayleigh and Ritz in the space of the modes at hand."""
-        shapes = self.modes.shapes
-        stiffness = shapes.T @ other.stiffness_times(shapes)
-        mass = shapes.T @ other.mass_times(shapes)
-        values, turn = la.eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
-        partner = match_rows(np.square(turn))[: self.count]
-        ratio = values[partner] / self.modes.eigenvalues[: self.count]
-        return np.asarray(np.sqrt(np.maximum(ratio, 0.0)) - 1.0)
 
     def exceeds(self, changes: FloatArray, least: float, deviations: float) -> bool:
         """Tell whether any mode changes by more than a share, or than so many deviations."""

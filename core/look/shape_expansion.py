@@ -98,16 +98,11 @@ class _Solver:
         self.shifted = ShiftedModel(model, eigenvalue)
 
     def __call__(self, right: FloatArray) -> FloatArray:
-        answer = np.empty(right.shape)
-        # A few columns at once: of a large model each array is as large as the factors.
-        most = settings.block // 32
-        for first in range(0, right.shape[1], most):
-            own = slice(first, first + most)
-            near = self.shifted.solve(right[:, own])
-            left = right[:, own] - self.model.stiffness_times(near)
-            left += self.eigenvalue * self.model.mass_times(near)
-            answer[:, own] = near + self.shifted.solve(left)
-        return answer
+        near = self.shifted.solve(right)
+        left = (
+            right - self.model.stiffness_times(near) + self.eigenvalue * self.model.mass_times(near)
+        )
+        return near + self.shifted.solve(left)
 
 
 def _discrepancy(values: FloatArray, parts: FloatArray) -> float:

@@ -24,6 +24,7 @@ from femubench.core.modal.sparse_eigen import lowest_eigenpairs
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 DENSE_LIMIT = 500
+ALL_MODES_LIMIT = 2000  # dofs: up to here a basis takes as long as what it saves
 _FEW_FROM, _FEW_SHARE = 250, 6  # dofs, and dofs a mode, above which a few modes are solved alone
 _MANY = 20  # modes of a large model, where nobody says how many
 _RIGID_SHARE = 0.9

@@ -14,7 +14,6 @@ from femubench.core.typing import FloatArray, IntArray
 
 _MARGIN = 4  # modes beyond those wanted, so that a pair may cross the end of the list
 _RIGID = 6
-SOLVED_LIMIT = 5000  # dofs up to which another model is solved anew
 
 
 def elastic_modes(model: Model, count: int) -> Modes:

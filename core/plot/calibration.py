@@ -9,7 +9,7 @@ import numpy as np
 
 from femubench.core.errors import InputError
 from femubench.core.plot.style import SOFT, check_kind, draw_curves, name_of, own_axes
-from femubench.core.schema.results import Run
+from femubench.core.schema.results import RunData
 from femubench.core.score.bounded_gain import MeasuredModes, Rule
 from femubench.core.score.predictive import Forecasts
 from femubench.core.typing import FloatArray
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _LEVELS = np.linspace(0.0, 0.99, 100)
 
 
-def calibration(run: Run, *, ax: Axes | None = None) -> Axes:
+def calibration(run: RunData, *, ax: Axes | None = None) -> Axes:
     """Draw the coverage of central intervals of every level, a line a strategy with uncertainty.
 
     Over the unseen modes of all jobs that are ok and make the ranks, every structure with the same
@@ -39,7 +39,7 @@ def calibration(run: Run, *, ax: Axes | None = None) -> Axes:
         >>> plot.calibration(femubench.rank(case, [Bayesian()])).get_xlabel()
         'level of the interval'
     """
-    check_kind(run, (Run,), "strategies")
+    check_kind(run, (RunData,), "strategies")
     structures = run.structures
     reached: dict[str, dict[str, list[FloatArray]]] = defaultdict(lambda: defaultdict(list))
     for result in (result for result in run.ranked if result.status == "ok"):

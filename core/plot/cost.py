@@ -8,7 +8,7 @@ import numpy as np
 
 from femubench.core.errors import InputError
 from femubench.core.plot.style import BEFORE, BLUE, INK, check_kind, own_axes, place_names
-from femubench.core.schema.results import Run
+from femubench.core.schema.results import RunData
 from femubench.core.score.leaderboard import leaderboard
 
 if TYPE_CHECKING:
@@ -22,7 +22,9 @@ _LABELS = {
 }
 
 
-def error_against_cost(run: Run, *, error: str = "error_percent", ax: Axes | None = None) -> Axes:
+def error_against_cost(
+    run: RunData, *, error: str = "error_percent", ax: Axes | None = None
+) -> Axes:
     """Draw every strategy of a run by error and wall time, medians over the cases.
 
     Hollow squares are models that lost rigid-body modes or have negative eigenvalues.
@@ -40,7 +42,7 @@ def error_against_cost(run: Run, *, error: str = "error_percent", ax: Axes | Non
         >>> plot.error_against_cost(run).get_xlabel()
         'wall time of the strategy, s (median over cases)'
     """
-    check_kind(run, (Run,), "strategies")
+    check_kind(run, (RunData,), "strategies")
     if error not in _LABELS:
         raise InputError(f"there is no error {error!r}", expected=", ".join(_LABELS))
     board = leaderboard(run)

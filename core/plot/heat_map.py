@@ -9,7 +9,7 @@ import numpy as np
 
 from femubench.core.errors import InputError
 from femubench.core.plot.style import INK, SOFT, check_kind, figure_of, name_of, own_axes
-from femubench.core.schema.results import Run
+from femubench.core.schema.results import RunData
 from femubench.core.study.axes import StudyAxes, Value
 from femubench.core.study.gain import gain_by
 from femubench.core.typing import FloatArray
@@ -26,7 +26,7 @@ _GREY = "0.85"
 
 
 def heat_map(
-    run: Run, x: str | None = None, y: str | None = None, *, ax: Axes | None = None
+    run: RunData, x: str | None = None, y: str | None = None, *, ax: Axes | None = None
 ) -> Axes:
     """Draw the gain of every cell, blue above the textbook model and red below it.
 
@@ -48,7 +48,7 @@ def heat_map(
         >>> plot.heat_map(run, "strategy", "case").get_xlabel()
         'strategy'
     """
-    check_kind(run, (Run,), "gain by axes")
+    check_kind(run, (RunData,), "gain by axes")
     known = StudyAxes.of(run)
     usual = [name for name in known.pictured if name not in (x, y)]
     x = x or usual.pop(0)

@@ -11,7 +11,7 @@ import numpy as np
 
 from femubench.core.errors import InputError
 from femubench.core.plot.style import AFTER, INK, SOFT, check_kind, curve_style, name_of, own_axes
-from femubench.core.schema.results import JobResult, Run
+from femubench.core.schema.results import JobResult, RunData
 from femubench.core.update.strategy import UpdateResult
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ _COUNTS = frozenset({"iteration", "step"})  # which say what is the axis anyway
 
 
 def convergence(
-    source: UpdateResult | JobResult | Run,
+    source: UpdateResult | JobResult | RunData,
     *,
     quantity: str | None = None,
     case: str | None = None,
@@ -45,9 +45,9 @@ def convergence(
         >>> plot.convergence(result).get_xlabel()
         'iteration'
     """
-    check_kind(source, (UpdateResult, JobResult, Run), "iterations")
-    whole = isinstance(source, Run)
-    histories = _histories(source, case) if isinstance(source, Run) else {"": source.history}
+    check_kind(source, (UpdateResult, JobResult, RunData), "iterations")
+    whole = isinstance(source, RunData)
+    histories = _histories(source, case) if isinstance(source, RunData) else {"": source.history}
     counts = Counter(
         key for history in histories.values() for key in (history or [{}])[0] if key not in _COUNTS
     )
@@ -80,7 +80,7 @@ def convergence(
     return ax
 
 
-def _histories(run: Run, case: str | None) -> dict[str, History]:
+def _histories(run: RunData, case: str | None) -> dict[str, History]:
     """Return the history of every strategy that iterated on one case, first seed."""
     cases = list(dict.fromkeys(result.case for result in run.results))
     if case is not None and case not in cases:

@@ -23,7 +23,7 @@ from femubench.core.plugin.validation import CHECKS, check_name
 from femubench.core.roles import Scenario
 
 if TYPE_CHECKING:
-    from femubench.core.schema.results import Run
+    from femubench.core.schema.results import RunData
 
 # What answers a question in a process of its own.
 _VARY = "femubench.core.plugin.describing:describe_variant"
@@ -224,11 +224,11 @@ def _loaded(handle: Handle) -> Any:  # noqa: ANN401 - as the kind has it
 class ForeignReporter(_Offered):
     """A reporter of a third party, whose text is written in a process of its own."""
 
-    def render(self, run: Run) -> Any:  # noqa: ANN401 - checked by who asks for it
+    def render(self, run: RunData) -> Any:  # noqa: ANN401 - checked by who asks for it
         """Return the report."""
         return self._call("render", run)
 
-    def _call(self, way: str, run: Run, exhibits: Any = None) -> Any:  # noqa: ANN401
+    def _call(self, way: str, run: RunData, exhibits: Any = None) -> Any:  # noqa: ANN401
         from femubench.core.schema.records import run_to_json
 
         store = None if exhibits is None else str(exhibits.store.absolute())

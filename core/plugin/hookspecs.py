@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 from femubench.core.plugin.markers import hookspec
 
 if TYPE_CHECKING:
-    from femubench.core.roles import Effect, Fault, Paper, Reader, Reporter, Scenario, Strategy
+    from femubench.core.roles import Effect, Fault, Paper, Reader, Reporter, Scenario, StrategyRole
 
 # Hook specifications have no body: pluggy reads their signature alone.
 # mypy: disable-error-code="empty-body"
 
 
 @hookspec
-def femubench_strategies() -> Iterable[Strategy | type[Strategy]]:
+def femubench_strategies() -> Iterable[StrategyRole | type[StrategyRole]]:
     """Return the plugin's updating strategies, as classes or instances."""
 
 

@@ -29,7 +29,7 @@ from femubench.core.plugin.importing import (
 )
 from femubench.core.plugin.markers import PROJECT
 from femubench.core.plugin.validation import CHECKS, choose_names
-from femubench.core.roles import Effect, Fault, Paper, Reader, Reporter, Scenario, Strategy
+from femubench.core.roles import Effect, Fault, Paper, Reader, Reporter, Scenario, StrategyRole
 from femubench.core.source_files import stamps
 from femubench.core.version import __version__
 
@@ -65,7 +65,7 @@ def show_entry(offers: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401 - a
 class Plugins:
     """Everything that plugins offer, by name, and what is broken."""
 
-    strategies: Mapping[str, Strategy] = field(default_factory=dict)
+    strategies: Mapping[str, StrategyRole] = field(default_factory=dict)
     scenarios: Mapping[str, Scenario] = field(default_factory=dict)
     effects: Mapping[str, Effect] = field(default_factory=dict)
     faults: Mapping[str, Fault] = field(default_factory=dict)

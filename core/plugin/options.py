@@ -8,7 +8,7 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 from femubench.core.errors import InputError
-from femubench.core.roles import Strategy
+from femubench.core.roles import StrategyRole
 
 SIMPLE = (bool, int, float, str, type(None))
 
@@ -47,7 +47,7 @@ def options_of(strategy: object) -> dict[str, Any]:
     return simple
 
 
-def with_options(base: Strategy, options: Mapping[str, object]) -> Strategy:
+def with_options(base: StrategyRole, options: Mapping[str, object]) -> StrategyRole:
     """Return a strategy with options set by their full names.
 
     Raises:
@@ -55,7 +55,7 @@ def with_options(base: Strategy, options: Mapping[str, object]) -> Strategy:
     """
     if isinstance(base, StatedOptions):
         whole: Any = base
-        found: Strategy = whole.with_options(options) if options else whole
+        found: StrategyRole = whole.with_options(options) if options else whole
         return found
     changed = base
     for key, value in options.items():

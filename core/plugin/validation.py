@@ -18,7 +18,7 @@ from femubench.core.roles import (
     Reader,
     Reporter,
     Scenario,
-    Strategy,
+    StrategyRole,
     list_declared,
 )
 
@@ -27,13 +27,13 @@ _WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
 _GROUPED = re.compile(rf"({_WORD.pattern}/)?{_WORD.pattern}")
 
 
-def check_strategy(offered: object) -> Strategy:
+def check_strategy(offered: object) -> StrategyRole:
     """Return an instance of a strategy class or the instance itself.
 
     Raises:
         PluginError: when it has no update(), name or citation, or needs the unknown.
     """
-    strategy: Strategy = _filled(offered, "Strategy", "update")
+    strategy: StrategyRole = _filled(offered, "Strategy", "update")
     if not _is_text(getattr(strategy, "citation", None)):
         raise PluginError(f"{_label(offered)}: citation is missing (author, year, title, equation)")
     needs: object = list_declared(strategy, "needs")

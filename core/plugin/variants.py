@@ -15,7 +15,7 @@ from typing import Any, cast
 from femubench.core.errors import InputError
 from femubench.core.plugin.options import SIMPLE, StatedOptions, entry_of, options_of, with_options
 from femubench.core.plugin.validation import did_you_mean
-from femubench.core.roles import Strategy, list_declared
+from femubench.core.roles import StrategyRole, list_declared
 
 _UNKNOWN = object()
 
@@ -29,7 +29,7 @@ class Variant:
         name: ``strategy:option=value,...``.
     """
 
-    base: Strategy
+    base: StrategyRole
     name: str
 
     @property
@@ -63,7 +63,7 @@ class Variant:
         return label_variant(_changed(self.base, options), self.base)
 
 
-def strategy_of(words: str, strategies: Mapping[str, Strategy]) -> Strategy:
+def strategy_of(words: str, strategies: Mapping[str, StrategyRole]) -> StrategyRole:
     """Return a strategy by its name, with the options that follow a colon.
 
     Arguments:
@@ -84,7 +84,7 @@ def strategy_of(words: str, strategies: Mapping[str, Strategy]) -> Strategy:
     return Variant(_changed(base, {key.strip(): _Typed(text) for key, _, text in pairs}), words)
 
 
-def label_variant(strategy: Strategy, default: Strategy | None = None) -> Variant:
+def label_variant(strategy: StrategyRole, default: StrategyRole | None = None) -> Variant:
     """Return a strategy under its name and the options that are not the default ones.
 
     Arguments:
@@ -106,7 +106,7 @@ def label_variant(strategy: Strategy, default: Strategy | None = None) -> Varian
     return Variant(strategy, strategy.name + (f":{','.join(words)}" if words else ""))
 
 
-def _settings(strategy: Strategy) -> dict[str, Any]:
+def _settings(strategy: StrategyRole) -> dict[str, Any]:
     """Return options, or where they are none of a dataclass the attributes of an instance."""
     own = getattr(strategy, "__dict__", {}) if not is_dataclass(strategy) else {}
     return options_of(strategy) or {
@@ -120,7 +120,7 @@ class _Typed(str):
     """An option as it was typed, not yet a value."""
 
 
-def _changed(base: Strategy, options: Mapping[str, object]) -> Strategy:
+def _changed(base: StrategyRole, options: Mapping[str, object]) -> StrategyRole:
     """Return a strategy with options set by name.
 
     Raises:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from femubench.core.publish.agreement import Outcome, Scales
-from femubench.core.schema.results import BLOCKS, DONE, JobResult, Run, origins_of
+from femubench.core.schema.results import BLOCKS, DONE, JobResult, RunData, origins_of
 from femubench.core.score.bounded_gain import Rule
 from femubench.core.score.leaderboard import list_rows, row_of
 from femubench.core.score.ranking import Scale, list_models
@@ -107,7 +107,7 @@ def gain_on(
                    counted, ground)  # fmt: skip
 
 
-def run_on(ground: Scope, counted: Mapping[str, Mapping[str, Sequence[Outcome]]]) -> Run:
+def run_on(ground: Scope, counted: Mapping[str, Mapping[str, Sequence[Outcome]]]) -> RunData:
     """Return what counts of several runs as one, in which the draws of a case are averaged."""
     results, companions = [], {}
     twins: dict[str, dict[str, Any]] = {"of": {}, "kinds": {}, "models": {}}
@@ -138,7 +138,7 @@ def run_on(ground: Scope, counted: Mapping[str, Mapping[str, Sequence[Outcome]]]
         "yardsticks": ground.yardsticks,
         **({"twins": twins} if companions else {}),
     }
-    return Run(meta, tuple(results), tuple(companions.values()))
+    return RunData(meta, tuple(results), tuple(companions.values()))
 
 
 def on_case(findings: Sequence[Outcome], scale: Scale) -> dict[str, Any]:

@@ -13,12 +13,12 @@ from femubench.core.case.case import Case
 from femubench.core.display import count_noun
 from femubench.core.errors import InputError
 from femubench.core.publish.agreement import NO_RESULT, agree
-from femubench.core.roles import Strategy
+from femubench.core.roles import StrategyRole
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.provenance import strategy_version
 from femubench.core.run.runner import Plan
 from femubench.core.run.starts import Starts
-from femubench.core.schema.results import Run
+from femubench.core.schema.results import RunData
 from femubench.core.schema.run_options import RunOptions
 from femubench.core.version import __version__
 
@@ -35,12 +35,12 @@ class Sample:
     """
 
     number: int
-    strategy: Callable[[str], Strategy | None]
+    strategy: Callable[[str], StrategyRole | None]
     tell: Callable[[str], None]
     seed: int = field(default_factory=lambda: secrets.randbelow(2**31))
 
     def check(
-        self, run: Run, cases: Mapping[str, Case], textbooks: Mapping[str, Case], file: Path
+        self, run: RunData, cases: Mapping[str, Case], textbooks: Mapping[str, Case], file: Path
     ) -> None:
         """Run jobs of strategies again that are installed in the same version, of this femubench.
 

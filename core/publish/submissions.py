@@ -24,7 +24,7 @@ from femubench.core.schema.records import (
     run_from_json,
     to_plain,
 )
-from femubench.core.schema.results import JobResult, Nominal, Run
+from femubench.core.schema.results import JobResult, Nominal, RunData
 from femubench.core.schema.validation import read_plain
 from femubench.core.score.bounded_gain import Rule
 from femubench.core.score.ranking import rank_results
@@ -41,7 +41,7 @@ _Digest = Annotated[str, Meta(min_length=1, max_length=200)]
 _Line = Annotated[str, Meta(max_length=LONGEST_LINE)]
 # Raises InputError for a run, given with the content of its file, that does not stand the checks;
 # tells whether its errors were computed again from its answers.
-Verify = Callable[[Run, Mapping[str, Any], Path], bool]
+Verify = Callable[[RunData, Mapping[str, Any], Path], bool]
 Proof = Literal["unverified", "stated", "recomputed"]
 _OF_CHECKED = ("plan", "sandbox", "twins")  # meta data of checked runs alone
 
@@ -119,7 +119,7 @@ class Submission:
             ``recomputed`` where their errors were computed again from these.
     """
 
-    run: Run
+    run: RunData
     text: str
     name: str
     proof: Proof = "unverified"
@@ -199,7 +199,7 @@ def _records(results: Iterable[JobResult]) -> list[dict[str, Any]]:
     return [{**result_to_json(item), **dropped} for item in order]
 
 
-def _meta(run: Run, file: Path) -> dict[str, Any]:
+def _meta(run: RunData, file: Path) -> dict[str, Any]:
     # Without halves of characters, which no file could hold.
     record = read_plain(_Meta, to_plain(run.meta), file=file, key="meta")
     data: dict[str, Any] = to_plain(record)

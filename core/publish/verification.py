@@ -21,7 +21,7 @@ from femubench.core.run.executor import count_workers
 from femubench.core.run.handed_in import judge_answers, name_answers
 from femubench.core.run.provenance import plan_digest
 from femubench.core.schema.records import Models
-from femubench.core.schema.results import BLOCKS, JobResult, Run
+from femubench.core.schema.results import BLOCKS, JobResult, RunData
 from femubench.core.score.bounded_gain import Rule
 from femubench.core.score.leaderboard import list_rows
 from femubench.core.score.ranking import Scale, rank_results
@@ -78,7 +78,12 @@ class _Known:
 
 
 def verify(
-    run: Run, data: Mapping[str, Any], file: Path, *, installed: Installed, sample: Sample | None
+    run: RunData,
+    data: Mapping[str, Any],
+    file: Path,
+    *,
+    installed: Installed,
+    sample: Sample | None,
 ) -> bool:
     """Check everything that a run says; tell whether its errors were computed again.
 
@@ -147,7 +152,9 @@ def verify(
     return True
 
 
-def _recompute(run: Run, listed: Sequence[Case], textbooks: Mapping[str, Case], file: Path) -> None:
+def _recompute(
+    run: RunData, listed: Sequence[Case], textbooks: Mapping[str, Case], file: Path
+) -> None:
     """Judge the answers of a run anew, and compare what it says of them."""
     judged = judge_answers(listed, [name_answers(file)], textbooks, count_workers(None), "both")
     found = {(r.case, r.strategy, r.seed, r.nominal): r for r in judged.results}
@@ -180,7 +187,7 @@ def _refuse(file: Path, what: str, key: str, expected: str) -> NoReturn:
     raise InputError(what, file=file, key=key, expected=expected)
 
 
-def _own_cases(run: Run, installed: Installed, file: Path) -> dict[str, Case]:
+def _own_cases(run: RunData, installed: Installed, file: Path) -> dict[str, Case]:
     """Return the cases of a run as they are installed here, which they have to equal."""
     found = {}
     for name, entry in run.meta["cases"].items():
@@ -205,7 +212,7 @@ def _own_cases(run: Run, installed: Installed, file: Path) -> dict[str, Case]:
 
 
 def _own_twins(
-    run: Run, cases: Sequence[Case], installed: Installed, file: Path
+    run: RunData, cases: Sequence[Case], installed: Installed, file: Path
 ) -> dict[str, Case]:
     """Return the twins of a run, drawn again from its seed."""
     twins = run.meta.get("twins")
@@ -234,7 +241,7 @@ def _own_twins(
     return dict(drawn)
 
 
-def _check_complete(run: Run, file: Path) -> None:
+def _check_complete(run: RunData, file: Path) -> None:
     """Check that every job is there, once: nobody leaves out what did not go well."""
     meta = run.meta
     jobs = {(r.case, r.nominal, r.strategy, r.seed) for r in chain(run.results, run.companions)}
@@ -292,7 +299,7 @@ def _check_result(result: JobResult, known: _Known, file: Path, key: str) -> Non
             _refuse(file, f"gain {result.gain:.6g}, its modes give another", f"{key}.gain", _AGAIN)
 
 
-def _check_board(run: Run, board: object, file: Path) -> None:
+def _check_board(run: RunData, board: object, file: Path) -> None:
     """Check the gains of the leaderboard that comes with a run, where one does."""
     if board is None:
         return

@@ -9,7 +9,7 @@ import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.plugin.variants import strategy_of
-from femubench.core.roles import Strategy
+from femubench.core.roles import StrategyRole
 from femubench.core.update.strategy import UpdateResult
 
 
@@ -23,7 +23,7 @@ class Workbench:
         on_advance: called after each update that had to be computed.
     """
 
-    strategies: Mapping[str, Strategy]
+    strategies: Mapping[str, StrategyRole]
     cases: Mapping[str, Case]
     on_advance: Callable[[], None] = lambda: None
     _done: dict[tuple[str, str], UpdateResult] = field(default_factory=dict, repr=False)

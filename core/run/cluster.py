@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 from femubench.core.child.sandbox import OFF, Enclosure, enclosure
 from femubench.core.display import count_noun
 from femubench.core.errors import FemubenchError, InputError, require
-from femubench.core.roles import Strategy
+from femubench.core.roles import StrategyRole
 from femubench.core.run.cluster_worker import (
     Demand,
     Errand,
@@ -85,7 +85,7 @@ class DaskWorkers:
         """Return the number of jobs at a time, and where."""
         return f"{count_noun(self.workers, 'worker')} of {self._where}"
 
-    def admit(self, strategies: Sequence[Strategy], memory: int | None) -> None:
+    def admit(self, strategies: Sequence[StrategyRole], memory: int | None) -> None:
         """Make sure that every worker has the versions that are here, and enough memory and cores.
 
         Raises:

@@ -12,7 +12,7 @@ from femubench.core.child.limits import memory_share
 from femubench.core.child.sandbox import Enclosure, enclosure
 from femubench.core.display import count_noun
 from femubench.core.errors import InputError, require
-from femubench.core.roles import Strategy
+from femubench.core.roles import StrategyRole
 from femubench.core.run.schedule import Workload, compute_jobs
 from femubench.core.schema.results import JobResult
 from femubench.core.schema.run_options import Sandbox, Where
@@ -54,7 +54,7 @@ class LocalProcesses:
         """
         return enclosure(self.sandbox)
 
-    def admit(self, strategies: Sequence[Strategy], memory: int | None) -> None:
+    def admit(self, strategies: Sequence[StrategyRole], memory: int | None) -> None:
         """Find nothing to object to: the workers are copies of this process."""
 
     def compute(self, workload: Workload, wanted: Iterable[int]) -> Iterator[tuple[int, JobResult]]:

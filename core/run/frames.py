@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from msgspec import to_builtins
 
-from femubench.core.schema.results import BLOCKS, Run
+from femubench.core.schema.results import BLOCKS, RunData
 from femubench.core.score.scoring import frequency_error
 from femubench.core.study.axes import StudyAxes
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def results_frame(run: Run) -> pd.DataFrame:
+def results_frame(run: RunData) -> pd.DataFrame:
     """Return one row a job: status, errors by block, counts, gain and rank; see `Run.table`."""
     import pandas as pd
 
@@ -36,7 +36,7 @@ def results_frame(run: Run) -> pd.DataFrame:
     return frame.astype({**whole, **dict.fromkeys(_FLOATS, "float64")})
 
 
-def modes_frame(run: Run) -> pd.DataFrame:
+def modes_frame(run: RunData) -> pd.DataFrame:
     """Return one row a measured mode of every job that is ok; see `Run.modes`."""
     import pandas as pd
 

@@ -23,7 +23,7 @@ from femubench.core.run.runner import Plan
 from femubench.core.run.schedule import Answers
 from femubench.core.run.starts import Starts
 from femubench.core.schema.bounds import Name, Text, Whole
-from femubench.core.schema.results import JobName, Nominal, Run
+from femubench.core.schema.results import JobName, Nominal, RunData
 from femubench.core.schema.run_options import RunOptions, StartModels
 
 _LARGEST = 1024 * MIB  # bytes of all answers of a file
@@ -57,7 +57,7 @@ def name_answers(file: Path) -> Path:
     return file.with_suffix(".answers")
 
 
-def count_unanswered(run: Run, answers: Answers) -> int:
+def count_unanswered(run: RunData, answers: Answers) -> int:
     """Return how many models of a run are not among some answers, as of results from a store."""
     listed = chain(run.results, run.companions)
     return sum(
@@ -65,7 +65,7 @@ def count_unanswered(run: Run, answers: Answers) -> int:
     )
 
 
-def write_answers(file: Path, run: Run, answers: Answers) -> None:
+def write_answers(file: Path, run: RunData, answers: Answers) -> None:
     """Write the answers of a run."""
     about = [run.meta.get(key) or {} for key in ("citations", "yardsticks")]
     strategies = [
@@ -106,7 +106,7 @@ def judge_answers(
     textbooks: Mapping[str, Case],
     jobs: int,
     nominal: StartModels = "textbook",
-) -> Run:
+) -> RunData:
     """Return the run of all strategies in files of answers, judged on cases with all their data.
 
     Nothing of a strategy runs, and nothing that a file says of errors counts: an answer is a model.

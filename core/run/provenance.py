@@ -23,7 +23,7 @@ from femubench.core.modal.questions import question_measurement
 from femubench.core.plugin.distribution import about
 from femubench.core.plugin.foreign import ForeignStrategy
 from femubench.core.plugin.variants import Variant
-from femubench.core.roles import Strategy
+from femubench.core.roles import StrategyRole
 from femubench.core.score.bounded_gain import Rule
 from femubench.core.score.scoring import Reference
 from femubench.core.source_files import Stamp, stamp, stamps
@@ -55,7 +55,7 @@ def _hash(*parts: str) -> str:
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
 
-def strategy_version(strategy: Strategy) -> str:
+def strategy_version(strategy: StrategyRole) -> str:
     """Return the version of the package that a strategy comes from, and a digest of its source.
 
     The digest is there because a package in the making changes and keeps its number.
@@ -69,7 +69,7 @@ def strategy_version(strategy: Strategy) -> str:
     return f"{_number(top)}+{source_digest(top, module)}"
 
 
-def about_of(strategy: Strategy) -> dict[str, str]:
+def about_of(strategy: StrategyRole) -> dict[str, str]:
     """Return what the package of a strategy says of it; of one given by hand, its DOI alone."""
     inner = strategy.base if isinstance(strategy, Variant) else strategy
     if isinstance(inner, ForeignStrategy):
@@ -77,12 +77,12 @@ def about_of(strategy: Strategy) -> dict[str, str]:
     return about(_OWN if comes_along(strategy) else "", getattr(inner, "doi", ""))
 
 
-def comes_along(strategy: Strategy) -> bool:
+def comes_along(strategy: StrategyRole) -> bool:
     """Tell whether a strategy is one of those that come with femubench."""
     return home_of(strategy)[0] == _OWN
 
 
-def home_of(strategy: Strategy) -> tuple[str, str]:
+def home_of(strategy: StrategyRole) -> tuple[str, str]:
     """Return the package and the module of a strategy."""
     inner = strategy.base if isinstance(strategy, Variant) else strategy
     if isinstance(inner, ForeignStrategy):
@@ -189,7 +189,7 @@ def new_run_id() -> str:
 
 def run_meta(
     cases: Sequence[Case],
-    strategies: Sequence[Strategy],
+    strategies: Sequence[StrategyRole],
     references: Mapping[str, Reference],
     seeds: Sequence[int],
     settings: Mapping[str, Any],

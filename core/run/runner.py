@@ -16,7 +16,7 @@ from femubench.core.child.limits import Limits
 from femubench.core.errors import InputError
 from femubench.core.files import make_folder
 from femubench.core.pace import OnAdvance
-from femubench.core.roles import Strategy
+from femubench.core.roles import StrategyRole
 from femubench.core.run.executor import Executor
 from femubench.core.run.provenance import home_of, plan_digest, run_meta
 from femubench.core.run.recording import Progress, Results, begin_run, record_end
@@ -25,7 +25,7 @@ from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Starts
 from femubench.core.run.stopping import stopping
 from femubench.core.run.store import Store
-from femubench.core.schema.results import JobName, Run, origins_of
+from femubench.core.schema.results import JobName, RunData, origins_of
 from femubench.core.schema.run_options import RunOptions
 from femubench.core.score.ranking import list_models, rank_results
 from femubench.core.score.repeatability import unsteady
@@ -61,7 +61,7 @@ class Plan:
     """
 
     cases: Sequence[Case]
-    strategies: Sequence[Strategy]
+    strategies: Sequence[StrategyRole]
     options: RunOptions = field(default_factory=RunOptions)
     starts: Starts = field(default_factory=Starts)
     request: Mapping[str, Any] = field(default_factory=dict)
@@ -82,7 +82,7 @@ class Plan:
         executor: Executor,
         receivers: Receivers = Receivers(),
         answers: Answers | None = None,
-    ) -> Run:
+    ) -> RunData:
         """Run the jobs, each in a process of its own.
 
         Ctrl-C lets the jobs that run come to their end, once more stops them; what is done is kept.
@@ -127,7 +127,7 @@ class Plan:
                 results.add(*one)
             others, done = origins_of(meta), results.in_order()
             ranked = rank_results([r for r in done if r.case not in others], meta)
-            found = Run(meta, ranked, tuple(result for result in done if result.case in others))
+            found = RunData(meta, ranked, tuple(result for result in done if result.case in others))
             if origins_of(meta, "again"):
                 ending["unsteady"] = unsteady(found)
         return replace(found, meta={**meta, **ending})
@@ -160,7 +160,7 @@ class Plan:
         return found
 
 
-def _check_names(**given: Sequence[Case] | Sequence[Strategy]) -> None:
+def _check_names(**given: Sequence[Case] | Sequence[StrategyRole]) -> None:
     for kind, things in given.items():
         names = [thing.name for thing in things]
         twice = sorted({name for name in names if names.count(name) > 1})

@@ -13,7 +13,7 @@ from functools import lru_cache, partial
 from typing import Any, overload
 
 from femubench.core.case.case import Case
-from femubench.core.roles import Strategy
+from femubench.core.roles import StrategyRole
 from femubench.core.run.jobs import Job, JobOutcome, one_line, pickle_strategy, seed_words
 from femubench.core.run.provenance import comes_along, job_key, provenance, strategy_version
 from femubench.core.schema.results import JobName, Nominal
@@ -124,7 +124,7 @@ class Slots(Sequence[Slot]):
     def __init__(
         self,
         starts: Iterable[tuple[Nominal, Case]],
-        strategies: Sequence[Strategy],
+        strategies: Sequence[StrategyRole],
         seeds: Sequence[int],
     ) -> None:
         self.starts = [Start(*start) for start in starts]
@@ -184,7 +184,7 @@ class _Lately:
         return self._found
 
 
-def _identity(strategy: Strategy, code: bytes | JobOutcome) -> bytes:
+def _identity(strategy: StrategyRole, code: bytes | JobOutcome) -> bytes:
     """Return bytes that tell a strategy and its options from others, in this session and later.
 
     What was typed into a notebook has no file whose digest would tell a later version apart:

@@ -31,7 +31,7 @@ from femubench.core.schema.results import (
     NOMINALS,
     JobName,
     JobResult,
-    Run,
+    RunData,
     origins_of,
 )
 from femubench.core.score.ranking import Scale, rate_results
@@ -141,7 +141,7 @@ class Store:
         return tuple(self._starts())
 
     @pause_collection()
-    def load(self, run_id: str | None = None) -> Run:
+    def load(self, run_id: str | None = None) -> RunData:
         """Return a run with gains and ranks, its results in the order of its jobs.
 
         What is damaged is left out; ``meta["notes"]`` say so, and which jobs have no result. A run
@@ -172,7 +172,7 @@ class Store:
         notes = [*(known if isinstance(known, list) else []), *notes_of(faults, self.folder)]
         notes += [missing] if missing else []
         rate_results(listed, Scale.of(meta))
-        return Run({**meta, "notes": notes}, tuple(listed), companions)
+        return RunData({**meta, "notes": notes}, tuple(listed), companions)
 
     @pause_collection()
     def by_key(self) -> dict[str, JobResult]:

@@ -14,7 +14,7 @@ from msgspec import Meta, Struct
 from femubench.core.errors import InputError
 from femubench.core.files import MIB, read_text
 from femubench.core.schema.bounds import Name, Percent, Text, Whole, read_rule_number
-from femubench.core.schema.results import BLOCKS, NOMINALS, Blocks, JobResult, Nominal, Run
+from femubench.core.schema.results import BLOCKS, NOMINALS, Blocks, JobResult, Nominal, RunData
 from femubench.core.schema.validation import read_plain
 
 LARGEST_RUN = 256 * MIB  # bytes of a file of `bench run --json`
@@ -83,7 +83,7 @@ class _MetaRecord(Struct):
     rule: dict[Name, str | float] | None = None
 
 
-def check_depth(data: object, what: str, **where: Any) -> None:  # noqa: ANN401 - of InputError
+def check_depth(data: object, **where: Any) -> None:  # noqa: ANN401 - of InputError
     """Check that plain data are not nested deeply, which functions that call themselves rely on.
 
     Raises:
@@ -100,7 +100,7 @@ def check_depth(data: object, what: str, **where: Any) -> None:  # noqa: ANN401 
         if not level:
             return
     expected = f"at most {_DEEPEST} levels"
-    raise InputError(f"{what} nested too deeply", **where, expected=expected)
+    raise InputError("meta data nested too deeply", **where, expected=expected)
 
 
 def check_extent(
@@ -227,14 +227,12 @@ def result_to_json(result: JobResult) -> dict[str, Any]:
     return {**plain, **dict.fromkeys(BLOCKS), **blocks, "unphysical": result.unphysical}
 
 
-def result_from_json(
-    record: object, *, file: Path | str | None = None, line: int | None = None, key: str = ""
-) -> JobResult:
+def result_from_json(record: object, *, file: Path | str | None = None, key: str = "") -> JobResult:
     """Return the result that a record holds.
 
     Arguments:
         record: what `result_to_json` gave.
-        file, line, key: where the record stands, for the message.
+        file, key: where the record stands, for the message.
 
     Raises:
         InputError: naming the first field that is wrong.
@@ -242,11 +240,11 @@ def result_from_json(
     if isinstance(record, dict):
         blocks = {name: record[name] for name in BLOCKS if record.get(name) is not None}
         record = {**record, "blocks": blocks}
-    read_plain(_Names, record, file=file, line=line, key=key)
-    return read_plain(JobResult, record, file=file, line=line, key=key, hidden="blocks")
+    read_plain(_Names, record, file=file, key=key)
+    return read_plain(JobResult, record, file=file, key=key, hidden="blocks")
 
 
-def run_to_json(run: Run) -> dict[str, Any]:
+def run_to_json(run: RunData) -> dict[str, Any]:
     """Return a run in the JSON contract of ``bench run --json``.
 
     Examples:
@@ -263,7 +261,7 @@ def run_to_json(run: Run) -> dict[str, Any]:
     return {"meta": meta, "results": results, **({"companions": companions} if companions else {})}
 
 
-def run_from_json(data: object, *, file: Path | str | None = None) -> Run:
+def run_from_json(data: object, *, file: Path | str | None = None) -> RunData:
     """Return the run that `run_to_json` gave.
 
     Raises:
@@ -283,32 +281,32 @@ def run_from_json(data: object, *, file: Path | str | None = None) -> Run:
         for key in ("results", "companions")
     )
     check_extent(meta, results, file=file)
-    return Run(meta, results, companions)
+    return RunData(meta, results, companions)
 
 
 def meta_from_json(
-    data: object, *, file: Path | str | None = None, line: int | None = None, key: str = "meta"
+    data: object, *, file: Path | str | None = None, line: int | None = None
 ) -> dict[str, Any]:
     """Return the meta data of a run as they are, once checked.
 
     Arguments:
         data: what `run_to_json` gave under ``meta``.
-        file, line, key: where they stand, for the message.
+        file, line: where they stand, for the message.
 
     Raises:
         InputError: naming the first field that is wrong.
     """
     if not isinstance(data, dict):
-        raise InputError("no meta data", file=file, line=line, key=key, expected="a table")
-    check_depth(data, "meta data", file=file, line=line, key=key)
-    read_plain(_MetaRecord, data, file=file, line=line, key=key)
+        raise InputError("no meta data", file=file, line=line, key="meta", expected="a table")
+    check_depth(data, file=file, line=line, key="meta")
+    read_plain(_MetaRecord, data, file=file, line=line, key="meta")
     for name, value in (data.get("rule") or {}).items():
         if name != "version":
-            read_rule_number(name, value, file=file, line=line, key=f"{key}.rule.{name}")
+            read_rule_number(name, value, file=file, line=line, key=f"meta.rule.{name}")
     return data
 
 
-def read_run(file: Path) -> Run:
+def read_run(file: Path) -> RunData:
     """Return the run in a file that ``bench run --json`` wrote, or somebody else.
 
     Raises:

@@ -191,7 +191,7 @@ def origins_of(meta: Mapping[str, Any], *kinds: str) -> dict[str, str]:
 
 
 @dataclass(frozen=True, repr=False)
-class Run(Shown):
+class RunData(Shown):
     """All results of one `bench run`.
 
     Arguments:

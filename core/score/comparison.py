@@ -9,7 +9,7 @@ from statistics import geometric_mean, mean
 from typing import Any, Literal, get_args
 
 from femubench.core.errors import InputError
-from femubench.core.schema.results import BLOCKS, DONE, NOMINALS, JobResult, Nominal, Run
+from femubench.core.schema.results import BLOCKS, DONE, NOMINALS, JobResult, Nominal, RunData
 from femubench.core.score.ranking import Scale
 from femubench.core.score.repeatability import environment_differences
 from femubench.core.score.statistics import Significance, weigh_evidence
@@ -169,8 +169,8 @@ class _JobPair:
 
 
 def compare_runs(
-    before: Run,
-    after: Run,
+    before: RunData,
+    after: RunData,
     *,
     thresholds: Sequence[Threshold] = DEFAULT_THRESHOLDS,
     strategies: Iterable[str] = (),
@@ -263,12 +263,12 @@ def _by_structure(pairs: Iterable[_JobPair], structures: Mapping[str, str]) -> l
     return [mean(map(mean, cases.values())) for cases in found.values()]
 
 
-def _notes(run: Run) -> list[str]:
+def _notes(run: RunData) -> list[str]:
     stated = run.meta.get("notes")
     return list(map(str, stated)) if isinstance(stated, (list, tuple)) else []
 
 
-def _common_start(before: Run, after: Run) -> Nominal:
+def _common_start(before: RunData, after: RunData) -> Nominal:
     """Return the nominal model from which both runs start, the one that ranks before the other.
 
     Raises:
@@ -290,7 +290,7 @@ def _by_job(results: Iterable[JobResult], names: Mapping[str, str]) -> dict[Name
     return {NamedJob(names[r.strategy], r.case, r.seed): r for r in chosen}
 
 
-def _strategies(run: Run) -> list[str]:
+def _strategies(run: RunData) -> list[str]:
     return list(dict.fromkeys(result.strategy for result in run.results))
 
 
@@ -314,7 +314,7 @@ def _names(old: Sequence[str], new: Sequence[str], against: Against | None) -> d
     return names
 
 
-def _digest(run: Run, result: JobResult) -> str:
+def _digest(run: RunData, result: JobResult) -> str:
     """Return the digest of the case files of a result, nothing where it is not known."""
     listed = (run.meta.get("cases") or {}).get(result.case) or {}
     return str(result.provenance.get("case") or listed.get("digest") or "")

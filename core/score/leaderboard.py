@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 import numpy as np
 
 from femubench.core.garbage import pause_collection
-from femubench.core.schema.results import BLOCKS, JobResult, Nominal, Run, origins_of
+from femubench.core.schema.results import BLOCKS, JobResult, Nominal, RunData, origins_of
 from femubench.core.score.bounded_gain import ModelErrors
 from femubench.core.score.ranking import TIE, Scale, rank_items, rank_results
 from femubench.core.score.statistics import (
@@ -76,7 +76,7 @@ class GainTable:
     @classmethod
     def of(
         cls,
-        run: Run,
+        run: RunData,
         results: Iterable[JobResult],
         nominal: Nominal,
         origins: Mapping[str, str] | None = None,
@@ -182,13 +182,13 @@ class Standings:
     FEWEST: ClassVar[int] = FEWEST
     METHOD: ClassVar[str] = METHOD
 
-    run: Run
+    run: RunData
     own: GainTable
     counted: Mapping[str, FloatArray]
     apart: Differences
 
     @classmethod
-    def of(cls, run: Run) -> Standings:
+    def of(cls, run: RunData) -> Standings:
         """Return the standings of a run.
 
         Raises:
@@ -232,7 +232,7 @@ class Standings:
         return is_test((self.run.meta.get("classes") or {}).get(case))
 
     @staticmethod
-    def basis_of(run: Run) -> str:
+    def basis_of(run: RunData) -> str:
         """Return on what the gain of a run is measured: ``unseen`` data, or the ``given`` modes.
 
         Examples:
@@ -242,7 +242,7 @@ class Standings:
         return find_basis(run)
 
     @staticmethod
-    def interval_of(run: Run) -> str:
+    def interval_of(run: RunData) -> str:
         """Return what the intervals of the gains are over: ``structures``, ``seeds`` or nothing.
 
         Examples:
@@ -300,7 +300,7 @@ def mean_known(values: FloatArray) -> FloatArray:
 
 
 @pause_collection()
-def leaderboard(run: Run) -> pd.DataFrame:
+def leaderboard(run: RunData) -> pd.DataFrame:
     """Return one row a strategy, by gain; yardsticks stand in their place and have no rank.
 
     Strategies of one gain share a rank.
@@ -331,7 +331,7 @@ def leaderboard(run: Run) -> pd.DataFrame:
     return pd.DataFrame(list_rows(run), columns=list(COLUMNS)).astype({"rank": float})
 
 
-def list_rows(run: Run, standings: Standings | None = None) -> list[dict[str, Any]]:
+def list_rows(run: RunData, standings: Standings | None = None) -> list[dict[str, Any]]:
     """Return the rows of `leaderboard`, best first; the rank of a yardstick is None.
 
     Arguments:
@@ -362,7 +362,7 @@ def list_rows(run: Run, standings: Standings | None = None) -> list[dict[str, An
     return [{**row, "rank": ranks.get(row["strategy"])} for row in rows]
 
 
-def row_of(run: Run, strategy: str) -> dict[str, Any]:
+def row_of(run: RunData, strategy: str) -> dict[str, Any]:
     """Return the row of one strategy on a leaderboard, without its rank.
 
     Arguments:
@@ -373,7 +373,7 @@ def row_of(run: Run, strategy: str) -> dict[str, Any]:
     return _row(run, strategy, found, Standings.of(run))
 
 
-def find_basis(run: Run) -> str:
+def find_basis(run: RunData) -> str:
     """Return on what the gain of a run is measured: ``unseen`` data, or the ``given`` modes."""
     scale = Scale.of(run.meta)
     return "unseen" if any(map(scale.holds_back, scale.textbook)) else "given"
@@ -389,7 +389,7 @@ def is_test(classes: Sequence[str] | None) -> bool:
 
 
 def _row(
-    run: Run, strategy: str, results: Sequence[JobResult], standings: Standings
+    run: RunData, strategy: str, results: Sequence[JobResult], standings: Standings
 ) -> dict[str, Any]:
     table, values = standings.own, standings.counted[strategy]
     by_structure = table.by_structure(values)

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from femubench.core.garbage import pause_collection
-from femubench.core.schema.results import UNSEEN, Block, Run
+from femubench.core.schema.results import UNSEEN, Block, RunData
 from femubench.core.score.bounded_gain import MeasuredModes
 from femubench.core.score.leaderboard import GainTable, mean_known
 from femubench.core.score.statistics import FEWEST, interval_of_mean
@@ -137,7 +137,7 @@ class PredictiveBoard:
 
     @classmethod
     @pause_collection()
-    def of(cls, run: Run) -> PredictiveBoard:
+    def of(cls, run: RunData) -> PredictiveBoard:
         """Return the predictive board of a run.
 
         Means over seeds, then over the cases of a structure, then over structures: `crps_percent`

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from femubench.core.schema.records import result_to_json
-from femubench.core.schema.results import JobResult, Nominal, Run, origins_of
+from femubench.core.schema.results import JobResult, Nominal, RunData, origins_of
 
 # What belongs to a run, or to the past, rather than to a result.
 _VOLATILE = frozenset({"seconds", "rank", "gain", "key", "provenance", "traceback", "unphysical"})
@@ -32,7 +32,7 @@ def environment_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> l
     ]
 
 
-def result_differences(old: Run, new: Run) -> list[str]:
+def result_differences(old: RunData, new: RunData) -> list[str]:
     """Return which results are not the same to the last bit, a line each.
 
     Times and ranks are left out: they do not belong to a result.
@@ -52,7 +52,7 @@ def result_differences(old: Run, new: Run) -> list[str]:
     return lines
 
 
-def unsteady(run: Run) -> dict[str, str]:
+def unsteady(run: RunData) -> dict[str, str]:
     """Return what differs, by strategy, where a job was run twice in a run.
 
     It got the same data and the same random numbers, so that its answer must be the same to the
@@ -91,7 +91,7 @@ def _answers_differ(one: JobResult, other: JobResult) -> str:
     return f"other {parts[0].replace('_', ' ')}" if parts else ""
 
 
-def _by_job(run: Run) -> dict[tuple[str, str, int, Nominal], JobResult]:
+def _by_job(run: RunData) -> dict[tuple[str, str, int, Nominal], JobResult]:
     return {(item.case, item.strategy, item.seed, item.nominal): item for item in run.results}
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femubench.core.schema.results import JobResult, Run, origins_of
+from femubench.core.schema.results import JobResult, RunData, origins_of
 from femubench.core.score.leaderboard import GainTable
 from femubench.core.score.ranking import Scale
 from femubench.core.score.statistics import weigh_evidence
@@ -56,7 +56,7 @@ class TwinGain:
         return self.worse or bool(self.known)
 
 
-def twin_gains(run: Run) -> dict[str, TwinGain]:
+def twin_gains(run: RunData) -> dict[str, TwinGain]:
     """Return what the twins say of every strategy; nothing of a run without twins.
 
     Raises:
@@ -96,7 +96,11 @@ def twin_gains(run: Run) -> dict[str, TwinGain]:
 
 
 def _known(
-    run: Run, scale: Scale, strategy: str, ran: Sequence[JobResult], kinds: Mapping[str, list[str]]
+    run: RunData,
+    scale: Scale,
+    strategy: str,
+    ran: Sequence[JobResult],
+    kinds: Mapping[str, list[str]],
 ) -> tuple[str, ...]:
     """Return the cases on which a strategy is good, and on each of their twins much worse.
 

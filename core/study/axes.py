@@ -13,7 +13,7 @@ from femubench.core.errors import InputError
 from femubench.core.plugin.validation import did_you_mean
 from femubench.core.schema.bounds import Name
 from femubench.core.schema.records import to_plain
-from femubench.core.schema.results import NOMINALS, Nominal, Run
+from femubench.core.schema.results import NOMINALS, Nominal, RunData
 from femubench.core.schema.validation import read_plain
 
 Value = bool | int | float | str | None
@@ -70,7 +70,7 @@ class StudyAxes:
     nominals: tuple[Nominal, ...] = NOMINALS[1:]
 
     @classmethod
-    def of(cls, run: Run) -> StudyAxes:
+    def of(cls, run: RunData) -> StudyAxes:
         """Return the axes of a run; one of no study has case, strategy and nominal model.
 
         Raises:
@@ -88,7 +88,7 @@ class StudyAxes:
         )
 
     @classmethod
-    def from_run(cls, run: Run) -> StudyAxes | None:
+    def from_run(cls, run: RunData) -> StudyAxes | None:
         """Return the axes that a study asked for; None for a run of no study.
 
         Raises:

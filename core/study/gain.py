@@ -8,7 +8,7 @@ from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from femubench.core.schema.results import DONE, JobResult, Nominal, Run
+from femubench.core.schema.results import DONE, JobResult, Nominal, RunData
 from femubench.core.score.leaderboard import row_of
 from femubench.core.study.axes import StudyAxes, Value
 
@@ -22,7 +22,7 @@ FIGURES = (
 )
 
 
-def gain_by(run: Run, *axes: str) -> pd.DataFrame:
+def gain_by(run: RunData, *axes: str) -> pd.DataFrame:
     """Return one row a cell of a study; see `Run.gain_by`."""
     import pandas as pd
 
@@ -51,7 +51,9 @@ def gain_by(run: Run, *axes: str) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*chosen, *FIGURES])
 
 
-def _figures(run: Run, arms: Sequence[_Arm], by_arm: dict[_Arm, list[JobResult]]) -> dict[str, Any]:
+def _figures(
+    run: RunData, arms: Sequence[_Arm], by_arm: dict[_Arm, list[JobResult]]
+) -> dict[str, Any]:
     """Return the figures of a cell, whose jobs go as one strategy on distinct cases."""
     structures, models = run.meta.get("structures") or {}, run.meta.get("models") or {}
     yardstick = run.meta.get("yardstick") or "drawn"
@@ -77,7 +79,7 @@ def _figures(run: Run, arms: Sequence[_Arm], by_arm: dict[_Arm, list[JobResult]]
             if case in models
         },
     }
-    row = row_of(Run(meta, results), "cell")
+    row = row_of(RunData(meta, results), "cell")
     stated = {name: row[name] for name in ("gain", "gain_low", "gain_high", "ok", "unphysical")}
     failed = sum(result.status not in DONE for result in results)
     jobs = int(row["total"])

@@ -82,7 +82,7 @@ class UpdateResult(Shown):
 class Strategy(ABC):
     """Base class for updating strategies: override `update`, set `name` and `citation`.
 
-    Nobody has to inherit it: whatever plays `core.roles.Strategy` is ranked and checked alike.
+    Nobody has to inherit it: whatever plays `core.roles.StrategyRole` is ranked and checked alike.
 
     Attributes:
         name: the word after ``bench run -s``.
@@ -135,6 +135,6 @@ class Strategy(ABC):
 
 if TYPE_CHECKING:
 
-    def _play(result: UpdateResult, strategy: Strategy) -> tuple[roles.Result, roles.Strategy]:
+    def _play(result: UpdateResult, strategy: Strategy) -> tuple[roles.Result, roles.StrategyRole]:
         """Let type checkers see that the classes play the roles."""
         return result, strategy

@@ -57,9 +57,9 @@ def rigid_modes(bench: Workbench, words: str, case: str = CASE) -> FloatArray:
     return np.sort(modes.natural_frequencies[modes.rigid])
 
 
-def format_frequencies(values: FloatArray, digits: int = 1) -> str:
+def format_frequencies(values: FloatArray) -> str:
     """Return frequencies as text, imaginary ones with an i."""
-    return " ".join(one(float(v), digits) for v in values)
+    return " ".join(one(float(v)) for v in values)
 
 
 def one(value: float, digits: int = 1) -> str:

@@ -190,8 +190,8 @@ def nearest(found: FloatArray, wanted: float) -> float:
     return float(found[np.argmin(np.abs(np.log(found / wanted)))])
 
 
-def _below(found: FloatArray, highest: float = HIGHEST) -> FloatArray:
-    return np.asarray(found[found < highest])
+def _below(found: FloatArray) -> FloatArray:
+    return np.asarray(found[found < HIGHEST])
 
 
 def _listed(frequencies: Iterable[float]) -> str:

@@ -6,20 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-import numpy as np
-
 from femubench import Model
-from femubench.effect import (
-    Change,
-    ElementOperator,
-    FrameEffect,
-    LookWarning,
-    ModelPlaces,
-    Parameter,
-    Seen,
-    Size,
-    Term,
-)
+from femubench.effect import FrameEffect, LookWarning, Parameter, Seen, Size
 from femubench.fem import Frame
 
 
@@ -58,15 +46,3 @@ class RotaryInertia(FrameEffect):
             return []
         changes = seen.changes(self.frame(structure.frame, "all", (1.0,)))
         return seen.notable(self.name, "The rotary inertia of the cross sections matters", changes)
-
-    def change(self, model: Model, place: str) -> Change:
-        """Return the mass matrix of the textbook's rotary inertia."""
-        structure = model.frame_structure
-        whole = structure.rebuilt(self.frame(structure.frame, place, (1.0,)))
-        rows = ModelPlaces(model).elements(place)
-        own = whole.properties.take(rows)
-        none = np.zeros(len(own))
-        without = own.scale("rhoIy", none).scale("rhoIz", none)
-        blocks = own.mass_matrices() - without.mass_matrices()
-        term = Term("mass", ElementOperator(structure, rows, blocks))
-        return Change.proportional(term, neutral=structure.frame.rotary_share)

@@ -81,8 +81,7 @@ class ShearDeformation(FrameEffect):
             return []
         unknown = any(m.section.kappa is None for m in structure.frame.members)
         remark = " (kappa = 5/6 assumed where none is given)" if unknown else ""
-        frame = self.frame(structure.frame, "all", (1.0,))
-        changes = _by_flexibility(seen, frame) if seen.large else seen.changes(frame)
+        changes = seen.changes(self.frame(structure.frame, "all", (1.0,)))
         what = f"The members are stubby enough for shear to matter{remark}"
         return seen.notable(self.name, what, changes)
 
@@ -125,25 +124,6 @@ def present_share(frame: Frame) -> float:
     """Return the multiple of 1/(kappa G A) that a frame has now, 0 for Euler-Bernoulli."""
     own = [f.factor for f in frame.factors if (f.quantity, f.at) == ("shear", _AT_ALL)]
     return float(np.prod(own)) if frame.beam == "timoshenko" else 0.0
-
-
-def _by_flexibility(seen: Seen, frame: Frame) -> FloatArray:
-    """Return the changes of the frequencies by adding the flexibilities, (count,).
-
-    1/lambda grows by W / lambda^2, W the sum of L (Vy^2 / (kappa_y G A) + Vz^2 / (kappa_z G A))
-    over the elements with the shear forces V of the mode (Dunkerley's sum). The matrix at full
-    flexibility would not do: on a fine mesh shear takes over within an element, and the old nodal
-    displacements are far from the new ones.
-    """
-    structure = seen.model.frame_structure
-    whole = structure.rebuilt(frame).properties
-    modes = seen.modes.take(np.arange(seen.count))
-    local = np.asarray(structure.gather @ modes.shapes).reshape(len(whole), 12, -1)
-    force = structure.properties.stiffness_matrices()[:, 1:3] @ local
-    flexibility = np.column_stack([whole.flex_y, whole.flex_z])
-    length = whole.length - whole.rigid_1 - whole.rigid_2
-    work = np.einsum("e,ed,edm->m", length, flexibility, np.square(force))
-    return np.asarray(1.0 / np.sqrt(1.0 + work / modes.eigenvalues) - 1.0)
 
 
 def _share(multiple: FloatArray | float, rate: FloatArray) -> FloatArray:

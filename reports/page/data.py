@@ -26,7 +26,7 @@ from femubench.reports.summary import (
     unconfined,
 )
 from femubench.reports.twins import suspicions, twins_by_strategy
-from femubench.results import JobResult, PredictiveBoard, Run, Standings, unsteady
+from femubench.results import JobResult, PredictiveBoard, RunData, Standings, unsteady
 
 BLOCKS = ("used", "higher", "modified")
 # Bytes of the details of all results together, and of the files to be downloaded once they are
@@ -53,7 +53,7 @@ class ExhibitSource(Protocol):
         ...
 
 
-def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]:
+def page_data(run: RunData, exhibits: ExhibitSource | None = None) -> dict[str, Any]:
     """Return everything that the page of a run shows.
 
     Errors and gains are those of the run to the last digit; other numbers are rounded.
@@ -86,7 +86,7 @@ def page_data(run: Run, exhibits: ExhibitSource | None = None) -> dict[str, Any]
             too_large.append(f"{title}: too large for the page; {more}")
     notes = [*notes_of(run), *suspicions(run), *map(plain, getattr(exhibits, "notes", ()))]
     baseline = run.meta.get("baseline")
-    run = Run(run.meta, standings.results)
+    run = RunData(run.meta, standings.results)
     cases, strategies = cases_of(run), strategies_of(run)
     listed = [_case(standings, case, exhibits) for case in cases]
     stages = {case["name"]: case["stage"] for case in listed}
@@ -131,7 +131,7 @@ def _cleaned(figures: _Named) -> dict[str, Any]:
     return {name: clean(value) for name, value in figures.items()}
 
 
-def _strategies(run: Run) -> list[dict[str, Any]]:
+def _strategies(run: RunData) -> list[dict[str, Any]]:
     """Return the strategies with what they cite, their version, and what twins and repeats say."""
     citations, twins = run.meta.get("citations") or {}, twins_by_strategy(run)
     differing, bare = unsteady(run), unconfined(run)
@@ -208,7 +208,7 @@ def _levels(result: JobResult, standings: Standings) -> list[float] | None:
 
 
 def _details(
-    run: Run, stages: Mapping[str, _Named | None], exhibits: ExhibitSource | None
+    run: RunData, stages: Mapping[str, _Named | None], exhibits: ExhibitSource | None
 ) -> tuple[dict[str, Any], list[str]]:
     """Return the details of the first seed's results, the best ones first, and what is missing.
 

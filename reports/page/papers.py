@@ -9,13 +9,13 @@ from importlib.resources import files
 from typing import Any
 
 from femubench.reports.summary import cases_of, first_seed, measured_modes
-from femubench.results import Run
+from femubench.results import RunData
 
 # Relative; the cases hold the printed frequencies, and what goes by the same name may be another.
 _SAME = 1e-6
 
 
-def papers_of(run: Run) -> dict[str, dict[str, dict[int, float]]]:
+def papers_of(run: RunData) -> dict[str, dict[str, dict[int, float]]]:
     """Return printed frequencies in Hz by case, strategy and number of the mode.
 
     A case counts as that of a paper when it has its name and its measured frequencies.
@@ -33,7 +33,7 @@ def papers_of(run: Run) -> dict[str, dict[str, dict[int, float]]]:
     return found
 
 
-def list_drawn_frequencies(run: Run) -> dict[str, dict[str, dict[int, float | None]]]:
+def list_drawn_frequencies(run: RunData) -> dict[str, dict[str, dict[int, float | None]]]:
     """Return our own frequencies in Hz from the models as drawn, as the papers have them.
 
     By case, strategy and mode; of the first seed, where a run starts from both nominal models.

@@ -17,7 +17,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 from femubench import report
 from femubench.core.schema.records import read_run
 from femubench.core.score.ranking import rank_results
-from femubench.results import JobResult, Run
+from femubench.results import JobResult, RunData
 from tests.command import call_bench
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -38,7 +38,7 @@ class Real:
         store: with the exhibits.
     """
 
-    run: Run
+    run: RunData
     json_file: Path
     page: Path
     store: Path
@@ -121,14 +121,14 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> Real:
     return Real(read_run(json_file), json_file, page, store)
 
 
-def with_a_failure(run: Run) -> Run:
+def with_a_failure(run: RunData) -> RunData:
     """Return a run in which one job gave no model; none does so by itself."""
     lost = next(r for r in run.results if (r.case, r.strategy) == ("hframe", "kabe"))
     why = "after step 1 no mode of the model matches measured mode 3"
     job = JobResult(lost.case, lost.strategy, lost.seed, "failed", why)
     failed = replace(job, key=lost.key, provenance=lost.provenance)
     listed = [failed if result is lost else result for result in run.results]
-    return Run(run.meta, rank_results(listed, run.meta))
+    return RunData(run.meta, rank_results(listed, run.meta))
 
 
 # Not for the whole session: its event loop would be in the way of tests elsewhere.

@@ -15,7 +15,7 @@ from femubench.core.schema.records import read_run
 from femubench.core.score.leaderboard import leaderboard, list_rows
 from femubench.core.score.ranking import rank_results
 from femubench.reports.summary import finding
-from femubench.results import PredictiveBoard, Run, run_to_json
+from femubench.results import PredictiveBoard, RunData, run_to_json
 
 ROUNDED = {"seconds": 1e-3}  # figures that the page holds with fewer digits
 KEYS = (
@@ -36,8 +36,8 @@ def page(view: Callable[..., Any], real: Any) -> Iterator[Page]:
 
 
 def part(
-    run: Run, *, cases: Collection[str] | None = None, strategies: Collection[str] | None = None
-) -> Run:
+    run: RunData, *, cases: Collection[str] | None = None, strategies: Collection[str] | None = None
+) -> RunData:
     """Return the run as if there were nothing but these."""
 
     def kept(name: str) -> bool:
@@ -48,7 +48,7 @@ def part(
     meta = {**run.meta, "strategies": names}
     for key in ("cases", "reference", "models"):
         meta[key] = {name: own for name, own in run.meta[key].items() if kept(name)}
-    return Run(meta, rank_results(results, meta))
+    return RunData(meta, rank_results(results, meta))
 
 
 def shown(page: Page) -> dict[str, dict[str, float | None]]:
@@ -70,7 +70,7 @@ def shown(page: Page) -> dict[str, dict[str, float | None]]:
     return {name: {k: float(v) if v else None for k, v in figures} for name, figures in rows}
 
 
-def assert_shows(page: Page, run: Run, *, without: Collection[str] = ()) -> None:
+def assert_shows(page: Page, run: RunData, *, without: Collection[str] = ()) -> None:
     """The table is the leaderboard of the run, row for row."""
     found, board = shown(page), leaderboard(run).to_dict("records")
     assert list(found) == [row["strategy"] for row in board]
@@ -210,7 +210,7 @@ def test_intervals_of_a_part_are_over_its_structures(
     """Twelve structures, one of two cases; of the whole run the leaderboard's own intervals."""
     run = synthetic_run(5, 12, failing=0.0)
     structures = {case: case.partition("/")[0] for case in run.meta["cases"]}
-    run = Run({**run.meta, "structures": structures}, run.results)
+    run = RunData({**run.meta, "structures": structures}, run.results)
     data = tmp_path / "run.json"
     data.write_text(json.dumps(run_to_json(run)), encoding="utf-8")
     command("report", data, "-f", "html", "-o", tmp_path)
@@ -222,7 +222,7 @@ def test_intervals_of_a_part_are_over_its_structures(
         read = "() => bench.board.rows().map((r) => [r.strategy, [r.gain_low, r.gain_high]])"
         return dict(page.evaluate(read))
 
-    def expected(whole: Run) -> dict[str, list[float]]:
+    def expected(whole: RunData) -> dict[str, list[float]]:
         rows = leaderboard(whole).to_dict("records")
         return {row["strategy"]: [row["gain_low"], row["gain_high"]] for row in rows}
 

@@ -13,7 +13,7 @@ from synthetic_run import synthetic_run
 
 from femubench.core.schema.records import to_plain
 from femubench.reports.htmls import HtmlReporter
-from femubench.results import Run, run_to_json
+from femubench.results import RunData, run_to_json
 
 SCRIPT = "<script>alert(1)</script>"
 TITLE = """Frame "of" 'quotes' </table></script><img src=x onerror=alert(2)> & more"""
@@ -21,7 +21,7 @@ FORMULA = '=HYPERLINK("http://example.invalid","x")'
 MEBI = 2**20
 
 
-def hostile() -> Run:
+def hostile() -> RunData:
     """Return a run whose names, titles, reasons, citations and parameters are markup."""
     run = synthetic_run(6, 4, names=(SCRIPT, FORMULA))
     cases = {name: {**about, "title": TITLE} for name, about in run.meta["cases"].items()}
@@ -36,7 +36,7 @@ def hostile() -> Run:
         for result in run.results
     ]
     results[0] = replace(results[0], status="failed", reason=SCRIPT, blocks={})
-    return Run(meta, tuple(results))
+    return RunData(meta, tuple(results))
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def test_markup_in_the_compared_page_and_the_site_is_text(
 
 def test_a_page_of_everything_stays_small(real: Any) -> None:
     """All built-in strategies on all built-in cases are eight times as many models."""
-    bare = len(HtmlReporter().render(Run(real.run.meta, ())).encode())
+    bare = len(HtmlReporter().render(RunData(real.run.meta, ())).encode())
     models = len(real.run.results)
     whole = bare + (real.page.stat().st_size - bare) * 144 / models
     assert bare < 3 * MEBI / 4  # half a megabyte of it is d3 and Plot

@@ -11,7 +11,7 @@ import pyuff
 
 from femubench.core.schema.records import to_plain
 from femubench.core.schema.results import Block
-from femubench.results import JobResult, PairedMode, Rule, Run, run_to_json
+from femubench.results import JobResult, PairedMode, Rule, RunData, run_to_json
 
 ROOT = Path(__file__).parents[2]
 CASES = sorted(
@@ -142,7 +142,7 @@ def universal_case(folder: Path) -> Path:
     return folder
 
 
-def a_run() -> Run:
+def a_run() -> RunData:
     """Return a run of three strategies on two cases with all that a result can have."""
     modes = (PairedMode(1, 20.0, 20.5, 0.98), PairedMode(2, 50.0, None, None))
     changed = (PairedMode(1, 18.0, -3.0, 0.9, "mass at E"),)
@@ -170,7 +170,7 @@ def a_run() -> Run:
         "reference": {"frame": errors, "set/part": errors}, "rule": Rule().to_json(),
         "models": {case: {"drawn": to_plain(blocks)} for case in ("frame", "set/part")},
     }  # fmt: skip
-    return Run(meta, tuple(results))
+    return RunData(meta, tuple(results))
 
 
 def run_text() -> str:

@@ -71,7 +71,7 @@ class Softer:
         return replace(model, stiffness=(1.0 + values[0]) * model.stiffness)
 
 
-STRATEGY: roles.Strategy = Duck()
+STRATEGY: roles.StrategyRole = Duck()
 EFFECT: roles.Effect = Softer()
 
 

@@ -7,18 +7,18 @@ from contextlib import nullcontext
 from typing import Any
 
 from femubench.core.case.case import Case
-from femubench.core.roles import Strategy
+from femubench.core.roles import StrategyRole
 from femubench.core.run.executor import Executor, open_executor
 from femubench.core.run.runner import Plan, Receivers
 from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
-from femubench.core.schema.results import Run
+from femubench.core.schema.results import RunData
 from femubench.core.schema.run_options import RunOptions, split_keywords
 
 
 def run_jobs(
     cases: Sequence[Case],
-    strategies: Sequence[Strategy],
+    strategies: Sequence[StrategyRole],
     options: RunOptions | None = None,
     *,
     executor: Executor | None = None,
@@ -26,7 +26,7 @@ def run_jobs(
     progress: Callable[..., None] | None = None,
     starts: Starts | None = None,
     **keywords: Any,
-) -> Run:
+) -> RunData:
     """Run every strategy on every case with every seed; keywords as of `rank`."""
     given, where = split_keywords(keywords, options)
     plan = Plan(cases, strategies, RunOptions(**given), starts or Starts())

@@ -9,7 +9,7 @@ from typing import Any
 from femubench.core.schema.records import to_plain
 from femubench.core.schema.results import Block
 from femubench.core.score.ranking import rank_results
-from femubench.results import JobResult, PairedMode, Rule, Run
+from femubench.results import JobResult, PairedMode, Rule, RunData
 
 HERTZ = {"used": 100.0, "higher": 200.0, "modified": 300.0}
 
@@ -63,7 +63,7 @@ def plain(found: Mapping[str, Block]) -> dict[str, Any]:
 
 def run(
     errors: Mapping[str, Mapping[str, float]], results: Iterable[JobResult], **more: Any
-) -> Run:
+) -> RunData:
     """Return a ranked run."""
     stated = meta(errors, **more)
-    return Run(stated, rank_results(results, stated))
+    return RunData(stated, rank_results(results, stated))

@@ -13,7 +13,7 @@ from femubench.core.schema.paired_modes import ModeBefore, PartnerCandidate
 from femubench.core.schema.results import Block
 from femubench.core.score.ranking import rank_results
 from femubench.core.score.scoring import frequency_error
-from femubench.results import JobResult, PairedMode, Rule, Run
+from femubench.results import JobResult, PairedMode, Rule, RunData
 
 BLOCKS = ("used", "higher", "modified")
 MODES = {"used": (1, 2, 3), "higher": (4, 5), "modified": (1, 4)}
@@ -30,7 +30,7 @@ def synthetic_run(
     names: Sequence[str] = (),
     failing: float = 0.03,
     random_seed: int = 20260101,
-) -> Run:
+) -> RunData:
     """Return a run with gains and ranks; the same arguments give the same run.
 
     Strategies get worse with their number, more or less. Some jobs fail, some do
@@ -83,7 +83,7 @@ def synthetic_run(
         "models": {case: {"drawn": _plain(blocks)} for case, blocks in nominal.items()},
         "notes": [],
     }
-    return Run(meta, rank_results(results, meta))
+    return RunData(meta, rank_results(results, meta))
 
 
 def _plain(blocks: dict[str, Block]) -> dict[str, object]:

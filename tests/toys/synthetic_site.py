@@ -11,7 +11,7 @@ from typing import Any
 from synthetic_run import synthetic_run
 
 from femubench import publish
-from femubench.results import Run
+from femubench.results import RunData
 
 
 def synthetic_site(
@@ -50,6 +50,6 @@ def synthetic_site(
             if number == 0 or result.strategy in meta["strategies"][:2]
         ]
         moment = {"run": f"run {number}", "started": f"2026-01-0{number + 1}T00:00:00Z"}
-        made = Run({**meta, **moment, **stated}, tuple(results))
+        made = RunData({**meta, **moment, **stated}, tuple(results))
         publish(folder, made, unverified=True, address="https://example.org/board")
     return folder

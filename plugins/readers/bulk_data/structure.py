@@ -238,7 +238,8 @@ class BulkData:
         cards = [card for card in self.cards("PARAM") if card.text(1) == "COUPMASS"]
         if any(card.text(2) == "YES" or card.text(2).strip("+0") == "1" for card in cards):
             return ()
-        return ("masses are consistent; the file asks for lumped ones (COUPMASS)",)
+        why = "the file asks for lumped ones (COUPMASS)"
+        return (f"masses are consistent; {why if cards else 'Nastran lumps them by default'}",)
 
     def list(self, card: Card, first: int, key: str) -> list[int]:
         """Return the grids of a list; raises InputError for more than any structure needs."""
