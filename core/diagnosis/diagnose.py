@@ -131,14 +131,13 @@ def diagnose(
         repaired = correct_case(case, inquiry.repaired)
         states = None
         if repaired.reference is not None:  # what is wrong with the data is no difference
-            states = compare_states(repaired.measurement, repaired.reference)
+            whole = replace(repaired.measurement, responses=given)
+            states = compare_states(whole, repaired.reference)
         proof = _proof(repaired, inquiry.examination, effort, case, states)
         with effort.piece("advice"):
             looks = _looks(case.model, repaired, (*registered, *known))
             posterior, leader = inquiry.examination.posterior, proof.leader
             differs = None if states is None else states.differs
-            if inquiry.examination.antiresonances and not differs:
-                differs = None  # modes alone agree
             decision = decide(posterior, leader, proof.test, differs)
             found = _written(repaired, inquiry, decision, proof, looks, begin)
         # With a reference both states have what the drawing lacks.

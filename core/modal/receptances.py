@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -57,6 +58,12 @@ class PredictedResponses:
     def receptances(self) -> AnyArray:
         """Return displacement over force, complex, like the measured ones."""
         return receptance(self.modes, *self.at, self.damping)
+
+    @cached_property
+    def read(self) -> tuple[FloatArray, FloatArray]:
+        """Return the shapes at responses and forces, (n_responses, m), (n_references, m)."""
+        out, into = (np.asarray(rows @ self.modes.shapes) for rows in self.at[:2])
+        return out, into
 
     def slopes(self, slopes: MatrixSlopes) -> AnyArray:
         """Return those of the receptances by parameters, of the slopes of the matrices."""
@@ -132,25 +139,62 @@ def receptance_slopes(
     ratio = np.broadcast_to(np.nan_to_num(np.asarray(damping, dtype=float)), len(modes))
     out, into = (np.asarray(rows @ modes.shapes) for rows in (response, excitation))
     compliance = 1.0 / dynamic_stiffness(modes.eigenvalues, frequencies, ratio)
-    of_stiffness, of_mass = _damping_slopes(modes.eigenvalues, ratio)
-    omega = 2.0 * np.pi * np.asarray(frequencies)[None, :, None]
-    lines, size = compliance.shape
-    # Modal coordinates under each force, (m, n_f n_excitation), as pairs of real numbers.
-    coordinates = compliance.T[:, :, None] * into.T[:, None, :]
-    pairs = np.ascontiguousarray(coordinates.reshape(size, -1)).view(float)
     read = compliance[:, None, :] * out  # (n_f, n_response, m)
-    found = np.empty((lines, len(out), len(into), slopes.count), dtype=complex)
-    stiffness = slopes.inner(modes.shapes, modes.shapes)
-    mass = slopes.inner(modes.shapes, modes.shapes, "mass")
-    for p, (k, m) in enumerate(zip(stiffness, mass, strict=True)):
-        parts = (k, m, of_stiffness * k + of_mass * m)
-        force, inertia, damped = (
-            (part @ pairs).view(complex).reshape(coordinates.shape) if part.any() else 0.0
-            for part in parts
-        )
-        exerted = force - np.square(omega) * inertia + 1j * omega * damped
+    found = np.empty((len(read), len(out), len(into), slopes.count), dtype=complex)
+    coordinates = compliance.T[:, :, None] * into.T[:, None, :]
+    for p, exerted in enumerate(_exerted(modes, coordinates, frequencies, slopes, ratio)):
         found[..., p] = -read @ np.broadcast_to(exerted, coordinates.shape).transpose(1, 0, 2)
     return found
+
+
+def paired_slopes(
+    modes: Modes,
+    out: FloatArray,
+    into: FloatArray,
+    frequencies: FloatArray,
+    slopes: MatrixSlopes,
+    damping: FloatArray,
+) -> AnyArray:
+    """Return `receptance_slopes` of one response and one force at each frequency, (k, p).
+
+    Arguments:
+        out, into: shapes at the response and at the force of every frequency, (k, m).
+    """
+    compliance = 1.0 / dynamic_stiffness(modes.eigenvalues, frequencies, damping)
+    read, coordinates = (compliance * out).T, (compliance * into).T[:, :, None]
+    found = np.empty((len(compliance), slopes.count), dtype=complex)
+    for p, exerted in enumerate(_exerted(modes, coordinates, frequencies, slopes, damping)):
+        found[:, p] = -np.einsum("mk,mk->k", read, exerted[..., 0])
+    return found
+
+
+def _exerted(
+    modes: Modes,
+    coordinates: AnyArray,
+    frequencies: FloatArray,
+    slopes: MatrixSlopes,
+    ratio: FloatArray,
+) -> Iterator[AnyArray]:
+    """Yield what the slope of each parameter exerts on motions, dZ q, in modes, (m, n_f, n).
+
+    Arguments:
+        coordinates: q, modal, under n forces at every frequency, (m, n_f, n).
+    """
+    # As pairs of real numbers.
+    pairs = np.ascontiguousarray(coordinates.reshape(len(modes), -1)).view(float)
+    of_stiffness, of_mass = _damping_slopes(modes.eigenvalues, ratio)
+    omega = 2.0 * np.pi * np.asarray(frequencies)[None, :, None]
+    stiffness = slopes.inner(modes.shapes, modes.shapes)
+    mass = slopes.inner(modes.shapes, modes.shapes, "mass")
+    for k, m in zip(stiffness, mass, strict=True):
+        parts = (k, m, of_stiffness * k + of_mass * m)
+        force, inertia, damped = (
+            (part @ pairs).view(complex).reshape(coordinates.shape)
+            if part.any()
+            else np.zeros((len(modes), 1, 1))
+            for part in parts
+        )
+        yield np.asarray(force - np.square(omega) * inertia + 1j * omega * damped)
 
 
 def _damping_slopes(eigenvalues: FloatArray, ratio: FloatArray) -> tuple[FloatArray, FloatArray]:
