@@ -138,18 +138,16 @@ def test_antiresonances_that_moved_differ_where_modes_agree() -> None:
     _, other = simulate(np.array([1.0, 0.8, 1.0]), lines=300)
     rng = np.random.default_rng(4)
     quiet = [compare_states(before.with_noise(rng), before.with_noise(rng)) for _ in range(20)]
-    assert {(states.verdict, len(states.antiresonances) > 4) for states in quiet} == {
-        ("agrees", True)
-    }
-    assert all((states.antiresonance_p or 0.0) > 0.01 for states in quiet)
+    assert {(states.verdict, len(states.zeros) > 4) for states in quiet} == {("agrees", True)}
+    assert all((states.zeros_p or 0.0) > 0.01 for states in quiet)
     states = compare_states(replace(before, responses=other.responses), before)
     assert states.differs
     assert (
         compare_states(before, before).count
         == compare_states(replace(before, responses=None), before).count + 2
     )
-    assert (states.antiresonance_p or 1.0) < 1e-6
-    most = max(states.antiresonances, key=lambda zero: abs(zero.deviations))
+    assert (states.zeros_p or 1.0) < 1e-6
+    most = max(states.zeros, key=lambda zero: abs(zero.deviations))
     assert abs(most.deviations) > 5.0
     assert most.force == before.responses.references.labels[0]  # type: ignore[union-attr]
     ratio = most.present_hz / most.reference_hz

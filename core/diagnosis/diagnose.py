@@ -379,7 +379,8 @@ def _advice(examination: Examination, group: Sequence[Explanation]) -> tuple[Adv
         return ()
     problems = [examination.problem_of(e) for e in stated]
     fits = [e.fit for e in stated]
-    return advise(examination.model, problems, fits, tolerance=examination.tolerance)
+    known, scatter = examination.antiresonances > 0, examination.tolerance
+    return advise(examination.model, problems, fits, tolerance=scatter, responses=known)
 
 
 def _notes(

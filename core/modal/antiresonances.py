@@ -195,7 +195,7 @@ def predict_antiresonances(answer: PredictedResponses) -> Antiresonances:
     own = hertz[np.maximum(answer.partner, 0)]
     own = np.where(answer.partner >= 0, own, np.nan)
     found = np.column_stack([zero, o, e, np.zeros(len(zero))])
-    return _shown(found, hertz[inner], answer.damping[inner], own)
+    return _shown(found, hertz[inner], answer.ratios[inner], own)
 
 
 def _real_and_slope(
@@ -205,7 +205,8 @@ def _real_and_slope(
     out, into = answer.read
     ends = hertz * np.array([[1.0], [1.0 - _STEP], [1.0 + _STEP]])
     dynamic = dynamic_stiffness(answer.modes.eigenvalues, ends.ravel(), answer.damping)
-    one, low, high = ((out[o] * into[e]) / dynamic.reshape(3, len(hertz), -1)).sum(axis=2).real
+    dynamic = dynamic.reshape(3, *out[o].shape)
+    one, low, high = (out[o] * into[e] / dynamic).sum(axis=2).real
     return one, (high - low) / (2.0 * _STEP * hertz)
 
 

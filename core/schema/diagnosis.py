@@ -349,8 +349,8 @@ class States:
         modes: that both states have.
         lost, new: modes that only the reference, only the present state has, in the band of both.
         mass_change: of the weighed mass, and its deviation, kg; None where one was not weighed.
-        antiresonances: that the responses of both states show.
-        antiresonance_p: probability of as large differences of these, were they noise.
+        zeros: antiresonances that the responses of both states show.
+        zeros_p: probability of as large differences of these, were they noise.
     """
 
     verdict: Literal["differs", "agrees"]
@@ -361,8 +361,8 @@ class States:
     lost: tuple[LoneMode, ...] = ()
     new: tuple[LoneMode, ...] = ()
     mass_change: tuple[Number, Number] | None = None
-    antiresonances: tuple[ZeroChange, ...] = ()
-    antiresonance_p: Number | None = None
+    zeros: tuple[ZeroChange, ...] = ()
+    zeros_p: Number | None = None
 
     @property
     def differs(self) -> bool:
