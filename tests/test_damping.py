@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from response_problems import simulate, simulated_case
 
-from femubench import InputError, Model, read_case, solve_modes
+from femubench import InputError, Model, read_case
 from femubench.core.case.writing import write_case
-from femubench.core.fem.model import Model as CoreModel
 from femubench.core.modal.receptances import PredictedResponses
 from femubench.core.score.responses import score_responses
 from femubench.fem import Damping
@@ -20,7 +19,7 @@ from femubench.update import Changes
 OWN = Damping(alpha=4.0, beta=2e-6, eta=0.015)
 
 
-def damped(model: CoreModel, damping: Damping = OWN) -> CoreModel:
+def damped(model: Model, damping: Damping = OWN) -> Model:
     """Return the model of a frame with damping of its own."""
     assert model.structure is not None
     return Model.of(replace(model.structure.frame, damping=damping))
@@ -54,15 +53,6 @@ def test_their_slopes_are_those_of_differences() -> None:
         rise = (high - low) / (2.0 * step)
         own = slopes[..., p] * parametric.steps(x)[p]
         assert own == pytest.approx(rise, rel=1e-5, abs=1e-5 * np.abs(rise).max())
-
-
-def test_ratios_are_those_at_resonance() -> None:
-    values = solve_modes(simulate(np.ones(3))[0]).eigenvalues
-    root = np.sqrt(np.maximum(values, 0.0))
-    lost = OWN.eta * values + root * (OWN.alpha + OWN.beta * values)
-    moving = root > 1.0
-    assert OWN.ratios(values)[moving] == pytest.approx(lost[moving] / (2.0 * values[moving]))
-    assert Damping(alpha=3.0).ratios(np.zeros(2)).tolist() == [0.0, 0.0]
 
 
 def test_a_case_states_it_and_the_score_judges_by_it(tmp_path: Path) -> None:

@@ -226,7 +226,7 @@ def frame_of(model: FrameSpec) -> Frame:
 
 def damping_of(spec: DampingSpec | None) -> Damping | None:
     """Return what `[model.damping]` states; None for nothing."""
-    return spec and Damping(spec.alpha, spec.beta, spec.eta)
+    return None if spec is None else Damping(spec.alpha, spec.beta, spec.eta)
 
 
 def _made(kind: Any, spec: TomlTable) -> Any:  # noqa: ANN401 - a part of a frame

@@ -127,6 +127,8 @@ def diagnose(
         # Faults of data and input first, then the causes that are left without them.
         inquiry = inquire(case.model, used, wrong, terms)
         given = case.used_measurement().responses
+        if any(fault.charge.fault.side == "data" for fault in inquiry.repaired):
+            given = None  # what is wrong with shapes or frequencies is wrong with them too
         inquiry = replace(inquiry, examination=weigh_by_antiresonances(inquiry.examination, given))
         repaired = correct_case(case, inquiry.repaired)
         states = None

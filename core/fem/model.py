@@ -172,8 +172,9 @@ class Model(Shown):
         """
         structure = Structure.build(source) if isinstance(source, Frame) else source
         mass, stiffness = structure.matrices()
-        known = {"free": structure.frame.free, "damping": structure.frame.damping}
-        return cls(mass, stiffness, dofs_of(structure), structure, structure, **known)
+        free, damping = structure.frame.free, structure.frame.damping
+        model = cls(mass, stiffness, dofs_of(structure), structure, structure)
+        return replace(model, free=free, damping=damping)
 
     def rows(self) -> list[tuple[str, str]]:
         """Return what it is a model of, its mass and what of it is not in the matrices."""

@@ -187,12 +187,12 @@ def _zero_changes(
     if not len(kept):
         return (), None
     covariance = np.zeros((len(kept), len(kept)))
-    for state, own, share in (
+    for side, own, share in (
         (now, zeros.take(kept), shares[kept]),
         (before, old.take(partner[kept]), old_shares[partner[kept]]),
     ):
         relative = np.hypot(own.std / own.frequencies, settings.reachable_antiresonance_std)
-        every = state.covariance(np.arange(len(state.given)))
+        every = side.covariance(np.arange(len(side.given)))
         covariance += np.diag(np.square(relative)) + share @ every @ share.T
     hz, was = zeros.frequencies[kept], old.frequencies[partner[kept]]
     ln, std = np.log(hz / was), np.sqrt(np.diag(covariance))
