@@ -6,6 +6,7 @@ from femubench.core.case.opensees import from_opensees as from_opensees
 from femubench.core.child.workers import call_apart as call_apart
 from femubench.core.errors import ModelError as ModelError
 from femubench.core.fem.beam import BeamProperties as BeamProperties
+from femubench.core.fem.damping import Damping as Damping
 from femubench.core.fem.frame import (
     Brace as Brace,
     Coupling as Coupling,

@@ -59,9 +59,10 @@ _LARGEST_ODDS = 1e6
 
 def states(found: Data) -> str:
     """Return in a sentence how two measurements differ, or that they agree."""
-    modes, p = found["modes"], figure(found["p"], 2)
+    modes, p, zeros = found["modes"], figure(found["p"], 2), found["zeros"]
+    of_zeros = f"{len(zeros)} antiresonance{'s' * (len(zeros) != 1)}"
     if found["verdict"] == "agrees":
-        among = f"in {len(modes)} mode{'s' * (len(modes) != 1)}"
+        among = f"in {len(modes)} mode{'s' * (len(modes) != 1)}{f' and {of_zeros}' * bool(zeros)}"
         return f"The two measurements agree {among} (probability {p})."
     rows = sorted(modes, key=lambda row: -abs(row["deviations"] or 0.0))
     changed = [said for row in rows if (said := _changed(row))]
@@ -72,6 +73,13 @@ def states(found: Data) -> str:
     for key, became in (("lost", "of the reference, {} Hz, is gone"), ("new", "at {} Hz is new")):
         alone = [f"mode {m['mode']} {became.format(figure(m['hz']))}" for m in found[key]]
         parts += [first_of(alone, 1)] if alone else []
+    if zeros and found["zeros_p"] < _LIMIT:
+        most = max(zeros, key=lambda row: abs(row["deviations"]))
+        where = f"near {figure(most['present_hz'])} Hz at {most['response']}"
+        moved = _moved(most["change_percent"], most["deviations"], "%")
+        sure = figure(found["zeros_p"], 2)
+        parts.append(f"of {of_zeros} (probability of all {sure}) that {where} {moved}")
+        parts += ["the modes agree"] * (len(parts) == 1)
     parts = parts or [f"all data together (probability {p}), no mode alone"]
     rest = "the other agrees" if len(modes) == len(changed) + 1 else "the others agree"
     parts += [rest] if 0 < len(changed) < len(modes) else []

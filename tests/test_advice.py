@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from advice_problems import STD, advised, every_option, fitted, posed
+from diagnosis_problems import measured, problem_of
 
 from femubench import Model
 from femubench.core.advise.advice import advise
@@ -78,6 +80,28 @@ class TestWinners:
         assert len(middle) == 2
         (modes,) = (o for text, o in options.items() if "2 more modes" in text)
         assert max(*middle, modes) < 1e-6
+
+    def test_responses_are_ranked_next_to_modes_and_sensors(self, symmetric: Model) -> None:
+        """Two of a joint's neighbours differ in many antiresonances, unless these are known."""
+        frame = symmetric.frame_structure.frame
+        truth = JointRotation().extend(symmetric, "A", [3000.0])
+        test = measured(truth, frame, shapes=6, weighed=False)
+        few = test.sensors.take(range(4)), test.shapes[:4], test.shape_std[:4]
+        test = replace(test, **dict(zip(("sensors", "shapes", "shape_std"), few, strict=True)))
+        problem = problem_of(symmetric, test, [JointRotation(), YoungsModulus()])
+        fits = [fitted(problem, JointRotation(), "A"), fitted(problem, YoungsModulus(), "all")]
+        found = {a.measurement: a.separation for a in advised(symmetric, problem, fits)}
+        (text,) = (word for word in found if "frequency responses" in word)
+        assert re.search(r"to a force at \S+: \d\d antiresonances up to \d+ Hz$", text)
+        options = every_option(symmetric, problem, fits)
+        single = [o for word, o in options.items() if "the antiresonance near" in word]
+        (further,) = (o for word, o in options.items() if "at further joints" in word)
+        assert found[text] > max(single)
+        assert further > 1.0
+        known = advise(symmetric, [problem] * 2, fits, tolerance=0.0, responses=True)
+        assert not any("frequency responses" in a.measurement for a in known)
+        twins = every_option(symmetric, problem, [fits[0], fits[0]])
+        assert twins[text] < 1e-9
 
     def test_nothing_helps_between_twins_but_one_option_stays(self, symmetric: Model) -> None:
         truth = YoungsModulus().extend(symmetric, "all", [0.05])

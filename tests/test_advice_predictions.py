@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 from advice_problems import STD, every_option, fitted, one_outlook, posed
-from diagnosis_problems import part_at
+from diagnosis_problems import measured, part_at, problem_of
 from numpy.testing import assert_allclose
 from scipy.special import logsumexp
 
@@ -19,6 +19,8 @@ from femubench.core.advise.point_attachments import antiresonances, predict_load
 from femubench.core.advise.prediction import Outlook, Points, Predicted, distance
 from femubench.core.fit.modal_fit import Fit, state_at
 from femubench.core.inference.settings import overridden
+from femubench.core.modal.antiresonances import predict_antiresonances
+from femubench.core.modal.receptances import PredictedResponses
 from femubench.effect import ModelPlaces
 from femubench.fem import FloatArray, Frame, Place, PointMass, Support
 from femubench.plugins.effects.added_mass import AddedMass
@@ -114,6 +116,45 @@ class TestPredictions:
                 slope = (high.values - low.values) / 2e-3
                 scale = np.abs(own.spread).max(initial=1e-12)
                 assert np.abs(own.spread[:, column] - slope).max(initial=0.0) < 1e-4 * scale
+
+    @overridden({"spare_modes": 1000})
+    def test_antiresonances_at_the_sensors_of_the_test(self, ladder: FrameBuilder) -> None:
+        """Against the zeros of the extended model, and their change within a deviation."""
+        frame = ladder(polar=False)
+        model = Model.of(frame)
+        truth = JointRotation().extend(model, "L", [4e3, 3e3])
+        test = measured(truth, frame, shapes=6, weighed=False)
+        problem = problem_of(model, test, [JointRotation()])
+        found = fitted(problem, JointRotation(), "L", 1.0)
+        view, _ = one_outlook(problem, found)
+        highest = float(test.frequencies.max())
+        own, spread = view.zeros(0, highest)
+        values = found.parts[0].hypothesis.values(found.state.x[None])[0].tolist()
+        whole = JointRotation().extend(model, "L", values)
+        at = whole.observe(test.sensors)
+        modes, lines = solve_modes(whole), np.array([0.5 * test.frequencies.min(), highest])
+        flat = np.zeros(len(modes))
+        partner = int(modes.rigid.sum()) + np.arange(len(test))
+        exact = predict_antiresonances(
+            PredictedResponses(modes, partner, (at, at[[0]], lines), flat)
+        )
+        pairs = own.pair(exact)
+        assert len(own) > 10
+        assert (pairs >= 0).mean() > 0.9
+        apart = np.abs(own.frequencies / exact.frequencies[pairs] - 1.0)[pairs >= 0]
+        assert apart.max() < 1e-3
+        root = np.linalg.cholesky(found.covariance)
+        for column in range(2):
+            ends = []
+            for sign in (-1.0, 1.0):
+                x = found.state.x + 1e-3 * sign * root[:, column]
+                moved = Fit(state_at(problem, found.parts, x), 0.0)
+                end, _ = one_outlook(problem, moved)[0].zeros(0, highest)
+                ends.append(end.frequencies[own.pair(end)])
+            slope = (ends[1] - ends[0]) / 2e-3
+            gap = np.abs(spread[:, column] - slope)
+            assert np.median(gap) < 1e-4 * np.abs(spread).max()
+            assert gap.max() < 1e-2 * np.abs(spread).max()
 
     def test_deflection_of_a_held_frame(self, ladder: FrameBuilder) -> None:
         frame = ladder(polar=False, accelerometer=False)

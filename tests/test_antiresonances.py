@@ -14,6 +14,7 @@ from femubench import NotApplicable
 from femubench.core.modal.antiresonances import (
     antiresonance_slopes,
     find_antiresonances,
+    frequency_shares,
     predict_antiresonances,
 )
 from femubench.core.modal.receptances import PredictedResponses
@@ -61,6 +62,34 @@ def test_their_slopes_are_those_of_differences() -> None:
         low, high = (predict_antiresonances(PredictedResponses.of(m, test)) for m in ends)
         rise = high.frequencies[own.pair(high)] - low.frequencies[own.pair(low)]
         assert column == pytest.approx(rise / (2.0 * step), rel=1e-4, abs=1e-4)
+
+
+def test_they_move_with_each_resonance_by_their_shares() -> None:
+    """Residues fitted to the lines, against the model with one eigenvalue after the other moved."""
+    model, test = simulate(np.ones(3), noise=1e-4, lines=300)
+    answer, step = PredictedResponses.of(model, test), 1e-4
+    own, modes = predict_antiresonances(answer), answer.modes
+    own = own.take(own.frequencies < answer.at[2][-1])  # what lines show
+    shares = frequency_shares(test, own)
+    assert len(own) > 4
+    for column, at in zip(shares.T, answer.partner, strict=True):
+        moved = [modes.eigenvalues.copy() for _ in range(2)]
+        for values, sign in zip(moved, (-1.0, 1.0), strict=True):
+            values[at] *= np.exp(2.0 * sign * step)
+        ends = (replace(modes, eigenvalues=values) for values in moved)
+        low, high = (predict_antiresonances(replace(answer, modes=end)) for end in ends)
+        rise = np.log(high.frequencies[own.pair(high)] / low.frequencies[own.pair(low)])
+        assert column == pytest.approx(rise / (2.0 * step), abs=0.02 * np.abs(shares).max())
+
+
+def test_a_channel_that_holds_noise_alone_shows_none() -> None:
+    _, test = simulate(np.ones(3), lines=300)
+    given, rng = test.responses, np.random.default_rng(3)
+    assert given is not None
+    noise = given.deviations * (rng.standard_normal(given.values.shape) * (1.0 + 1.0j))
+    silent = replace(given, values=noise)
+    assert (noise.real[1:] * noise.real[:-1] < 0.0).sum() > 500
+    assert len(find_antiresonances(silent, test.frequencies, test.damping)) == 0
 
 
 def within_two_deviations(draws: range) -> int:

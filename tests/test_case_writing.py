@@ -23,6 +23,7 @@ from samples import one_of_each
 from femubench import Case, InputError, Model, read_case
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.writing import write_case
+from femubench.core.fem.damping import Damping
 from femubench.core.fem.frame import (
     Brace,
     Coupling,
@@ -220,6 +221,7 @@ def full_frames(ladder: Case, portal: Case, bracket: Case) -> Iterator[tuple[str
             braces=(Brace(("A", "C"), 1e5), Brace(("A", "B"), 2e4, "z")),
             eccentricities=(Eccentricity("left", z=-0.004),),
             gravity=0.5,
+            damping=Damping(1.5, 2e-6, 0.01),
             oscillators=(Oscillator(Place(joint="B"), "x", 0.05, 30.0),),
         ),
     )

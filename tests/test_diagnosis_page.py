@@ -22,6 +22,7 @@ from femubench.core.schema.diagnosis import (
     ModeChange,
     Rival,
     States,
+    ZeroChange,
 )
 from femubench.reports.diagnosis import diagnosis_html, diagnosis_markdown, diagnosis_text
 from tests.command import call_bench
@@ -184,6 +185,22 @@ class TestStates:
         ModeChange(7, 7, 90.0, 90.0, 0.0, 0.2, 0.0, 1.0, 1.0),
     )
     DIFFERS = States("differs", 1e-99, 500.0, 11, MODES, (), (LONE,), (0.6, 0.05))
+
+    def test_antiresonances_are_said_next_to_the_modes(self) -> None:
+        zeros = (
+            ZeroChange("S3", "S1", 88.0, 90.64, 3.0, 4.2),
+            ZeroChange("S2", "S1", 70.0, 70.0, 0.0, 0.0),
+        )
+        same = self.MODES[2:]
+        moved = States("differs", 1e-5, 40.0, 5, same, (), (), None, zeros, 1e-4)
+        text = page_of(data_of(states=moved)).text
+        assert (
+            "The two measurements differ: of 2 antiresonances (probability of all 0.0001) that "
+            "near 90.64 Hz at S3 rose by 3 % (4.2 deviations); the modes agree."
+        ) in text
+        alike = States("agrees", 0.4, 4.0, 5, same, (), (), None, zeros[1:], 1.0)
+        said = "The two measurements agree in 1 mode and 1 antiresonance (probability 0.4)."
+        assert said in page_of(data_of(states=alike)).text
 
     def test_what_differs_is_said_first_then_drawn_then_the_causes(self) -> None:
         data = data_of(states=self.DIFFERS, model_error=(ErrorScale("joints", 0.05, ""),))

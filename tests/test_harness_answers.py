@@ -160,8 +160,9 @@ def test_every_field_of_a_frame_gets_through() -> None:
         nominal = frame_of(case)
         text = msgpack.encode(frame_to_plain(frame, nominal))
         found = frame_from_plain(msgpack.decode(text), nominal, 10_000)
-        # Its sets and whether it hangs free are taken from the nominal one.
-        assert_same_frame(found, replace(frame, sets=nominal.sets, free=nominal.free))
+        # Its sets, its damping and whether it hangs free are taken from the nominal one.
+        kept = {name: getattr(nominal, name) for name in ("sets", "damping", "free")}
+        assert_same_frame(found, replace(frame, **kept))
 
 
 # --- lies ---------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from response_problems import simulate
 
 from femubench.core.fem.sensors import Sensors
 from femubench.core.look.states import compare_states
@@ -129,3 +130,25 @@ def test_a_deviation_that_is_missing_takes_the_median_of_the_others() -> None:
     bare = replace(measured(), sensors=alone, shapes=without, shape_std=without)
     states = compare_states(bare, bare)
     assert (states.count, states.modes[0].mac, states.modes[0].shape_p) == (6, None, None)
+
+
+def test_antiresonances_that_moved_differ_where_modes_agree() -> None:
+    """Responses of another structure with the same modes; noise as stated agrees."""
+    _, before = simulate(np.ones(3), lines=300)
+    _, other = simulate(np.array([1.0, 0.8, 1.0]), lines=300)
+    rng = np.random.default_rng(4)
+    quiet = [compare_states(before.with_noise(rng), before.with_noise(rng)) for _ in range(20)]
+    assert {(states.verdict, len(states.zeros) > 4) for states in quiet} == {("agrees", True)}
+    assert all((states.zeros_p or 0.0) > 0.01 for states in quiet)
+    states = compare_states(replace(before, responses=other.responses), before)
+    assert states.differs
+    assert (
+        compare_states(before, before).count
+        == compare_states(replace(before, responses=None), before).count + 2
+    )
+    assert (states.zeros_p or 1.0) < 1e-6
+    most = max(states.zeros, key=lambda zero: abs(zero.deviations))
+    assert abs(most.deviations) > 5.0
+    assert most.force == before.responses.references.labels[0]  # type: ignore[union-attr]
+    ratio = most.present_hz / most.reference_hz
+    assert most.change_percent == pytest.approx(100.0 * (ratio - 1.0))

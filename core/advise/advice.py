@@ -52,6 +52,7 @@ class Group:
         hertz: relative standard deviation of a frequency, element scatter included.
         tolerance: standard deviation of the relative scatter of every element.
         elements: number of elements that scatter.
+        responses: whether frequency responses are given, so that their antiresonances are known.
     """
 
     views: tuple[Outlook, ...]
@@ -60,6 +61,7 @@ class Group:
     hertz: float
     tolerance: float
     elements: int
+    responses: bool = False
 
     @property
     def data(self) -> Data:
@@ -147,10 +149,47 @@ def _antiresonances(group: Group) -> Iterator[Option]:
             yield in_order(found, lambda option: -min(option.distances))[0]
 
 
+def _responses(group: Group) -> Iterator[Option]:
+    """Yield the force at a sensor of the test whose responses have the best antiresonances.
+
+    Those of all sensors count together. Each has a deviation of its own, and one that is common to
+    all: that of a frequency. Where explanations have other ones, those that both have count.
+    """
+    sensors = group.data.measurement.sensors
+    if group.responses or not len(group.data.shape_rows[0]):
+        return
+    highest, found = float(group.data.measurement.frequencies.max()), []
+    for force, label in enumerate(sensors.labels):
+        (own, spread), *others = (view.zeros(force, highest) for view in group.views)
+        hertz = own.frequencies
+        spread = np.hstack([spread, group.hertz * hertz[:, None]])
+        distances = []
+        for other, wide in others:
+            partner = own.pair(other)
+            kept = np.flatnonzero(partner >= 0)
+            pair = (
+                Predicted(hertz, spread).take(kept),
+                Predicted(other.frequencies, wide).take(partner[kept]),
+            )
+            std = settings.reachable_antiresonance_std * hertz[kept]
+            distances.append(distance(*pair, std) if len(kept) else 0.0)
+        text = f"record frequency responses of all sensors to a force at {label}: "
+        text += f"{len(own)} antiresonances up to {_hertz(highest)} Hz"
+        found.append(Option("responses", text, tuple(distances)))
+    yield from in_order(found, lambda option: -min(option.distances))[:1]
+
+
 def _shapes(group: Group) -> Iterator[Option]:
-    if len(group.data.shape_rows[0]) or not group.points.labels:
+    if not group.points.labels:
         return
     pairs = [view.shapes() for view in group.views]
+    further = ""
+    if len(group.data.shape_rows[0]):
+        view, further = group.views[0], "further "
+        known = view.sensed[None] - view.seen[:, None], view.sensed[None] + view.seen[:, None]
+        least = np.minimum(*(np.abs(gap).max(axis=2) for gap in known)).min(axis=1)
+        new = least > settings.slope_step * np.abs(view.seen).max(axis=1)
+        pairs = [(shapes[new], spread[new]) for shapes, spread in pairs]
     shapes = pairs[0][0]
     if len(shapes) < 2:
         return
@@ -158,7 +197,7 @@ def _shapes(group: Group) -> Iterator[Option]:
     own, *others = [align_shapes(shapes, *pair) for pair in pairs]
     yield group.option(
         "shapes",
-        "measure the shapes of the used modes at joints and in the middle of members",
+        f"measure the shapes of the used modes at {further}joints and in the middle of members",
         [own, *others],
         np.broadcast_to(std, shapes.shape).ravel(),
     )
@@ -234,7 +273,7 @@ def _hertz(frequency: float) -> str:
 
 
 _KINDS: tuple[Callable[[Group], Iterator[Option]], ...] = (
-    _weighing, _more_modes, _masses, _antiresonances, _shapes, _readings, _deflection,
+    _weighing, _more_modes, _masses, _antiresonances, _responses, _shapes, _readings, _deflection,
 )  # fmt: skip
 
 
@@ -244,7 +283,12 @@ def options_for(group: Group) -> list[Option]:
 
 
 def advise(
-    model: Model, problems: Sequence[Problem], fits: Sequence[Fit], *, tolerance: float
+    model: Model,
+    problems: Sequence[Problem],
+    fits: Sequence[Fit],
+    *,
+    tolerance: float,
+    responses: bool = False,
 ) -> tuple[Advice, ...]:
     """Return the measurements that tell the first explanation best from all others.
 
@@ -259,6 +303,7 @@ def advise(
         problems: of each fit; the model may have textbook effects in it.
         fits: explanations that the data cannot tell apart, the most probable first.
         tolerance: standard deviation of the relative scatter of every element.
+        responses: whether frequency responses are given already.
 
     Returns:
         up to eight, largest separation first; at least one where anything can be measured.
@@ -275,7 +320,7 @@ def advise(
     hertz = float(np.median(scatter * m.frequency_std / m.frequencies))
     structure = model.structure
     elements = len(structure.properties) if structure is not None else model.size
-    group = Group(views, points, model.total_mass, hertz, tolerance, elements)
+    group = Group(views, points, model.total_mass, hertz, tolerance, elements, responses)
     return _ranked(options_for(group), [_label(view) for view in views], second_level(group))
 
 

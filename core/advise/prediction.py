@@ -17,6 +17,9 @@ from femubench.core.fem.model import Model
 from femubench.core.fit.modal_fit import Fit, Problem, State, signed_hz, state_at
 from femubench.core.inference.coordinates import modes_for, place_data
 from femubench.core.inference.settings import settings
+from femubench.core.modal.antiresonances import Antiresonances, predict_antiresonances
+from femubench.core.modal.eigen import Modes
+from femubench.core.modal.receptances import PredictedResponses
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 
@@ -120,6 +123,12 @@ class Outlook:
         return np.asarray(self.readings @ self.state.vectors[: self.readings.shape[1]])
 
     @cached_property
+    def sensed(self) -> FloatArray:
+        """Return the readings of the sensors of the test from the modes, (n_sensors, N)."""
+        vectors = self.state.vectors
+        return np.asarray(self.state.problem.space.pad_readings(len(vectors)) @ vectors)
+
+    @cached_property
     def _slopes(self) -> list[tuple[FloatArray, FloatArray, float]]:
         return self.state.problem.space.slopes(self.state.parts, self.state.x)
 
@@ -159,6 +168,29 @@ class Outlook:
         frequencies = signed_hz(values)
         scale = 8.0 * np.pi**2 * np.maximum(np.abs(frequencies), 1e-9)
         return frequencies, spread / scale[..., None]
+
+    def zeros(self, force: int, highest: float) -> tuple[Antiresonances, FloatArray]:
+        """Return the antiresonances of all sensors under a force at one, and their spread, (k, p).
+
+        Arguments:
+            force: at which sensor.
+            highest: frequency in Hz up to which they are sought; from half the lowest measured one.
+        """
+        values, sensed = self.state.eigenvalues, self.sensed
+        own = np.sqrt(np.abs(values[self.state.partner])) / (2.0 * np.pi)
+        at = sp.eye_array(len(sensed), format="csr")
+        modes = Modes(values, sensed, signed_hz(values) <= self.zero)
+        lines = np.array([0.5 * own.min(), highest])
+        where = at, at[[force]], lines
+        answer = PredictedResponses(modes, self.state.partner, where, np.zeros(len(values)))
+        found = predict_antiresonances(answer)
+        found = found.take((found.frequencies >= lines[0]) & (found.frequencies <= highest))
+        square = np.square(2.0 * np.pi * found.frequencies)
+        compliance = 1.0 / (values - square[:, None])
+        left, right = compliance * sensed[found.response], compliance * sensed[force]
+        pull = self.stiffness_spread @ right.T - (self.mass_spread @ right.T) * square
+        steep = 2.0 * square * (left * right).sum(axis=1) / found.frequencies
+        return found, np.einsum("kN,pNk->kp", left, pull) / steep[:, None]
 
     def mass(self) -> Predicted:
         """Return the mass of the structure in kg."""

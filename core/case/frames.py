@@ -13,6 +13,7 @@ from femubench.core.case.checks import check_frame, check_unique
 from femubench.core.case.faults import BadKey, KeyPath, Misfit, WrongDirection, at_key
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.schema import (
+    DampingSpec,
     ExchangeSpec,
     FileSpec,
     FrameSpec,
@@ -24,6 +25,7 @@ from femubench.core.case.schema import (
 )
 from femubench.core.errors import ModelError
 from femubench.core.fem.alteration import Alteration, Exchange, Removable
+from femubench.core.fem.damping import Damping
 from femubench.core.fem.frame import (
     ACTIVE,
     BeamTheory,
@@ -203,6 +205,7 @@ def frame_of(model: FrameSpec) -> Frame:
     materials = {n: Material(m.E, m.nu, m.rho, n) for n, m in model.materials.items()}
     own = ("plane", "beam", "rotary_inertia", "bending_mass", "gravity", "free")
     parts: dict[str, Any] = {key: getattr(model, key) for key in own}
+    parts["damping"] = damping_of(model.damping)
     for key, kind in _PARTS.items():
         parts[key] = tuple(_made(kind, spec) for spec in getattr(model, key))
     members = tuple(
@@ -219,6 +222,11 @@ def frame_of(model: FrameSpec) -> Frame:
         key: attachments(key, getattr(model, key), site) for key in _ATTACHED
     }
     return replace(site.frame, **attached)
+
+
+def damping_of(spec: DampingSpec | None) -> Damping | None:
+    """Return what `[model.damping]` states; None for nothing."""
+    return None if spec is None else Damping(spec.alpha, spec.beta, spec.eta)
 
 
 def _made(kind: Any, spec: TomlTable) -> Any:  # noqa: ANN401 - a part of a frame

@@ -22,6 +22,7 @@ from femubench.core.case.frames import (
     Site,
     alteration_of,
     attachments,
+    damping_of,
     frame_of,
     site_of,
 )
@@ -48,6 +49,7 @@ from femubench.core.case.schema import (
     DrawingSpec,
     FileSpec,
     FrameSpec,
+    MatricesSpec,
     ModificationSpec,
     ScatterSpec,
 )
@@ -189,11 +191,11 @@ class _Building:
         spec = self.spec.model
         with at_key("model"), np.errstate(all="ignore"):
             if isinstance(spec, FileSpec):
-                model = mark_free(model_of_file(spec, self.files, self.readers), spec.free)
+                model = as_stated(model_of_file(spec, self.files, self.readers), spec)
                 self.notes |= dict.fromkeys(remarks_of(spec, self.files, self.readers))
                 return model
             if not isinstance(spec, FrameSpec):
-                return mark_free(model_of_matrices(spec, self.files, self.readers), spec.free)
+                return as_stated(model_of_matrices(spec, self.files, self.readers), spec)
             frame = frame_of(spec)
             try:
                 model = Model.of(frame)
@@ -422,19 +424,20 @@ class _Building:
         return change
 
 
-def mark_free(model: Model, free: bool) -> Model:
-    """Return a model of which it is known whether it hangs free.
+def as_stated(model: Model, spec: MatricesSpec | FileSpec) -> Model:
+    """Return a model with what a case states of its damping, and whether it hangs free.
 
     Raises:
         BadKey: when its supports say otherwise.
     """
-    if not free or model.structure is None:
-        return replace(model, free=free)
-    frame = replace(model.structure.frame, free=True)
-    if frame.supports:
+    model = replace(model, free=spec.free, damping=damping_of(spec.damping))
+    if model.structure is None or not (spec.free or spec.damping):
+        return model
+    frame = replace(model.structure.frame, free=spec.free, damping=model.damping)
+    if frame.free and frame.supports:
         raise BadKey(("free",), FREE_YET_HELD, NOT_HELD)
     structure = model.structure.rebuilt(frame)
-    return replace(model, free=True, structure=structure, geometry=structure)
+    return replace(model, structure=structure, geometry=structure)
 
 
 def check_labels(

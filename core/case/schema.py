@@ -293,6 +293,14 @@ class JointKindSpec(TomlTable):
     made: Made = Field(description=f"one of {', '.join(MADE)}")
 
 
+class DampingSpec(TomlTable):
+    """`[model.damping]`."""
+
+    alpha: NotNegative = Field(0.0, description="a number >= 0 in 1/s, of the mass")
+    beta: NotNegative = Field(0.0, description="a number >= 0 in s, of the stiffness")
+    eta: NotNegative = Field(0.0, description="a number >= 0, the loss factor")
+
+
 class FrameSpec(TomlTable):
     """`[model]` with ``kind = "frame"``."""
 
@@ -305,6 +313,7 @@ class FrameSpec(TomlTable):
     )
     gravity: NotNegative = Field(0.0, description="a multiple of the own weight, a number >= 0")
     free: bool = Field(False, strict=True, description="true or false")
+    damping: DampingSpec | None = Field(None, description="{alpha, beta, eta}")
     materials: dict[Name, MaterialSpec] = Field(description="tables [model.materials.NAME]")
     sections: dict[Name, SectionSpec] = Field(description="tables [model.sections.NAME]")
     joints: Annotated[Many[JointSpec], Field(min_length=2, max_length=MOST_ELEMENTS)] = Field(
@@ -354,6 +363,7 @@ class MatricesSpec(TomlTable):
     stiffness: FileName = Field(description="a matrix file in the case folder")
     dofs: FileName = Field(description="a CSV file: row,node,direction,x,y,z")
     free: bool = Field(False, strict=True, description="true or false")
+    damping: DampingSpec | None = Field(None, description="{alpha, beta, eta}")
     groups: Many[GroupSpec] = Field(
         (), max_length=1000, description="tables [[model.groups]], 1000 at most"
     )
@@ -370,6 +380,7 @@ class FileSpec(TomlTable):
     )
     unit: LengthUnit = Field("m", description=f"one of {', '.join(get_args(LengthUnit))}")
     free: bool = Field(False, strict=True, description="true or false")
+    damping: DampingSpec | None = Field(None, description="{alpha, beta, eta}")
     groups: Many[GroupSpec] = Field(
         (), max_length=1000, description="tables [[model.groups]], 1000 at most"
     )

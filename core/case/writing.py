@@ -8,7 +8,7 @@ import secrets
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -249,6 +249,8 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
             keys[part] = f"{part}.csv"
     if case.model.free:
         keys = {"kind": keys["kind"], "free": True, **keys}
+    if case.model.damping is not None:
+        keys["damping"] = asdict(case.model.damping)
     share = common_share(_measurements(case), known.shape_std)
     measurement: Keys = {"modes": "modes.csv", "shape_std": share}
     if len(case.measurement.sensors):

@@ -124,18 +124,19 @@ def diagnose(
         # Faults of data and input first, then the causes that are left without them.
         inquiry = inquire(case.model, used, wrong, terms)
         given = case.used_measurement().responses
+        if any(fault.charge.fault.side == "data" for fault in inquiry.repaired):
+            given = None  # what is wrong with shapes or frequencies is wrong with them too
         inquiry = replace(inquiry, examination=weigh_by_antiresonances(inquiry.examination, given))
         repaired = correct_case(case, inquiry.repaired)
         states = None
         if repaired.reference is not None:  # what is wrong with the data is no difference
-            states = compare_states(repaired.measurement, repaired.reference)
+            whole = replace(repaired.measurement, responses=given)
+            states = compare_states(whole, repaired.reference)
         proof = _proof(repaired, inquiry.examination, effort, case, states)
         with effort.piece("advice"):
             looks = _looks(case.model, repaired, (*registered, *known))
             posterior, leader = inquiry.examination.posterior, proof.leader
             differs = None if states is None else states.differs
-            if inquiry.examination.antiresonances and not differs:
-                differs = None  # modes alone agree
             decision = decide(posterior, leader, proof.test, differs)
             found = _written(repaired, inquiry, decision, proof, looks, begin)
         # With a reference both states have what the drawing lacks.
@@ -377,7 +378,8 @@ def _advice(examination: Examination, group: Sequence[Explanation]) -> tuple[Adv
         return ()
     problems = [examination.problem_of(e) for e in stated]
     fits = [e.fit for e in stated]
-    return advise(examination.model, problems, fits, tolerance=examination.tolerance)
+    known, scatter = examination.antiresonances > 0, examination.tolerance
+    return advise(examination.model, problems, fits, tolerance=scatter, responses=known)
 
 
 def _notes(

@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from scipy.spatial import cKDTree
 
+from femubench.core.fem.damping import Damping
 from femubench.core.fem.sections import Section
 from femubench.core.typing import FloatArray, IntArray
 
@@ -292,6 +293,7 @@ class Frame:
             & Kosmatka 1993), Hermite's without shear; ``cubic`` takes these in every theory.
         gravity: multiple of the own weight, down along z, that acts on its stiffness.
         free: whether the structure is known to hang free, so that nothing may hold it.
+        damping: of the whole frame; None where nothing is known of it.
         sets: named by the user.
         families: the members of every section and of every material, by the names that these have
             in the case; empty for a frame that was not read.
@@ -311,6 +313,7 @@ class Frame:
     bending_mass: BendingMass = "shear-consistent"
     gravity: float = 0.0
     free: bool = False
+    damping: Damping | None = None
     factors: tuple[Factor, ...] = ()
     preloads: tuple[Preload, ...] = ()
     eccentricities: tuple[Eccentricity, ...] = ()

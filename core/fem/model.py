@@ -15,6 +15,7 @@ from femubench.core.display import Shown, count_noun
 from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.assembly import prune
 from femubench.core.fem.attaching import MatrixChange, attach, grow_matrix
+from femubench.core.fem.damping import Damping
 from femubench.core.fem.frame import Frame, GroundSpring, PointMass
 from femubench.core.fem.sensors import Sensors, unit_motions
 from femubench.core.fem.structure import Structure
@@ -138,6 +139,7 @@ class Model(Shown):
         structure: the meshed frame that gave the matrices; None for matrices from files.
         mass_change, stiffness_change: low-rank terms on top of the sparse matrices.
         free: whether the structure is known to hang free, so that nothing may hold it.
+        damping: of the whole structure; None where nothing is known of it.
         groups, mass_groups: named parts of stiffness and mass of a model from files, sparse (n, n)
             each.
         group_priors: by name of a group, a factor of so much up or down is as likely as not.
@@ -155,6 +157,7 @@ class Model(Shown):
     stiffness_change: LowRank | None = None
     groups: Mapping[str, SparseArray] = field(default_factory=dict)
     free: bool = False
+    damping: Damping | None = None
     mass_groups: Mapping[str, SparseArray] = field(default_factory=dict)
     group_priors: Mapping[str, float] = field(default_factory=dict)
     group_kinds: Mapping[str, str] = field(default_factory=dict)
@@ -169,9 +172,9 @@ class Model(Shown):
         """
         structure = Structure.build(source) if isinstance(source, Frame) else source
         mass, stiffness = structure.matrices()
-        return cls(
-            mass, stiffness, dofs_of(structure), structure, structure, free=structure.frame.free
-        )
+        free, damping = structure.frame.free, structure.frame.damping
+        model = cls(mass, stiffness, dofs_of(structure), structure, structure)
+        return replace(model, free=free, damping=damping)
 
     def rows(self) -> list[tuple[str, str]]:
         """Return what it is a model of, its mass and what of it is not in the matrices."""

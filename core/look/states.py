@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -11,10 +11,11 @@ from scipy.special import chdtrc
 
 from femubench.core.case.modes import FREQUENCY_STD
 from femubench.core.inference.settings import settings
+from femubench.core.modal.antiresonances import find_antiresonances, frequency_shares
 from femubench.core.modal.close_modes import align_close_modes, clusters_of
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import LEAST_SENSORS, Pairing, pair_modes
-from femubench.core.schema.diagnosis import LoneMode, ModeChange, States
+from femubench.core.schema.diagnosis import LoneMode, ModeChange, States, ZeroChange
 from femubench.core.typing import FloatArray, IntArray
 
 
@@ -55,10 +56,12 @@ def compare_states(present: Measurement, reference: Measurement) -> States:
 
     A shape counts as two data however many sensors saw it, by Fisher's sum of -2 ln p: else some
     hundred readings that agree would hide a frequency that does not. So does a mode that one state
-    lacks in the band of both, with the probability that a test misses one.
+    lacks in the band of both, with the probability that a test misses one; and so do all
+    antiresonances together that the responses of both show.
 
     Arguments:
-        present, reference: all modes that were measured, one at least, at the same sensors.
+        present, reference: all modes that were measured, one at least, at the same sensors, with
+            responses or without.
 
     Source: Fisher (1932), Statistical Methods for Research Workers, 21.1, for the sum.
     """
@@ -95,6 +98,8 @@ def compare_states(present: Measurement, reference: Measurement) -> States:
     )
     odds = [row.shape_p for row in rows if row.shape_p is not None]
     odds += [settings.prior_missed_mode] * len([*lost, *new])
+    zeros, zeros_p = _zero_changes(now, before, mine, other)
+    odds += [] if zeros_p is None else [zeros_p]
     moved = change @ np.linalg.pinv(covariance, hermitian=True) @ change
     chi2, count = float(moved) - 2.0 * float(np.log(odds).sum()), len(rows) + 2 * len(odds)
     mass = None
@@ -105,7 +110,7 @@ def compare_states(present: Measurement, reference: Measurement) -> States:
             chi2, count = chi2 + (mass[0] / mass[1]) ** 2, count + 1
     p = float(chdtrc(count, chi2)) if count else 1.0
     verdict: Literal["differs", "agrees"] = "differs" if p < settings.noise_p else "agrees"
-    return States(verdict, p, chi2, count, rows, lost, new, mass)
+    return States(verdict, p, chi2, count, rows, lost, new, mass, zeros, zeros_p)
 
 
 def _pair(now: _State, before: _State) -> tuple[Pairing, dict[int, IntArray]]:
@@ -148,7 +153,60 @@ def _shape_p(now: _State, mode: int, before: _State, columns: IntArray) -> float
         scale = np.linalg.lstsq(space / root[:, None], shape / root, rcond=None)[0]
         variance = own + others @ np.square(scale)
     chi2 = np.square(shape - space @ scale) / variance
-    return max(float(chdtrc(degrees, chi2.sum())), float(np.finfo(float).tiny))
+    return _p_of(degrees, float(chi2.sum()))
+
+
+def _zero_changes(
+    now: _State, before: _State, mine: IntArray, other: IntArray
+) -> tuple[tuple[ZeroChange, ...], float | None]:
+    """Return how antiresonances moved that both states have between the modes of both.
+
+    They move with the resonances, so that errors of these are theirs too. The second value is the
+    probability of as large differences, were they noise; None without antiresonances.
+
+    Arguments:
+        mine, other: the modes of both, of the present state and of the reference.
+    """
+    found, labels = [], now.given.sensors.labels
+    for state, modes in ((now.given, mine), (before.given, other)):
+        if (lines := state.responses) is None or lines.deviations is None:
+            return (), None
+        zeros = find_antiresonances(lines, state.frequencies, state.damping)
+        shares = frequency_shares(state, zeros)
+        # Both count the same modes and sensors.
+        sides = (lines.responses, zeros.response), (lines.references, zeros.force)
+        at = [
+            np.array([labels.index(label) if label in labels else -1 for label in side.labels])[k]
+            for side, k in sides
+        ]
+        zeros = replace(zeros, below=zeros.below[:, modes], response=at[0], force=at[1])
+        found.append((zeros, shares))
+    (zeros, shares), (old, old_shares) = found
+    partner = zeros.pair(old)
+    kept = np.flatnonzero((partner >= 0) & (zeros.response >= 0) & (zeros.force >= 0))
+    if not len(kept):
+        return (), None
+    covariance = np.zeros((len(kept), len(kept)))
+    for side, own, share in (
+        (now, zeros.take(kept), shares[kept]),
+        (before, old.take(partner[kept]), old_shares[partner[kept]]),
+    ):
+        relative = np.hypot(own.std / own.frequencies, settings.reachable_antiresonance_std)
+        every = side.covariance(np.arange(len(side.given)))
+        covariance += np.diag(np.square(relative)) + share @ every @ share.T
+    hz, was = zeros.frequencies[kept], old.frequencies[partner[kept]]
+    ln, std = np.log(hz / was), np.sqrt(np.diag(covariance))
+    moved = zip(kept, was, hz, 100.0 * np.expm1(ln), ln / std, strict=True)
+    rows = tuple(
+        ZeroChange(labels[zeros.response[k]], labels[zeros.force[k]], *map(float, values))
+        for k, *values in moved
+    )
+    return rows, _p_of(len(kept), float(ln @ np.linalg.solve(covariance, ln)))
+
+
+def _p_of(degrees: int, chi2: float) -> float:
+    """Return the probability of as large a chi-square, never 0."""
+    return max(float(chdtrc(degrees, chi2)), float(np.finfo(float).tiny))
 
 
 def _filled(shares: FloatArray, usual: float) -> FloatArray:

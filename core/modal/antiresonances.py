@@ -8,14 +8,16 @@ from functools import cached_property
 import numpy as np
 
 from femubench.core.fem.slopes import MatrixSlopes
-from femubench.core.modal.frf import FrequencyResponses, receptance
-from femubench.core.modal.receptances import PredictedResponses, receptance_slopes
-from femubench.core.typing import AnyArray, BoolArray, FloatArray, IntArray
+from femubench.core.modal.frf import FrequencyResponses, dynamic_stiffness, receptance
+from femubench.core.modal.measurement import Measurement
+from femubench.core.modal.receptances import PredictedResponses, paired_slopes
+from femubench.core.typing import BoolArray, FloatArray, IntArray
 
 SAME = 1.25  # ratio of frequencies within which two may be the same one
 _SIDE = 4  # lines on each side of a change of sign that say where the zero is
 _REACH = 1.15  # ratio of frequencies within which they lie
 _SHARP = 0.01  # of the frequency: one whose deviation is larger says nothing
+_STEEP = 5.0  # deviations: with less of a slope through zero a channel may hold noise alone
 _HIDDEN = 0.01, 2.0  # of a resonance, and dampings of it, within which it hides the zero
 _GRID, _STEPS, _BEYOND = 2000, 4, 1.5
 _STEP = 1e-5  # relative, of a difference by frequency
@@ -104,6 +106,34 @@ def find_antiresonances(
     return _shown(found, poles, damping, poles)
 
 
+def frequency_shares(test: Measurement, zeros: Antiresonances) -> FloatArray:
+    """Return by how much each antiresonance moves with a resonance, d ln f0 / d ln f, (k, m).
+
+    By the residues A of the measured modes, which with an inertia below and a flexibility above
+    the lines fit each channel, and what they make of dH = -A dw_r^2 / (w_r^2 - w^2)^2.
+
+    Arguments:
+        test: with the responses that the antiresonances were found in.
+    """
+    measured, values = test.responses, test.eigenvalues
+    assert measured is not None
+    damping = test.damping_of(np.arange(len(test)), len(test))
+    square, lines = np.square(2.0 * np.pi * zeros.frequencies), 2.0 * np.pi * measured.frequencies
+    terms = 1.0 / dynamic_stiffness(values, measured.frequencies, damping)
+    terms = np.column_stack([terms, 1.0 / np.square(lines), np.ones(len(lines))])
+    found = np.zeros((len(zeros), len(test)))
+    for o, e in set(zip(zeros.response.tolist(), zeros.force.tolist(), strict=True)):
+        own = (zeros.response == o) & (zeros.force == e)
+        weight = 1.0 / measured.receptance_std[:, o, e]
+        rows, right = terms * weight[:, None], np.nan_to_num(measured.receptances[:, o, e]) * weight
+        whole = np.vstack([rows.real, rows.imag]), np.append(right.real, right.imag)
+        *residues, inertia, _ = np.linalg.lstsq(*whole, rcond=None)[0]
+        steep = residues / np.square(values - square[own, None])
+        total = steep.sum(axis=1) - inertia / np.square(square[own])
+        found[own] = steep * values / (total * square[own])[:, None]
+    return found
+
+
 def _zero_of(hertz: FloatArray, y: FloatArray, std: FloatArray) -> tuple[float, float]:
     """Return the zero of a parabola in f^2 that is nearest to the middle, and its deviation."""
     middle = float(np.mean(hertz[_SIDE - 1 : _SIDE + 1]))
@@ -118,7 +148,10 @@ def _zero_of(hertz: FloatArray, y: FloatArray, std: FloatArray) -> tuple[float, 
     root = float(real[np.abs(real).argmin()])
     power = root ** np.arange(3)
     slope = a[1] + 2.0 * a[2] * root
-    sigma = float(np.sqrt(power @ covariance @ power)) / max(abs(slope), 1e-300)
+    turn = np.array([0.0, 1.0, 2.0 * root])
+    if abs(slope) < _STEEP * np.sqrt(turn @ covariance @ turn):
+        return 0.0, np.inf
+    sigma = float(np.sqrt(power @ covariance @ power)) / abs(slope)
     zero = middle * np.sqrt(max(1.0 + root, 0.0))
     return float(zero), 0.5 * middle**2 * sigma / max(float(zero), 1e-300)
 
@@ -162,21 +195,19 @@ def predict_antiresonances(answer: PredictedResponses) -> Antiresonances:
     own = hertz[np.maximum(answer.partner, 0)]
     own = np.where(answer.partner >= 0, own, np.nan)
     found = np.column_stack([zero, o, e, np.zeros(len(zero))])
-    return _shown(found, hertz[inner], answer.damping[inner], own)
+    return _shown(found, hertz[inner], answer.ratios[inner], own)
 
 
 def _real_and_slope(
     answer: PredictedResponses, hertz: FloatArray, o: IntArray, e: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the real part of receptances, each at a frequency of its own, and its slope, (k,)."""
-    response, force, _ = answer.at
-    each, step = np.arange(len(hertz)), _STEP * hertz
-
-    def real(at: FloatArray) -> FloatArray:
-        found = receptance(answer.modes, response, force, at, answer.damping)
-        return np.asarray(found[each, o, e].real)
-
-    return real(hertz), (real(hertz + step) - real(hertz - step)) / (2.0 * step)
+    out, into = answer.read
+    ends = hertz * np.array([[1.0], [1.0 - _STEP], [1.0 + _STEP]])
+    dynamic = dynamic_stiffness(answer.modes.eigenvalues, ends.ravel(), answer.damping)
+    dynamic = dynamic.reshape(3, *out[o].shape)
+    one, low, high = (out[o] * into[e] / dynamic).sum(axis=2).real
+    return one, (high - low) / (2.0 * _STEP * hertz)
 
 
 def antiresonance_slopes(
@@ -186,10 +217,8 @@ def antiresonance_slopes(
 
     On a zero of Re H(f, x) it is -Re(dH/dx) / Re(dH/df).
     """
-    response, force, _ = answer.at
     o, e = found.response, found.force
-    own: AnyArray = receptance_slopes(
-        answer.modes, response, force, found.frequencies, slopes, answer.damping
-    )[np.arange(len(found)), o, e]
+    out, into = answer.read
+    own = paired_slopes(answer.modes, out[o], into[e], found.frequencies, slopes, answer.damping)
     _, by_frequency = _real_and_slope(answer, found.frequencies, o, e)
     return np.asarray(-own.real / by_frequency[:, None])

@@ -10,6 +10,7 @@ import numpy as np
 
 from femubench.core.display import Shown, count_noun
 from femubench.core.errors import ModelError
+from femubench.core.fem.damping import Damping
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import Modes
 from femubench.core.typing import AnyArray, BoolArray, FloatArray, SparseArray
@@ -171,7 +172,7 @@ def receptance(
     response: SparseArray,
     excitation: SparseArray,
     frequencies: FloatArray,
-    damping: FloatArray | float = 0.0,
+    damping: FloatArray | float | Damping = 0.0,
 ) -> FloatArray:
     """Return displacement over force, complex, (n_frequencies, n_response, n_excitation).
 
@@ -179,7 +180,8 @@ def receptance(
         modes: mass-normalised modes, rigid-body modes included.
         response, excitation: readings and forces from dofs, (n_response, n), (n_excitation, n).
         frequencies: in Hz, (n_f,).
-        damping: viscous damping ratio of every mode or of all; ignored at zero frequency.
+        damping: viscous damping ratio of every mode or of all, ignored at zero frequency; or that
+            of the model.
 
     Raises:
         ModelError: at the very frequency of an undamped mode, such as 0 Hz of a free structure.
@@ -190,9 +192,8 @@ def receptance(
         >>> modal.receptance(modes, readings, readings[:1], np.linspace(100.0, 300.0, 5)).shape
         (5, 13, 1)
     """
-    ratio = np.broadcast_to(np.nan_to_num(np.asarray(damping, dtype=float)), len(modes))
     out, into = response @ modes.shapes, excitation @ modes.shapes
-    return modal_sum(modes.eigenvalues, out, into, frequencies, ratio)
+    return modal_sum(modes.eigenvalues, out, into, frequencies, damping)
 
 
 def modal_sum(
@@ -200,7 +201,7 @@ def modal_sum(
     out: FloatArray,
     into: FloatArray,
     frequencies: FloatArray,
-    damping: FloatArray | float,
+    damping: FloatArray | float | Damping,
 ) -> FloatArray:
     """Return the receptance of modes that are known at the readings alone.
 
@@ -208,7 +209,7 @@ def modal_sum(
         eigenvalues: in rad^2/s^2, (m,).
         out, into: mass-normalised shapes at responses and forces, (n_response, m), (n_force, m).
         frequencies: in Hz, (n_f,).
-        damping: viscous damping ratio of every mode, or of all.
+        damping: as of `receptance`.
 
     Raises:
         ModelError: at the very frequency of an undamped mode.
@@ -218,11 +219,18 @@ def modal_sum(
 
 
 def dynamic_stiffness(
-    eigenvalues: FloatArray, frequencies: FloatArray, damping: FloatArray | float
+    eigenvalues: FloatArray, frequencies: FloatArray, damping: FloatArray | float | Damping
 ) -> AnyArray:
-    """Return lambda - w^2 + 2 i z w_r w of modes, (n_f, m); raises ModelError where it is 0."""
+    """Return lambda - w^2 + 2 i z w_r w of modes, (n_f, m); raises ModelError where it is 0.
+
+    Of the damping of a model it is lambda (1 + i eta) - w^2 + i w (alpha + beta lambda).
+    """
     omega = 2.0 * np.pi * np.asarray(frequencies)[:, None]
-    dynamic = eigenvalues - omega**2 + 2j * damping * np.sqrt(np.abs(eigenvalues)) * omega
+    if isinstance(damping, Damping):
+        lost = damping.eta * eigenvalues + omega * (damping.alpha + damping.beta * eigenvalues)
+    else:
+        lost = 2.0 * np.nan_to_num(damping) * np.sqrt(np.abs(eigenvalues)) * omega
+    dynamic = eigenvalues - omega**2 + 1j * lost
     if not dynamic.all():
         raise ModelError("the receptance is infinite at a frequency of an undamped mode")
     return np.asarray(dynamic)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError, NotApplicable
+from femubench.core.fem.damping import Damping
 from femubench.core.fem.model import Model
 from femubench.core.fem.slopes import MatrixSlopes
 from femubench.core.modal.eigen import Modes, modes_of, modes_up_to
@@ -33,13 +35,14 @@ class PredictedResponses:
         modes: as of `response_modes`.
         partner: which of them belongs to every measured mode; -1 where none does, (m,).
         at: readings and forces from dofs, and lines in Hz.
-        damping: ratio of every mode, that of its measured partner.
+        damping: of the model; where nothing is known of it the ratio of every mode, that of its
+            measured partner.
     """
 
     modes: Modes
     partner: IntArray
     at: tuple[SparseArray, SparseArray, FloatArray]
-    damping: FloatArray
+    damping: FloatArray | Damping
 
     @classmethod
     def of(cls, model: Model, measured: Measurement) -> PredictedResponses:
@@ -50,13 +53,25 @@ class PredictedResponses:
         modes = response_modes(model, sp.vstack(rows, format="csr"), float(at.frequencies[-1]))
         readings = np.asarray(model.observe(measured.sensors) @ modes.shapes)
         partner = pair_measured(measured, modes, readings).index
-        damping = measured.damping_of(partner, len(modes))
+        damping = model.damping or measured.damping_of(partner, len(modes))
         return cls(modes, partner, (*rows, at.frequencies), damping)
 
     @cached_property
     def receptances(self) -> AnyArray:
         """Return displacement over force, complex, like the measured ones."""
         return receptance(self.modes, *self.at, self.damping)
+
+    @property
+    def ratios(self) -> FloatArray:
+        """Return the viscous damping ratio of every mode, (m,)."""
+        own = self.damping
+        return own.ratios(self.modes.eigenvalues) if isinstance(own, Damping) else own
+
+    @cached_property
+    def read(self) -> tuple[FloatArray, FloatArray]:
+        """Return the shapes at responses and forces, (n_responses, m), (n_references, m)."""
+        out, into = (np.asarray(rows @ self.modes.shapes) for rows in self.at[:2])
+        return out, into
 
     def slopes(self, slopes: MatrixSlopes) -> AnyArray:
         """Return those of the receptances by parameters, of the slopes of the matrices."""
@@ -111,12 +126,13 @@ def receptance_slopes(
     excitation: SparseArray,
     frequencies: FloatArray,
     slopes: MatrixSlopes,
-    damping: FloatArray | float = 0.0,
+    damping: FloatArray | float | Damping = 0.0,
 ) -> AnyArray:
     """Return d receptance / d parameter, complex, (n_frequencies, n_response, n_excitation, p).
 
-    dH = -H dZ H with dZ = dK - w^2 dM + i w dC. The damping ratio of every mode stays, so that the
-    damping C = sum 2 z_r w_r M phi_r phi_r' M moves with the modes.
+    dH = -H dZ H with dZ = dK - w^2 dM + i w dC. The damping of a model stays in proportion to its
+    matrices; else the ratio of every mode stays, so that the damping C = sum 2 z_r w_r M phi_r
+    phi_r' M moves with the modes.
 
     Arguments:
         modes: mass-normalised; all of them give exact slopes, those of `response_modes` of a large
@@ -129,28 +145,71 @@ def receptance_slopes(
 
     Source: Lin & Ewins (1990), the linear term of their equation; Fox & Kapoor (1968) for dC.
     """
-    ratio = np.broadcast_to(np.nan_to_num(np.asarray(damping, dtype=float)), len(modes))
     out, into = (np.asarray(rows @ modes.shapes) for rows in (response, excitation))
-    compliance = 1.0 / dynamic_stiffness(modes.eigenvalues, frequencies, ratio)
-    of_stiffness, of_mass = _damping_slopes(modes.eigenvalues, ratio)
-    omega = 2.0 * np.pi * np.asarray(frequencies)[None, :, None]
-    lines, size = compliance.shape
-    # Modal coordinates under each force, (m, n_f n_excitation), as pairs of real numbers.
-    coordinates = compliance.T[:, :, None] * into.T[:, None, :]
-    pairs = np.ascontiguousarray(coordinates.reshape(size, -1)).view(float)
+    compliance = 1.0 / dynamic_stiffness(modes.eigenvalues, frequencies, damping)
     read = compliance[:, None, :] * out  # (n_f, n_response, m)
-    found = np.empty((lines, len(out), len(into), slopes.count), dtype=complex)
-    stiffness = slopes.inner(modes.shapes, modes.shapes)
-    mass = slopes.inner(modes.shapes, modes.shapes, "mass")
-    for p, (k, m) in enumerate(zip(stiffness, mass, strict=True)):
-        parts = (k, m, of_stiffness * k + of_mass * m)
-        force, inertia, damped = (
-            (part @ pairs).view(complex).reshape(coordinates.shape) if part.any() else 0.0
-            for part in parts
-        )
-        exerted = force - np.square(omega) * inertia + 1j * omega * damped
+    found = np.empty((len(read), len(out), len(into), slopes.count), dtype=complex)
+    coordinates = compliance.T[:, :, None] * into.T[:, None, :]
+    for p, exerted in enumerate(_exerted(modes, coordinates, frequencies, slopes, damping)):
         found[..., p] = -read @ np.broadcast_to(exerted, coordinates.shape).transpose(1, 0, 2)
     return found
+
+
+def paired_slopes(
+    modes: Modes,
+    out: FloatArray,
+    into: FloatArray,
+    frequencies: FloatArray,
+    slopes: MatrixSlopes,
+    damping: FloatArray | Damping,
+) -> AnyArray:
+    """Return `receptance_slopes` of one response and one force at each frequency, (k, p).
+
+    Arguments:
+        out, into: shapes at the response and at the force of every frequency, (k, m).
+    """
+    compliance = 1.0 / dynamic_stiffness(modes.eigenvalues, frequencies, damping)
+    read, coordinates = (compliance * out).T, (compliance * into).T[:, :, None]
+    found = np.empty((len(compliance), slopes.count), dtype=complex)
+    for p, exerted in enumerate(_exerted(modes, coordinates, frequencies, slopes, damping)):
+        found[:, p] = -np.einsum("mk,mk->k", read, exerted[..., 0])
+    return found
+
+
+def _exerted(
+    modes: Modes,
+    coordinates: AnyArray,
+    frequencies: FloatArray,
+    slopes: MatrixSlopes,
+    damping: FloatArray | float | Damping,
+) -> Iterator[AnyArray]:
+    """Yield what the slope of each parameter exerts on motions, dZ q, in modes, (m, n_f, n).
+
+    Arguments:
+        coordinates: q, modal, under n forces at every frequency, (m, n_f, n).
+    """
+    # As pairs of real numbers.
+    pairs = np.ascontiguousarray(coordinates.reshape(len(modes), -1)).view(float)
+    of_stiffness: FloatArray | float
+    of_mass: FloatArray | float
+    if isinstance(damping, Damping):
+        of_stiffness, of_mass, loss = damping.beta, damping.alpha, damping.eta
+    else:
+        ratio = np.broadcast_to(np.nan_to_num(np.asarray(damping, dtype=float)), len(modes))
+        (of_stiffness, of_mass), loss = _damping_slopes(modes.eigenvalues, ratio), 0.0
+    omega = 2.0 * np.pi * np.asarray(frequencies)[None, :, None]
+    stiffness = slopes.inner(modes.shapes, modes.shapes)
+    mass = slopes.inner(modes.shapes, modes.shapes, "mass")
+    for k, m in zip(stiffness, mass, strict=True):
+        parts = (k, m, of_stiffness * k + of_mass * m)
+        force, inertia, damped = (
+            (part @ pairs).view(complex).reshape(coordinates.shape)
+            if part.any()
+            else np.zeros((len(modes), 1, 1))
+            for part in parts
+        )
+        elastic = (1.0 + 1j * loss) * force
+        yield np.asarray(elastic - np.square(omega) * inertia + 1j * omega * damped)
 
 
 def _damping_slopes(eigenvalues: FloatArray, ratio: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -21,7 +21,7 @@ from femubench.core.run.plain_arrays import BytesError
 from femubench.core.schema.validation import say_fault
 
 # What a strategy may change of a frame; the rest says what kind of structure it is.
-_KEPT = ("plane", "free", "sets", "families")
+_KEPT = ("plane", "free", "damping", "sets", "families")
 _CHANGED = tuple(field.name for field in fields(Frame) if field.name not in _KEPT)
 
 

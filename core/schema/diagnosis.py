@@ -322,6 +322,23 @@ class LoneMode:
 
 
 @dataclass(frozen=True, slots=True)
+class ZeroChange:
+    """An antiresonance of the structure as it is, and the same one of the reference.
+
+    Arguments:
+        response, force: labels of the sensors where motion and force were measured.
+        change_percent, deviations: of its frequency; the deviations of both states count.
+    """
+
+    response: str
+    force: str
+    reference_hz: Number
+    present_hz: Number
+    change_percent: Number
+    deviations: Number
+
+
+@dataclass(frozen=True, slots=True)
 class States:
     """Whether two measurements of a structure differ, without a model.
 
@@ -332,6 +349,8 @@ class States:
         modes: that both states have.
         lost, new: modes that only the reference, only the present state has, in the band of both.
         mass_change: of the weighed mass, and its deviation, kg; None where one was not weighed.
+        zeros: antiresonances that the responses of both states show.
+        zeros_p: probability of as large differences of these, were they noise.
     """
 
     verdict: Literal["differs", "agrees"]
@@ -342,6 +361,8 @@ class States:
     lost: tuple[LoneMode, ...] = ()
     new: tuple[LoneMode, ...] = ()
     mass_change: tuple[Number, Number] | None = None
+    zeros: tuple[ZeroChange, ...] = ()
+    zeros_p: Number | None = None
 
     @property
     def differs(self) -> bool:

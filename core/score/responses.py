@@ -21,7 +21,8 @@ def score_responses(case: Case, model: Model) -> ResponseBlock | None:
     """Return the error of a model's log-magnitudes and phases at held-out lines and sensors.
 
     What noise exceeds is not counted. The model's modes have the damping ratios of the measured
-    modes, held-out ones among them, that they are paired with: no strategy is asked for damping.
+    modes, held-out ones among them, that they are paired with, or the damping that the case states:
+    no strategy is asked for any.
     A model that has no response has no block.
     """
     if case.frfs is None or case.split is None:
