@@ -355,7 +355,7 @@ def test_evidence_is_the_integral_of_likelihood_times_prior(
 def test_what_alone_keeps_the_mass_positive_is_no_passenger(problems: dict[str, Problem]) -> None:
     """Without it the other cause takes away more mass than there is."""
     problem = problems["hframe"]
-    part = part_at(problem, "youngs-modulus", "all")
+    part = part_at(problem, "density", "all")
     away = np.array([-30.0])
     with pytest.raises(ModelError, match="indefinite"):
         state_at(problem, (part,), away)
