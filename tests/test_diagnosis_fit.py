@@ -171,11 +171,13 @@ def test_rebased_coordinates_are_those_of_the_model_with_the_cause_in_it(
     spring = part_at(problem, "grounding-spring", "J5")
     other = part_at(problem, "attached-oscillator", "J1")
     third = part_at(problem, "member-mass", "rung-middle")
+    whole = part_at(problem, "youngs-modulus", "all")
+    assert whole.whole
     index = [
         next(i for i, p in enumerate(problem.space.projections) if p is part)
-        for part in (other, third)
+        for part in (other, third, whole)
     ]
-    x, rest = np.array([0.9]), np.array([0.7, 0.4, 1.2])
+    x, rest = np.array([0.9]), np.array([0.7, 0.4, 1.2, 0.5])
     space = problem.space.rebase((spring,), x)
     # The spring holds one of the rigid modes.
     assert (problem.space.rigid, space.rigid) == (3, 2)
@@ -183,13 +185,13 @@ def test_rebased_coordinates_are_those_of_the_model_with_the_cause_in_it(
         space.eigenvalues, solve_pencil(*problem.space.assemble((spring,), x)[:2])[0]
     )
     above = tuple(space.projections[i] for i in index)
-    together = problem.space.assemble((spring, other, third), np.concatenate([x, rest]))
+    together = problem.space.assemble((spring, other, third, whole), np.concatenate([x, rest]))
     on_top = space.assemble(above, rest)
     elastic = slice(2, None)
     expected, seen = (solve_pencil(*found[:2])[0][elastic] for found in (together, on_top))
     np.testing.assert_allclose(seen, expected, rtol=1e-8)
     assert on_top[2] == pytest.approx(together[2], rel=1e-12)
-    one = state_at(problem, (spring, other, third), np.concatenate([x, rest])).raw
+    one = state_at(problem, (spring, other, third, whole), np.concatenate([x, rest])).raw
     two = state_at(replace(problem, space=space), above, rest).raw
     np.testing.assert_allclose(two, one, atol=1e-5)
 

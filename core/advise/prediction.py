@@ -14,6 +14,7 @@ from femubench.core.change.hypothesis import Hypothesis
 from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.reading import Reading
 from femubench.core.fem.model import Model
+from femubench.core.fit.modal_basis import place_parts
 from femubench.core.fit.modal_fit import Fit, Problem, State, signed_hz, state_at
 from femubench.core.inference.coordinates import modes_for, place_data
 from femubench.core.inference.settings import settings
@@ -105,12 +106,8 @@ class Outlook:
     @property
     def causes(self) -> tuple[tuple[Hypothesis, slice], ...]:
         """Return the causes with their places among the coordinates."""
-        result, start = [], 0
-        for part in self.state.parts:
-            count = len(part.hypothesis.parameters)
-            result.append((part.hypothesis, slice(start, start + count)))
-            start += count
-        return tuple(result)
+        parts = place_parts(len(self.state.problem.space), self.state.parts)
+        return tuple((part.hypothesis, own) for part, _, own in parts)
 
     @property
     def zero(self) -> float:

@@ -13,7 +13,7 @@ from femubench.core.cli.progress import progress
 from femubench.core.cli.registry import plugins_for
 from femubench.core.errors import FemubenchError, InputError
 from femubench.core.files import check_new, write_atomically
-from femubench.core.library.cases import one_case
+from femubench.core.library.cases import one_case, render_diagnosis
 from femubench.core.plugin.validation import choose_names
 from femubench.core.schema.run_options import RunOptions
 
@@ -96,7 +96,6 @@ def diagnose(
     from femubench.core.diagnosis.serial import diagnosis_to_json
     from femubench.core.inference.settings import decisions_from
     from femubench.core.library.diagnose import diagnosis_of, has_model
-    from femubench.core.library.report import rendering
 
     with progress(read.name, quiet=quiet) as on_advance:
         found = diagnosis_of(
@@ -115,7 +114,7 @@ def diagnose(
         found, written=None if fault is not None else written, case=found.subject
     )
     if report_file is not None:
-        write_atomically(report_file, rendering(data, _STYLES[report_file.suffix.lower()]))
+        write_atomically(report_file, render_diagnosis(data, _STYLES[report_file.suffix.lower()]))
     _tell(data, json_file, None if quiet else style)
     if not quiet and style == "terminal" and json_file != options.SCREEN and Path(case).is_dir():
         click.echo(f"Next: bench run {case}")
@@ -139,13 +138,11 @@ def _fault(found: Diagnosis, folder: Path) -> Exception | None:
 
 def _tell(data: Mapping[str, Any], json_file: Path | None, style: str | None) -> None:
     """Print the report, and write or print the JSON."""
-    from femubench.core.library.report import rendering
-
     if json_file is not None:
-        text = rendering(data, "json")
+        text = render_diagnosis(data, "json")
         if json_file == options.SCREEN:
             click.echo(text)
             return
         write_atomically(json_file, text)
     if style is not None:
-        click.echo(rendering(data, style))
+        click.echo(render_diagnosis(data, style))

@@ -80,10 +80,12 @@ class Space:
         for part, index, columns in place_parts(len(self), parts):
             factors = part.hypothesis.factors(x[None, columns])[0]
             weight += float(factors @ part.weights)
+            # A view, which is added to at once, where the part has no coordinates of its own.
+            block = np.ix_(index, index) if part.extra else (slice(len(self)),) * 2
             for matrix, kind in ((stiffness, False), (mass, True)):
                 change = part.matrix(factors, mass=kind)
                 if change is not None:
-                    matrix[np.ix_(index, index)] += change
+                    matrix[block] += change
         return stiffness, mass, weight
 
     def slopes(
@@ -181,7 +183,7 @@ class Space:
             first, last = last, last + len(part.rows)
             rows = together[first:last]
             rows = np.hstack([rows, part.rows[:, n:]]) if part.extra else rows
-            projections.append(replace(part, rows=rows))
+            projections.append(replace(part, rows=rows, whole=False))
         small = float(np.abs(values[self.rigid : self.rigid + 1]).sum()) * 1e-8
         rigid = int((np.abs(values[: self.rigid]) <= small).sum())
         return Space(values, readings, tuple(projections), weight, rigid)

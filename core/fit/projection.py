@@ -64,12 +64,15 @@ class Projection:
         chosen = self.is_mass if mass else ~self.is_mass
         if not chosen.any():
             return None
-        return np.asarray(np.tensordot(factors[..., chosen], self.cores[chosen], axes=1))
+        cores = self.cores if chosen.all() else self.cores[chosen]
+        return np.asarray(np.tensordot(factors[..., chosen], cores, axes=1))
 
     def matrix(self, factors: FloatArray, *, mass: bool) -> FloatArray | None:
         """Return the change of one matrix, (N + extra, N + extra); None where there is none."""
         core = self.core(factors, mass=mass)
-        return None if core is None else np.asarray(self.rows.T @ (core @ self.rows))
+        if core is None or self.whole:
+            return core
+        return np.asarray(self.rows.T @ (core @ self.rows))
 
     @cached_property
     def apart(self) -> bool:

@@ -14,6 +14,7 @@ from femubench.core.change.hypothesis import (
     finer,
     hypotheses_of,
 )
+from femubench.core.fem.model import Model
 from femubench.core.fit.extended_model import check_joint_fit, extend_model
 from femubench.core.fit.modal_fit import Fit, Problem, State, fit, log_evidence, state_at
 from femubench.core.fit.projection import Projection, Projector
@@ -23,6 +24,7 @@ from femubench.core.inference.grid_search import Screened, likely, residuals_at,
 from femubench.core.inference.posterior import Explanation, by_weight
 from femubench.core.inference.prior import Base, selection_cost, textbook_bases
 from femubench.core.inference.settings import settings
+from femubench.core.modal.eigen import keep_last
 from femubench.core.roles import Effect
 from femubench.core.ties import in_order, least
 from femubench.core.typing import FloatArray
@@ -174,15 +176,23 @@ class Search:
     def split(self, explanation: Explanation) -> list[Explanation]:
         """Return an explanation with more values at one of its places, where there are more."""
         result, problem = [], replace(explanation.fit.state.problem, offset=0.0)
-        project = Projector(problem.model, modes_for(problem.model).shapes)
         for i, part in enumerate(explanation.parts):
-            for own in finer(part.hypothesis, problem.model, self.effects):
+            for own in self.finer(problem.model, part.hypothesis):
                 parts = list(explanation.parts)
-                parts[i] = project(own)
+                parts[i] = own
                 fitted = _fit_from_grid(problem, parts, i, explanation.fit)
-                self.coarse[id(own)] = id(part.hypothesis)
+                self.coarse[id(own.hypothesis)] = id(part.hypothesis)
                 result += self.bear_out(explanation.base, fitted)
         return result
+
+    def finer(self, model: Model, hypothesis: Hypothesis) -> list[Projection]:
+        """Return what tells more of a hypothesis where it sits, in the coordinates of a model."""
+
+        def make() -> list[Projection]:
+            project = Projector(model, modes_for(model).shapes)
+            return [project(own) for own in finer(hypothesis, model, self.effects)]
+
+        return keep_last(model, ("finer", hypothesis.cause), hypothesis, make)
 
     def bear_out(self, base: Base, found: Fit | None) -> list[Explanation]:
         """Return the explanation by a fit that its own model bears out, if it is any.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -46,6 +47,13 @@ def way_of(style: str, way: str) -> Callable[..., Any]:
         return found  # type: ignore[no-any-return]
     having = ", ".join(name for name in formats if callable(getattr(formats[name], way, None)))
     raise InputError(f"there is no style {style!r}", expected=f"one of {having}")
+
+
+def render_diagnosis(data: Mapping[str, Any], style: str) -> str:
+    """Return a diagnosis as plain data in a style; nothing that a run needs is loaded."""
+    if style == "json":
+        return json.dumps(data, indent=1, allow_nan=False)
+    return str(way_of(style, "render_diagnosis")(data))
 
 
 class InstalledReaders(Sequence[Reader]):

@@ -16,7 +16,7 @@ from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_js
 from femubench.core.drawing.files import Exhibits
 from femubench.core.errors import FemubenchError, InputError, PluginError
 from femubench.core.files import check_writable, read_bytes, write_atomically
-from femubench.core.library.cases import usable_plugins, way_of
+from femubench.core.library.cases import render_diagnosis, usable_plugins, way_of
 from femubench.core.library.rank import Run as Tables, read_run, store_in
 from femubench.core.plugin.apart import Origin
 from femubench.core.plugin.importing import import_offer
@@ -116,15 +116,15 @@ def rendering(what: object, style: str) -> str:
     further: list[Any] = []
     if isinstance(data, Diagnosis):
         data = diagnosis_to_json(data, case=data.subject)
+    if style not in SUFFIXES:
+        raise InputError(f"there is no style {style!r}", expected=f"one of {', '.join(SUFFIXES)}")
     if isinstance(data, Mapping):
-        way = "render_diagnosis"
-    elif isinstance(data, Comparison):
+        return render_diagnosis(data, style)
+    if isinstance(data, Comparison):
         way, data = "render_comparison", to_plain(data.to_json())
     else:
         way, data = "render_studies", [data] if isinstance(data, Study) else data
         further = [dict(drawings(data)) if style == "html" else {}]
-    if style not in SUFFIXES:
-        raise InputError(f"there is no style {style!r}", expected=f"one of {', '.join(SUFFIXES)}")
     if style != "json":
         return str(way_of(style, way)(data, *further))
     plain, ascii_only = (cells_to_json(data), False) if further else (data, True)
