@@ -42,7 +42,7 @@ def suspicions(run: Run) -> list[str]:
     stated = [
         f"{plain(name)} knows the cases? gain {found.original_gain:.3f} on them, "
         f"{found.gain:.3f} on their twins"
-        + f" (more than twice the error on the twins of {first_of(found.known, 3)})"
+        + f" (more than three times the error on the twins of {first_of(found.known, 3)})"
         * bool(found.known)
         for name, found in twin_gains(run).items()
         if found.suspicious
