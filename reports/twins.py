@@ -13,7 +13,8 @@ MEANING = (
     "ones have other sizes, moduli and densities, of which the truth follows exactly; stretched "
     "ones also other spans and sections, or parts of other materials, of which it follows from "
     "solids that were solved before. A strategy that reckons errs on them about as on their cases; "
-    "one that is clearly better on the cases may know these by heart."
+    "one that is clearly better on the cases may know these by heart. An answer that is the same "
+    "on stretched ones, though their data are not, counts there as the model that was given."
 )
 
 

@@ -67,5 +67,6 @@ def _logs(
         for name in UNSEEN
         if name in blocks
         for mode in blocks[name].modes
-        if (mode.predicted_hz or 0.0) > 0.0 and scale.modes[case].band_of(name, mode) != "band"
+        if mode.predicted_hz is not None and mode.predicted_hz > 0.0
+        if scale.modes[case].band_of(name, mode) != "band"
     }
