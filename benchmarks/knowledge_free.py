@@ -24,7 +24,7 @@ import scipy.sparse as sp
 from scipy.optimize import minimize
 
 import femubench
-from femubench import Measurement, Strategy, UpdateResult
+from femubench import Measurement, Run, Strategy, UpdateResult
 from femubench.core.case.case import Case
 from femubench.core.fem.frame import GroundSpring, PointMass
 from femubench.core.fem.model import Dofs, Geometry, LowRank, Model
@@ -289,13 +289,19 @@ def remember(words: Sequence[str]) -> pd.DataFrame:
     known = [Learnt.of(problem) for problem in problems]
     able = [Memory(known, share, by_make=kind) for kind in (False, True) for share in SHARES]
     names = [problem.case.name for problem in problems]
-    run = femubench.rank(
-        names, [*able, "meet", "shifted"], nominal="textbook", twins=TWINS, timeout=None
+    return list_gains(
+        femubench.rank(
+            names, [*able, "meet", "shifted"], nominal="textbook", twins=TWINS, timeout=None
+        )
     )
-    board, kinds = leaderboard(run).set_index("strategy")["gain"], run.meta["twins"]["kinds"]
-    stretched = {run.meta["twins"]["of"][twin] for twin in kinds if "stretched" in kinds[twin]}
+
+
+def list_gains(run: Run) -> pd.DataFrame:
+    """Return the gains on cases and twins of a run, and who is marked."""
+    board, twins = leaderboard(run).set_index("strategy")["gain"], run.meta["twins"]
+    stretched = {twins["of"][key] for key, kinds in twins["kinds"].items() if "stretched" in kinds}
     rows = [
-        {"strategy": name, "structures": len(names), "stretched": len(stretched),
+        {"strategy": name, "structures": len(run.meta["models"]), "stretched": len(stretched),
          "cases": found.original_gain, "twins": found.gain, "board": board[name],
          "p": found.p, "known": len(found.known), "marked": found.suspicious}
         for name, found in twin_gains(run).items()
@@ -348,16 +354,7 @@ def main() -> None:
     words = parser.parse_args()
     if words.memory is not None:
         files = sorted(TABLE.parents[2].glob("scenarios/suite/*/stretch.npz"))
-        names = {f"suite/{file.parent.name}" for file in files}
-        later = {case.name for case in read_cases(["suite:after the rule"], load_plugins())}
-        whole = {
-            "before the rule": ["suite:before the rule"],
-            "before the rule, stretched": sorted(names - later),
-            "after the rule, stretched": sorted(names & later),
-        }
-        asked = {"asked for": words.memory} if words.memory else whole
-        found = {name: remember(cases) for name, cases in asked.items()}
-        table = pd.concat(found, names=["set"]).reset_index("set")
+        table = remember(words.memory or [f"suite/{file.parent.name}" for file in files])
         print(table.to_string(index=False))
         if not words.memory:
             table.to_csv(MEMORY, index=False, lineterminator="\n")

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from boards import put
+from scipy import stats
 from tabulate import tabulate
 
 import femubench
@@ -35,7 +36,13 @@ FIGURE = ROOT / "docs" / "figures" / "method-by-parameters.svg"
 METHODS = ("bayesian", "cross-model", "eigensensitivity", "global")
 METHODS += ("multi-start", "physical", "sparse", "strain-energy")
 SETS, FACTORS = ("own", "members", "joints", "sections"), ("structure", "method", "parameters")
-COUNT, RESAMPLES = 20, 1999
+COUNT = 20
+# A fixed effect is weighed by how far it differs from structure to structure.
+AGAINST = {
+    "method": "structure x method",
+    "parameters": "structure x parameters",
+    "method x parameters": "remainder",
+}
 
 
 def structures() -> list[str]:
@@ -100,25 +107,47 @@ def analyse(gains: FloatArray) -> dict[str, tuple[int, float]]:
     return found
 
 
-def summarise(gains: FloatArray) -> pd.DataFrame:
-    """Return what every source has of the variance, with 95 % intervals over structures.
+def components(gains: FloatArray) -> FloatArray:
+    """Return the variance components by source, in the order of `analyse`.
 
-    `eta2` is the part of the sum of squares; `omega2` that without what chance adds to it.
-    Structures that are drawn twice add to all parts but the remainder: the intervals are therefore
-    reflected about the estimate (basic bootstrap; Davison & Hinkley 1997, section 5.2).
+    Structures are a random effect, with all that they interact with; of method, parameters and
+    these two together it is the variance of the fixed effects. In a balanced layout these are what
+    REML gives too, as long as no random component is negative.
+
+    Source: Searle, Casella & McCulloch (1992), Variance Components, sections 4.3 and 6.6.
     """
+    count, methods, sets = gains.shape
     freedom, squares = np.array(list(analyse(gains).values())).T
-    random = np.random.default_rng(0).integers(0, len(gains), (RESAMPLES, len(gains)))
-    drawn = np.array([[size for _, size in analyse(gains[own]).values()] for own in random])
-    shares = squares / squares.sum()
-    drawn /= drawn.sum(axis=1, keepdims=True)
-    low, high = 2.0 * shares - np.quantile(drawn, (0.975, 0.025), axis=0)
-    error = squares[-1] / freedom[-1]
-    omega = (squares - freedom * error) / (squares.sum() + error)
-    omega[-1] = np.nan
+    s, m, p, sm, sp, mp, rest = squares / freedom
+    alone = (s - sm - sp + rest) / (methods * sets), (m - sm) / (count * sets)
+    both = (sm - rest) / sets, (sp - rest) / methods, (mp - rest) / count
+    return np.array([*alone, (p - sp) / (count * methods), *both, rest])
+
+
+def summarise(gains: FloatArray) -> pd.DataFrame:
+    """Return the deviation of every source, its share of the variance, and p of fixed effects.
+
+    The 95 % intervals are those of a jackknife over structures (Arvesen 1969, Annals of
+    Mathematical Statistics 40), and p by the F test with 1 and n - 1 degrees of freedom, which
+    holds however cells vary together (Geisser & Greenhouse 1958, the same 29): gains are not
+    normal, and some methods have one set twice.
+    """
+    sources, n = analyse(gains), len(gains)
+    found = components(gains)
+    left = np.array([components(np.delete(gains, i, axis=0)) for i in range(n)])
+    left /= left.sum(axis=1, keepdims=True)
+    share = found / found.sum()
+    reach = stats.t.ppf(0.975, n - 1) * np.sqrt((n - 1) * left.var(axis=0))
+    mean = {name: squares / freedom for name, (freedom, squares) in sources.items()}
+    p = {
+        fixed: stats.f.sf(mean[fixed] / mean[against], 1, n - 1)
+        for fixed, against in AGAINST.items()
+    }
     return pd.DataFrame(
-        {"source": list(analyse(gains)), "df": freedom.astype(int),
-         "eta2": shares, "low": low.clip(0.0), "high": high, "omega2": omega}
+        {"source": list(sources), "df": [freedom for freedom, _ in sources.values()],
+         "deviation": np.sqrt(found.clip(0.0)), "share": share,
+         "low": (share - reach).clip(0.0), "high": share + reach,
+         "p": [p.get(name, np.nan) for name in sources]}
     )  # fmt: skip
 
 

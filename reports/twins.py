@@ -13,7 +13,8 @@ MEANING = (
     "ones have other sizes, moduli and densities, of which the truth follows exactly; stretched "
     "ones also other spans and sections, or parts of other materials, of which it follows from "
     "solids that were solved before. A strategy that reckons errs on them about as on their cases; "
-    "one that is clearly better on the cases may know these by heart."
+    "one that is clearly better on the cases may know these by heart. An answer that is the same "
+    "on stretched ones, though their data are not, counts there as the model that was given."
 )
 
 
@@ -42,7 +43,7 @@ def suspicions(run: RunData) -> list[str]:
     stated = [
         f"{plain(name)} knows the cases? gain {found.original_gain:.3f} on them, "
         f"{found.gain:.3f} on their twins"
-        + f" (more than twice the error on the twins of {first_of(found.known, 3)})"
+        + f" (more than three times the error on the twins of {first_of(found.known, 3)})"
         * bool(found.known)
         for name, found in twin_gains(run).items()
         if found.suspicious

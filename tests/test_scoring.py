@@ -19,7 +19,7 @@ from femubench.core.modal import eigen
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import RunData
-from femubench.core.score.leaderboard import find_basis, leaderboard
+from femubench.core.score.leaderboard import Standings, leaderboard
 from femubench.core.score.ranking import rank_items, rank_results
 from femubench.core.score.scoring import (
     Reference,
@@ -344,8 +344,8 @@ def test_a_case_that_holds_nothing_back_counts_only_among_its_like() -> None:
     assert found[["answered", "total"]].tolist() == [2, 2]
     given = scored.run({"b": {"used": 3.0}}, [result("b", used=1.5)])
     assert leaderboard(given)["gain"][0] == pytest.approx(0.5)
-    assert find_basis(given) == "given"
-    assert find_basis(scored.run(errors, [seen])) == "unseen"
+    assert Standings.basis_of(given) == "given"
+    assert Standings.basis_of(scored.run(errors, [seen])) == "unseen"
 
 
 def test_tests_stand_apart_from_computed_truths() -> None:

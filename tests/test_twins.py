@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -313,8 +314,8 @@ def answer(case: str, error: float, **more: Any) -> JobResult:
 
 
 def test_over_many_structures_the_signs_decide() -> None:
-    # Twelve structures, on the twins of which a strategy leaves more error: no single case.
-    cases = [f"case-{i}" for i in range(12)]
+    # On the twins of twelve structures of thirty a strategy leaves more error: no single case.
+    cases = [f"case-{i}" for i in range(30)]
     meta = scored.meta({name: {"used": 1.0, "higher": 3.0} for name in cases})
     twins = {f"{name}~1": name for name in cases}
     meta["twins"] = {
@@ -325,10 +326,10 @@ def test_over_many_structures_the_signs_decide() -> None:
     results, others = [], []
     for strategy, factor in (("knows", 1.2), ("none", 1.0), ("slightly", 1.05)):
         for i, name in enumerate(cases):
-            error = 2.0 + 0.01 * i
+            error, more = 2.0 + 0.01 * i, factor if i < 12 else 1.0
             results.append(scored.result(name, strategy, higher=error))
-            others.append(scored.result(f"{name}~1", strategy, higher=error * factor))
-    run = RunData(meta, tuple(results), tuple(others))
+            others.append(scored.result(f"{name}~1", strategy, higher=error * more))
+    run = Run(meta, tuple(results), tuple(others))
     found = twin_gains(run)
     assert [found[n].suspicious for n in ("knows", "none", "slightly")] == [True, False, False]
     assert found["knows"].p is not None
@@ -338,6 +339,41 @@ def test_over_many_structures_the_signs_decide() -> None:
     rows = leaderboard(run).set_index("strategy")["gain"]
     assert rows["knows"] == pytest.approx(found["knows"].gain)
     assert rows["none"] == pytest.approx(found["none"].original_gain)
+
+
+def moved_twins(errors: Mapping[str, tuple[float, float]], kind: str, twins: int = 2) -> Run:
+    """Return a run of twelve structures, of which the textbook model errs otherwise on twins.
+
+    Arguments:
+        errors: of each strategy in percent on a case, where the textbook model has 6, and on a
+            twin, where it has 8.
+    """
+    cases = [f"case-{i}" for i in range(12)]
+    of = {f"{name}~{number}": name for name in cases for number in range(1, twins + 1)}
+    meta = scored.meta({name: {"higher": 6.0} for name in cases})
+    there = scored.meta({name: {"higher": 8.0} for name in of})["models"]
+    kinds = {name: [kind, "similar"] for name in of}
+    meta["twins"] = {"of": of, "again": {}, "models": there, "kinds": kinds}
+    first = [scored.result(c, s, higher=own[0]) for s, own in errors.items() for c in cases]
+    others = [scored.result(t, s, higher=own[1]) for s, own in errors.items() for t in of]
+    return Run(meta, tuple(first), tuple(others))
+
+
+def test_an_answer_that_does_not_follow_the_data_of_a_stretched_twin_is_no_gain_there() -> None:
+    # Half of the way to the case, and as far again on its twin; half of the way on both; a share
+    # that is wrong on both; next to nothing done on both.
+    errors = {"half": (3.0, 5.0), "follows": (3.0, 4.0), "worse": (9.0, 11.0), "idle": (5.5, 7.5)}
+    run = moved_twins(errors, "stretched")
+    found, board = twin_gains(run), leaderboard(run).set_index("strategy")["gain"]
+    assert found["half"].original_gain == found["follows"].original_gain == pytest.approx(0.5)
+    assert found["half"].gain == board["half"] == 0.0
+    assert found["follows"].gain == pytest.approx(0.5)
+    assert found["worse"].gain == pytest.approx(-3.0 / 11.0)
+    assert found["idle"].gain == pytest.approx(0.5 / 8.0)
+    assert [name for name, item in found.items() if item.suspicious] == ["half"]
+    # On a similar twin the data are the same, and on one twin alone it may be chance.
+    for other in (moved_twins(errors, "similar"), moved_twins(errors, "stretched", twins=1)):
+        assert twin_gains(other)["half"].gain == pytest.approx(3.0 / 8.0)
 
 
 def test_one_twin_may_be_chance_and_who_is_never_good_knows_nothing() -> None:

@@ -119,8 +119,10 @@ def run_on(ground: Scope, counted: Mapping[str, Mapping[str, Sequence[Outcome]]]
                     if origin != outcome.result.case:
                         continue
                     label = f"{own} of {item.name}"  # every run draws twins of its own
-                    models = item.run.meta["twins"]["models"][own]
+                    stated = item.run.meta["twins"]
+                    models = stated["models"][own]
                     twins["of"][label] = origin
+                    twins["kinds"][label] = (stated.get("kinds") or {}).get(own, [])
                     twins["models"][label] = {"textbook": next(iter(models.values()))}
                     for r in item.run.companions:
                         if (r.case, r.strategy) == (own, name):

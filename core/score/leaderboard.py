@@ -15,6 +15,7 @@ import numpy as np
 from femubench.core.garbage import pause_collection
 from femubench.core.schema.results import BLOCKS, JobResult, Nominal, RunData, origins_of
 from femubench.core.score.bounded_gain import ModelErrors
+from femubench.core.score.carried_answers import carried_answers
 from femubench.core.score.ranking import TIE, Scale, rank_items, rank_results
 from femubench.core.score.statistics import (
     FEWEST,
@@ -62,7 +63,8 @@ class GainTable:
         structures: of each case, by its place among them.
         expected: jobs of every strategy, those on cases that do not count with them.
         values: `FIGURES` by strategy, (cases, seeds, figures); what is missing counts as the model
-            that was given, and on twins not at all.
+            that was given, and on twins not at all; on twins an answer that is carried there from
+            the case counts as the model that was given, where that gains less.
     """
 
     scale: Scale
@@ -105,11 +107,15 @@ class GainTable:
         names += tuple(sorted({result.strategy for result in run.results} - set(names)))
         own = run.structures
         found: dict[tuple[str, str, int], list[FloatArray]] = defaultdict(list)
+        carried = carried_answers(run, scale, listed, origins) if origins else ()
         for result in listed:
             case = result.case if origins is None else origins.get(result.case, "")
             if case in cases:
-                figures = _figures(scale, result.case, scale.errors(result))
-                found[result.strategy, case, result.seed].append(figures)
+                job, errors = (result.strategy, case, result.seed), [scale.errors(result)]
+                if job in carried:
+                    errors.append(scale.start(result.case, nominal))
+                rows = [_figures(scale, result.case, one) for one in errors]
+                found[job].append(min(rows, key=lambda row: float(row[0])))
         # Who did not run on a twin has no gain there.
         given = {
             case: _figures(scale, case, scale.start(case, nominal))
@@ -121,7 +127,7 @@ class GainTable:
         values = {
             name: np.array(
                 [
-                    _mean_of(found.get((name, case, seed)) or [given[case]])
+                    np.mean(found.get((name, case, seed)) or [given[case]], axis=0)
                     for case in held
                     for seed in order
                 ]
@@ -181,6 +187,7 @@ class Standings:
     TIE: ClassVar[float] = TIE
     FEWEST: ClassVar[int] = FEWEST
     METHOD: ClassVar[str] = METHOD
+    interval_tail = staticmethod(interval_tail)
 
     run: RunData
     own: GainTable
@@ -239,7 +246,8 @@ class Standings:
             >>> results.Standings.basis_of(run)
             'unseen'
         """
-        return find_basis(run)
+        scale = Scale.of(run.meta)
+        return "unseen" if any(map(scale.holds_back, scale.textbook)) else "given"
 
     @staticmethod
     def interval_of(run: RunData) -> str:
@@ -250,16 +258,6 @@ class Standings:
             ''
         """
         return GainTable.of(run, (), run.nominals[0]).interval
-
-    @staticmethod
-    def interval_tail(count: int) -> float:
-        """Return the share of resamples beyond either end of an interval over so many structures.
-
-        Examples:
-            >>> [round(results.Standings.interval_tail(count), 3) for count in (6, 10, 1000)]
-            [0.002, 0.009, 0.025]
-        """
-        return interval_tail(count)
 
     @staticmethod
     def ordered(
@@ -276,11 +274,6 @@ class Standings:
             ['a', 'b', 'c']
         """
         return [item for _, item in rank_items(items, key)]
-
-
-def _mean_of(rows: Sequence[FloatArray]) -> FloatArray:
-    """Return the mean of rows, of which there is nearly always one."""
-    return rows[0] if len(rows) == 1 else np.asarray(np.mean(rows, axis=0))
 
 
 def _mean_gain(table: GainTable, values: FloatArray) -> float:
@@ -371,12 +364,6 @@ def row_of(run: RunData, strategy: str) -> dict[str, Any]:
     """
     found = [result for result in run.ranked if result.strategy == strategy]
     return _row(run, strategy, found, Standings.of(run))
-
-
-def find_basis(run: RunData) -> str:
-    """Return on what the gain of a run is measured: ``unseen`` data, or the ``given`` modes."""
-    scale = Scale.of(run.meta)
-    return "unseen" if any(map(scale.holds_back, scale.textbook)) else "given"
 
 
 def is_test(classes: Sequence[str] | None) -> bool:

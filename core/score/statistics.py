@@ -101,6 +101,10 @@ def interval_tail(count: int) -> float:
     Arguments:
         count: number of structures, at least 2.
     Source: Hesterberg (2015), section on expanded percentile intervals.
+
+    Examples:
+        >>> [round(results.Standings.interval_tail(count), 3) for count in (6, 10, 1000)]
+        [0.002, 0.009, 0.025]
     """
     from scipy.special import ndtr, stdtrit
 

@@ -68,21 +68,19 @@ def nearness(case: Case) -> list[tuple[int, float]]:
     That is the number of measured modes without a partner in it, and the rms of
     ln(f_predicted / f_measured) of the others.
     """
-    found = [_nearness(case.model, case.measurement)]
-    for change in case.modifications:
-        model = change.modify(case.model)
-        found.append(_nearness(model, change.measurement))
+    states = [(case.model, case.measurement)]
+    states += [(change.modify(case.model), change.measurement) for change in case.modifications]
+    found = []
+    for model, measured in states:
+        modes = solve_modes(model)
+        readings = model.observe(measured.sensors) @ modes.shapes
+        partners = pair_measured(measured, modes, readings).index
+        paired = partners >= 0
+        predicted = modes.natural_frequencies[partners[paired]]
+        off = np.log(np.abs(predicted) / measured.frequencies[paired])
+        error = np.sqrt(np.square(off).sum() / max(off.size, 1))
+        found.append((int((~paired).sum()), float(error)))
     return found
-
-
-def _nearness(model: Model, measured: Measurement) -> tuple[int, float]:
-    modes = solve_modes(model)
-    partners = pair_measured(measured, modes, model.observe(measured.sensors) @ modes.shapes).index
-    paired = partners >= 0
-    predicted = modes.natural_frequencies[partners[paired]]
-    off = np.log(np.abs(predicted) / measured.frequencies[paired])
-    error = np.sqrt(np.square(off).sum() / max(off.size, 1))
-    return int((~paired).sum()), float(error)
 
 
 def stretch_case(
