@@ -702,7 +702,7 @@ def test_a_case_has_all_its_files_and_says_what_of_them_does_not_count(tmp_path:
         "MDLPRM (1), PARAM (1), PSHELL (1)",
         "truss.bdf: nothing is reduced or held by ASET1 (1): all directions stay",
         "truss.bdf: J of PROD is left out: a joint of rods alone takes up no twist",
-        "truss.bdf: masses are consistent; the file asks for lumped ones (COUPMASS)",
+        "truss.bdf: masses are consistent, not lumped as without PARAM,COUPMASS,1",
     )
     plain = tmp_path / "plain.bdf"
     plain.write_text(TRUSS)
@@ -711,6 +711,8 @@ def test_a_case_has_all_its_files_and_says_what_of_them_does_not_count(tmp_path:
     assert femubench.read_case(tmp_path, readers=(READER,)).digest != case.digest
     plain.write_text(CLAMPED + "PARAM,COUPMASS,1\n")
     assert READER.read_remarks(plain) == ("cards left out: PARAM (1)",)
+    plain.write_text("BEGIN BULK\n" + CLAMPED + "PARAM,COUPMASS,1\n")
+    assert READER.read_remarks(plain)[1] == "nothing is held by SPC: no `SPC = 1` before BEGIN BULK"
 
 
 FOREIGN = {
