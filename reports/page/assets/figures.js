@@ -4,7 +4,7 @@
   const LOOK = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "stroke-opacity", "stroke-linecap", "stroke-linejoin", "opacity",
     "font-family", "font-size", "font-weight", "font-style", "text-anchor", "dominant-baseline", "paint-order", "visibility", "display", "vector-effect"];
   const PIXELS = 3; // of the PNG for one of the screen
-  const node = (tag, attrs) => Object.entries(attrs).reduce((one, [name, value]) => (one.setAttribute(name, value), one), document.createElementNS("http://www.w3.org/2000/svg", tag));
+  const node = (tag, attrs) => Object.entries(attrs).reduce((one, [name, value]) => (one.setAttribute(name, value), one), document.createElementNS(document.querySelector("svg").namespaceURI, tag));
 
   /** Return a copy that looks the same on its own; `drawing.film()` gives what moves, as [element, outlines of one cycle]. */
   function copyOf(drawing, moving) {
