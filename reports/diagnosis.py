@@ -78,7 +78,7 @@ def diagnosis_html(data: Data) -> str:
         brand=f"Diagnosis of {data['case']}",
         foot=f"femubench {data['version']}, {seconds}. The numbers are those of bench "
         "diagnose --json.",
-        scripts=("sortable.js", "diagnosis.js"),
+        scripts=("sortable.js", "diagnosis.js", "figures.js"),
     )
 
 

@@ -40,7 +40,12 @@ def identification_html(found: Identification, source: str = "") -> str:
     brand, heading = f"Identification of {source}" if source else "Identification", _heading(found)
     foot = f"femubench {__version__}. The numbers are those of modes.csv."
     return to_html(
-        _sections(found), title=f"{brand}: {heading}", heading=heading, brand=brand, foot=foot
+        _sections(found),
+        title=f"{brand}: {heading}",
+        heading=heading,
+        brand=brand,
+        foot=foot,
+        scripts=("figures.js",),
     )
 
 

@@ -1,10 +1,9 @@
-"""Hammer tests over time of a lumped frame and a cantilever: own matrices, exact steps of SciPy."""
+"""Hammer tests over time of a lumped frame: own matrices, exact steps of SciPy."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -60,33 +59,6 @@ def frame(
     return Structure(mass, stiffness, "x", xyz)
 
 
-def cantilever(softer: float = 0.0, added: float = 0.0) -> Structure:
-    """Return a steel strip of 0.8 m, its root softer by a share, a mass on its tip in kg."""
-    spans, length = 8, 0.1
-    bending, weight = 210e9 * 0.05 * 0.01**3 / 12.0, 7850.0 * 0.05 * 0.01
-    n = 2 * (spans + 1)
-    mass, stiffness = np.zeros((n, n)), np.zeros((n, n))
-    a = length
-    element = np.array(
-        [[12, 6 * a, -12, 6 * a], [6 * a, 4 * a * a, -6 * a, 2 * a * a],
-         [-12, -6 * a, 12, -6 * a], [6 * a, 2 * a * a, -6 * a, 4 * a * a]]
-    ) * (bending / a**3)  # fmt: skip
-    consistent = np.array(
-        [[156, 22 * a, 54, -13 * a], [22 * a, 4 * a * a, 13 * a, -3 * a * a],
-         [54, 13 * a, 156, -22 * a], [-13 * a, -3 * a * a, -22 * a, 4 * a * a]]
-    ) * (weight * a / 420.0)  # fmt: skip
-    for k in range(spans):
-        rows = np.ix_(range(2 * k, 2 * k + 4), range(2 * k, 2 * k + 4))
-        stiffness[rows] += element * (1.0 - softer * (k < 2))
-        mass[rows] += consistent
-    mass[-2, -2] += added
-    keep = [*range(2, n, 2), *range(3, n, 2)]  # the displacements of all but the root first
-    keep = np.array(keep)
-    xyz = np.outer(length * np.arange(1, spans + 1), [1.0, 0.0, 0.0])
-    ways = np.ix_(keep, keep)
-    return Structure(mass[ways], stiffness[ways], "z", xyz)
-
-
 def hit(
     structure: Structure,
     point: int,
@@ -108,27 +80,3 @@ def hit(
     every = scipy.signal.decimate(every, FINER, axis=0, ftype="fir")
     every += noise * every.std(axis=0) * rng.standard_normal(every.shape)
     return every[:, 0] + 0.2, every[:, 1:] - 0.1
-
-
-def write_mat(
-    file: Path,
-    structure: Structure,
-    points: Sequence[int],
-    seed: int,
-    *,
-    force: bool = True,
-    **how: Any,
-) -> Path:
-    """Write a record of every hit point, on all sensors."""
-    import scipy.io
-
-    forces, motion = zip(*(hit(structure, p, seed + p, **how) for p in points), strict=True)
-    held = {
-        "t": np.arange(len(forces[0])) / RATE,
-        **({"F": np.stack(forces, axis=1)} if force else {}),
-        "acc": np.stack(motion, axis=2),
-        "responses": np.array(structure.labels, dtype=object),
-        "references": np.array([structure.labels[p] for p in points], dtype=object),
-    }
-    scipy.io.savemat(file, held)
-    return file

@@ -713,6 +713,8 @@ def test_a_case_has_all_its_files_and_says_what_of_them_does_not_count(tmp_path:
         plain.write_text(CLAMPED + f"PARAM,COUPMASS,{asked}\n")
         said = tuple(f"masses are consistent; {what}" for what in note)
         assert READER.read_remarks(plain) == ("cards left out: PARAM (1)", *said)
+    plain.write_text("BEGIN BULK\n" + CLAMPED + "PARAM,COUPMASS,1\n")
+    assert READER.read_remarks(plain)[1] == "nothing is held by SPC: no `SPC = 1` before BEGIN BULK"
 
 
 FOREIGN = {

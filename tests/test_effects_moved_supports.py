@@ -216,6 +216,14 @@ def test_changes_are_the_frames_written_out(members: int) -> None:
         assert found.frequency < 1e-3 < found.effect
 
 
+def test_a_quarter_whose_middle_is_a_joint_is_sought_there() -> None:
+    """As in a deck of a solver, whose members are single elements."""
+    model = beam(members=8, elements=8)
+    assert SupportAdded().places(model) == tuple(f"J{i}:z" for i in (1, 3, 5, 7))
+    found = tell(model, [ROLLER], [ROLLER, 0.85], 0.002, 2)
+    assert [(c.effect, c.place) for c in found.causes] == [("support-added", "J7:z")]
+
+
 def test_a_fine_mesh_and_a_support_in_space() -> None:
     """Of more elements than a cubic each can be spared for, several share one."""
     effect, frame = SupportPosition(), beam(elements=30).frame_structure.frame

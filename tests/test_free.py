@@ -165,7 +165,11 @@ def test_damage_is_no_matter_of_tolerance_where_there_is_a_reference() -> None:
     assert loss(None) > -0.39  # pulled towards the drawing
     change = Parameter("change", "", 0.1, lower=-0.9, wording="change")
     assert change.widen(0.4).coordinate(-0.44) == pytest.approx(np.log(0.56) / 0.4)
+    mass = Parameter("mass", "kg", 0.1, one_sided=True)
+    assert mass.coordinate(1.2) == pytest.approx(12.0)  # beyond reach of what a drawing forgets
+    assert mass.widen(0.4).coordinate(1.2) == pytest.approx(np.log(73.0))
     stated = [replace(change, scaling="factor"), replace(change, wording="share")]
+    stated += [Parameter("length", "m", 0.1, upper=0.3, one_sided=True)]
     assert [p.widen(0.4) for p in stated] == stated
 
 

@@ -329,7 +329,7 @@ def test_over_many_structures_the_signs_decide() -> None:
             error, more = 2.0 + 0.01 * i, factor if i < 12 else 1.0
             results.append(scored.result(name, strategy, higher=error))
             others.append(scored.result(f"{name}~1", strategy, higher=error * more))
-    run = Run(meta, tuple(results), tuple(others))
+    run = RunData(meta, tuple(results), tuple(others))
     found = twin_gains(run)
     assert [found[n].suspicious for n in ("knows", "none", "slightly")] == [True, False, False]
     assert found["knows"].p is not None
@@ -341,7 +341,7 @@ def test_over_many_structures_the_signs_decide() -> None:
     assert rows["none"] == pytest.approx(found["none"].original_gain)
 
 
-def moved_twins(errors: Mapping[str, tuple[float, float]], kind: str, twins: int = 2) -> Run:
+def moved_twins(errors: Mapping[str, tuple[float, float]], kind: str, twins: int = 2) -> RunData:
     """Return a run of twelve structures, of which the textbook model errs otherwise on twins.
 
     Arguments:
@@ -356,7 +356,7 @@ def moved_twins(errors: Mapping[str, tuple[float, float]], kind: str, twins: int
     meta["twins"] = {"of": of, "again": {}, "models": there, "kinds": kinds}
     first = [scored.result(c, s, higher=own[0]) for s, own in errors.items() for c in cases]
     others = [scored.result(t, s, higher=own[1]) for s, own in errors.items() for t in of]
-    return Run(meta, tuple(first), tuple(others))
+    return RunData(meta, tuple(first), tuple(others))
 
 
 def test_an_answer_that_does_not_follow_the_data_of_a_stretched_twin_is_no_gain_there() -> None:

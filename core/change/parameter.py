@@ -102,11 +102,16 @@ class Parameter:
         return float(self.scale * np.exp(abs(x)))
 
     def widen(self, std: float) -> Parameter:
-        """Return a relative change as that of a log-normal factor, where it was less free.
+        """Return what is known of it where something has happened to the structure since a test.
+
+        A relative change is that of a log-normal factor, where it was less free. What is put on, a
+        size with a sign but no bound, spans decades up to far beyond what a drawing may forget.
 
         Arguments:
             std: standard deviation of ln(factor).
         """
+        if self.one_sided and self.scaling == "linear" and np.isinf(self.upper):
+            return replace(self, scale=self.scale / self.reach, scaling="exponential")
         if self.wording != "change" or self.scaling != "linear" or self.scale >= std:
             return self
         return replace(self, scale=std, scaling="factor")

@@ -11,6 +11,7 @@ from femubench.core.typing import AnyArray
 _DAMPING = (0.0025, 0.006, 0.015)
 _STEP = 0.004  # between frequencies that are looked at, relative
 _MOST = 12
+_BLOCK = 64
 _APART = 2.0  # half-power bandwidths between candidates
 
 
@@ -32,10 +33,19 @@ def find_hidden_poles(lines: Lines, fit: ModalModel) -> tuple[AnyArray, AnyArray
     damping = np.repeat(_DAMPING, len(omega))
     poles = np.tile(omega, len(_DAMPING)) * (-damping + 1j * np.sqrt(1.0 - damping**2))
     weight = (1j * lines.omega) ** lines.derivative / lines.noise
-    shapes = (1.0 / (1j * lines.omega[:, None] - poles)).astype(np.complex64)
-    size = np.sqrt(np.square(np.abs(weight)) @ np.square(np.abs(shapes)))
-    flat = (weight.conj()[:, None, None] * left).reshape(len(weight), -1).astype(np.complex64)
-    residues = (shapes.conj().T @ flat / size[:, None]).reshape(-1, *left.shape[1:])
+    square = np.square(np.abs(weight)).astype(np.float32)
+    flat = (weight[:, None, None] * left.conj()).reshape(len(weight), -1).T.astype(np.complex64)
+    residues = np.empty((len(poles), len(flat)), dtype=np.complex64)
+    # Some at once, which the processor keeps at hand: all lines by all poles fill the memory.
+    for first in range(0, len(poles), _BLOCK):
+        some = slice(first, first + _BLOCK)
+        apart = (lines.omega[:, None] - poles.imag[some]).astype(np.float32)
+        decay = -poles.real[some].astype(np.float32)
+        size = 1.0 / (np.square(apart) + np.square(decay))  # of 1 / (decay + i apart), squared
+        shapes = np.empty(size.shape, dtype=np.complex64)
+        shapes.real, shapes.imag = decay * size, -apart * size
+        residues[some] = (flat @ shapes / np.sqrt(square @ size)).conj().T
+    residues = residues.reshape(-1, *left.shape[1:])
     gains = np.square(np.abs(residues)).sum(axis=(1, 2))
     # The largest gains that are not side by side.
     best: list[int] = []

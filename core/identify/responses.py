@@ -17,7 +17,7 @@ from femubench.core.identify.identification import Identification
 from femubench.core.identify.lscf import Poles, lscf_poles
 from femubench.core.identify.modal_fit import ModalModel, fit_modes, predict_responses
 from femubench.core.identify.noise import first_weights, noise_kept, noise_left, unevenness
-from femubench.core.identify.selection import find_needed, select
+from femubench.core.identify.selection import find_needed, least_gain, select
 from femubench.core.modal.complex_modes import mean_phase
 from femubench.core.modal.correlation import mac
 from femubench.core.modal.frf import DERIVATIVES, FrequencyResponses
@@ -46,7 +46,8 @@ def identify_responses(
         band: lowest and highest frequency in Hz; None for all lines.
         most_poles: of the largest model of the stabilisation diagram.
         least_collinear: modal phase collinearity below which a shape is no mode's; above 0, what
-            no pole of the models stands for is none either.
+            no pole of the models stands for is none either, nor what does not stand out of the
+            noise around it as a mode has to stand out of that of the weights.
 
     Raises:
         InputError: when there are too few lines, or no mode stands out of the noise.
@@ -70,12 +71,13 @@ def identify_responses(
     orders = len(np.unique(poles.orders))
     clusters = [c for c in clusters_of(poles.select(able), orders) if c.support >= _SUPPORT]
     fit, lines = _fitted(lines, clusters, seen)
-    keep = phase_collinearity(fit.shapes) >= least_collinear
+    keep, clear = phase_collinearity(fit.shapes) >= least_collinear, 0.0
     if least_collinear > 0.0:
+        clear = least_gain(np.ones(len(data.responses)))
         seeds = np.array([cluster.pole for cluster in clusters], dtype=complex)
         near = np.abs(seeds - fit.poles[:, None]) < _SAME * np.abs(fit.poles[:, None])
         keep &= near.any(axis=1)
-    return _identification(data, fit, lines, clusters, poles, keep)
+    return _identification(data, fit, lines, clusters, poles, keep, clear)
 
 
 def _check_linked(data: FrequencyResponses, seen: BoolArray) -> None:
@@ -179,6 +181,7 @@ def _identification(
     clusters: Sequence[Cluster],
     poles: Poles,
     keep: BoolArray,
+    clear: float,
 ) -> Identification:
     s = fit.poles + data.decay
     hz, ratio = np.abs(s) / (2.0 * np.pi), -s.real / np.abs(s)
@@ -199,6 +202,10 @@ def _identification(
     ]
     covariance = fit.shape_covariance[order] * of_shapes[:, None, None]
     shapes, shape_std = _scaled_shapes(fit.shapes[:, order], covariance)
+    faint = np.square(np.abs(shapes)).sum(axis=0) < clear * np.square(shape_std).mean(axis=0)
+    if faint.any():
+        keep = keep & ~np.isin(np.arange(len(keep)), order[faint])
+        return _identification(data, fit, lines, clusters, poles, keep, clear)
     support = [
         max((c.support for c in clusters if abs(c.pole - pole) < _SAME * abs(pole)), default=0.0)
         for pole in fit.poles[order]

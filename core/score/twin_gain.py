@@ -87,7 +87,7 @@ def twin_gains(run: RunData) -> dict[str, TwinGain]:
     }
 
 
-def _known(run: Run, scale: Scale, strategy: str, ran: Sequence[JobResult]) -> tuple[str, ...]:
+def _known(run: RunData, scale: Scale, strategy: str, ran: Sequence[JobResult]) -> tuple[str, ...]:
     """Return the cases on which a strategy is good, and on each of their twins much worse.
 
     Arguments:

@@ -28,6 +28,7 @@ from femubench.plugins.effects.mass_eccentricity import section_size
 _SHARE = 0.005  # of the structure's mass
 _SPREAD, _BOUND = 1.0, 5.0  # of the size of the section
 _FELT = 1e-9
+_ALIKE = 0.999  # cosine of the angle between axes
 
 
 class MassOffset(FrameEffect):
@@ -45,10 +46,11 @@ class MassOffset(FrameEffect):
     )
 
     def places(self, model: Model) -> Sequence[str]:
-        """Return the points along the members at which an arm can be felt."""
+        """Return the points of members and of straight beams at which an arm can be felt."""
         if model.structure is None:
             return ()
-        along = [at for at in ModelPlaces(model).points() if "@" in at]
+        frame = model.structure.frame
+        along = [at for at in ModelPlaces(model).points() if _is_straight(frame, at)]
         # Asked for with every likely added mass, and the same for all of them.
         return once_for(
             model,
@@ -60,7 +62,7 @@ class MassOffset(FrameEffect):
         """Return the mass, and the arm, whose scale is the section's size that way."""
         frame = model.frame_structure.frame
         axis: Literal["y", "z"] = "y" if frame.plane == "out-of-plane" else "z"
-        size = section_size(_member_at(frame, place).section, axis)
+        size = section_size(_members_at(frame, place)[0].section, axis)
         mass = Parameter(
             "mass", "kg", _SHARE * model.total_mass, scaling="exponential", one_sided=True
         )
@@ -102,13 +104,21 @@ def _directions(model: Model) -> list[str]:
     return [d for d in model.frame_structure.frame.active if d in "xyz"]
 
 
-def _member_at(frame: Frame, place: str) -> Member:
-    return frame.members[frame.member_index[str(Places(frame).point(place).member)]]
+def _members_at(frame: Frame, place: str) -> list[Member]:
+    at = Places(frame).point(place)
+    names = [at.member] if at.member else frame.ends_at(str(at.joint))
+    return [frame.members[frame.member_index[str(name)]] for name in names]
+
+
+def _is_straight(frame: Frame, place: str) -> bool:
+    """Tell whether what goes through a point has the same axes on both sides, as in a deck."""
+    axes = [Places(frame).axes(member) for member in _members_at(frame, place)]
+    return 0 < len(axes) <= 2 and all((np.diag(axes[0] @ one.T) > _ALIKE).all() for one in axes)
 
 
 def _across(frame: Frame, place: str) -> FloatArray:
     """Return the direction of an arm, global, (3,); an arm up is not felt out of plane."""
-    axes = Places(frame).axes(_member_at(frame, place))
+    axes = Places(frame).axes(_members_at(frame, place)[0])
     return np.asarray(axes[1] if frame.plane == "out-of-plane" else axes[2])
 
 

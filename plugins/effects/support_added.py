@@ -53,10 +53,11 @@ class SupportAdded(FrameEffect):
             beam = beam_of(frame, member.name)
             seen |= dict(beam.members).keys()
             for k in range(_PARTS):
-                at = beam.place((k + 0.5) / _PARTS * beam.ends[-1])
+                at = Places(frame).point(str(beam.place((k + 0.5) / _PARTS * beam.ends[-1])))
+                point = at.joint or f"{at.member}@{at.s:.6g}"
                 words = directions_across(frame, member.name)
                 tails = [""] if frame.plane == "out-of-plane" else [f":{word}" for word in words]
-                found += [f"{at.member}@{at.s:.6g}{tail}" for tail in tails]
+                found += [f"{point}{tail}" for tail in tails]
         return tuple(found[:_MOST])
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
@@ -107,7 +108,7 @@ class SupportAdded(FrameEffect):
 def _line(frame: Frame, place: str) -> tuple[Beam, float, Member, str]:
     """Return the beam at a place, where on it that is in m, the member there, and a direction."""
     at, direction = Places(frame).directed_point(place)
-    name = place.rpartition("@")[0]
+    name = at.member or frame.ends_at(str(at.joint))[0]
     beam = beam_of(frame, name)
     x = beam.position(frame, at)
     assert x is not None

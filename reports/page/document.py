@@ -14,7 +14,7 @@ SCRIPTS = (
     *("vendor/d3.min.js", "vendor/plot.umd.min.js"),
     *("core.js", "sortable.js", "charts.js", "structure.js"),
     *("ranking.js", "filters.js", "overview.js", "case_matrix.js", "board.js"),
-    *("case_tables.js", "case.js", "app.js"),
+    *("case_tables.js", "case.js", "app.js", "figures.js"),
 )
 # What could end the element that holds the data, or a line of script.
 _ESCAPES = {ord(letter): f"\\u{ord(letter):04x}" for letter in "<>&\u2028\u2029"}

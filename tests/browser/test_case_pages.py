@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -160,6 +161,16 @@ def test_the_mode_moves_until_it_is_paused(shown: Callable[..., Page]) -> None:
     assert drawn(page) == still
     button.click()
     page.wait_for_function("(still) => " + PIXELS + " !== still", arg=still)
+
+
+def test_a_saved_mode_moves(shown: Callable[..., Page]) -> None:
+    page = shown("frame")
+    with page.expect_download() as got:
+        page.locator(f"{VIEW} ~ .saves").get_by_role("button", name="SVG").click()
+    saved = Path(got.value.path()).read_text()
+    outlines = re.findall(r'<animate attributeName="d"[^>]* values="([^"]+)"', saved)
+    assert outlines
+    assert all(len(set(each.split(";"))) > 10 for each in outlines)
 
 
 def test_changes_of_the_stiffness(shown: Callable[..., Page]) -> None:

@@ -63,3 +63,18 @@ def test_hostile_names_stay_text(view: Callable[..., Any], tmp_path: Path) -> No
         assert opened.page.evaluate("document.documentElement.scrollWidth") <= size[0]
         assert (opened.dialogs, opened.messages) == ([], [])
         assert [url for url in opened.requests if not url.startswith("file:")] == []
+
+
+def test_a_figure_is_saved_as_it_looks(view: Callable[..., Any], tmp_path: Path) -> None:
+    opened = view(page_of(tmp_path, toys.data_of()))
+    figures = opened.page.locator("figure:has(svg)")
+    assert figures.count() == opened.page.locator("figure .saves").count() > 0
+    for word, starts in (("SVG", b"<svg"), ("PNG", b"\x89PNG")):
+        with opened.page.expect_download() as got:
+            figures.first.get_by_role("button", name=word).click()
+        assert got.value.suggested_filename.endswith(f".{word.lower()}")
+        saved = Path(got.value.path()).read_bytes()
+        assert saved.startswith(starts)
+        assert len(saved) > 2000
+        assert word == "PNG" or b"fill:" in saved
+    assert opened.messages == []

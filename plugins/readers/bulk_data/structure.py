@@ -225,11 +225,15 @@ class BulkData:
         """Return which cards count for nothing, apart from some that are read."""
         known = [c for c in self.deck.cards if c.name != "PARAM" or c.text(1) != "WTMASS"]
         counts = Counter(card.name for card in known if card.name not in read)
+        free = {card.id(1, "SID") for card in self.cards("SPC", "SPC1")}
+        if not self.deck.controlled or "SPC" in self.deck.chosen:
+            free = set()
         design = {"DVPREL1", "DVPREL2", "DVMREL1", "DVMREL2"} & set(counts)
         found = (
             _listed("cards left out: {}", counts, IGNORED - _REDUCING),
             _listed("nothing is reduced or held by {}: all directions stay", counts, _REDUCING),
             "properties are those of their cards, not of the design variables" * bool(design),
+            f"nothing is held by SPC: no `SPC = {min(free)}` before BEGIN BULK" if free else "",
         )
         return tuple(filter(None, found))
 

@@ -5,6 +5,7 @@
   const START = { "out-of-plane": [32, 34], "in-plane": [14, 12], "3d": [34, 24] };
   const FLAT = { ...START, "out-of-plane": [0, 90], "in-plane": [0, 0] };
   const CYCLE = 2400; // ms of one period on the screen
+  const FRAMES = 24; // of a cycle that is saved
   const REACH = 0.22; // of the radius of the structure, a reading of 1 at an amplitude of 1
   const MOST_LABELS = 12; // of findings that are stated in words on the drawing
   const MANY = 100; // findings; more are drawn by colours while the view moves
@@ -306,6 +307,17 @@
       paint();
     };
     const play = player(drawing, paint);
+    drawing.film = () => {
+      const [parts, phase] = [[layers.shape, layers.arrows], play.phase];
+      const outlines = d3.range(FRAMES + 1).map((k) => {
+        play.phase = Math.cos((2 * Math.PI * k) / FRAMES);
+        paint();
+        return parts.map((part) => part.getAttribute("d"));
+      });
+      play.phase = phase;
+      paint();
+      return parts.map((part, i) => [part, outlines.map((one) => one[i])]).filter(([, [first]]) => first);
+    };
     // Draw a view that has been moved, in full once it rests.
     const move = () => {
       moving = true;
