@@ -86,7 +86,7 @@ def test_the_predictive_board_and_what_the_documents_say_of_it() -> None:
         for key, cell in zip(keys, cells, strict=True):
             assert own[key] == as_printed(cell), (name, key)
     said = re.findall(r"`([a-z-]+)`,? (?:has )?(\d+) %", text.partition("- Above the band")[2])
-    percent = {"diagnosed": 25, "bayesian": 37, "bayesian-sampling": 76}
+    percent = {"diagnosed": 88, "bayesian": 37, "bayesian-sampling": 76}
     assert {name: int(number) for name, number in said} == percent
     for name, number in percent.items():
         assert 100.0 * board[name]["above_coverage90"] == as_printed(str(number))
@@ -121,15 +121,18 @@ def test_what_the_documents_say_of_the_board() -> None:
     )
     rows = {row["strategy"]: row for row in list_rows(stored("after"))}
     said = re.search(
-        r"`diagnosed` is second with a gain of (\S+) \((\S+) to (\S+)\), "
-        r"`shifted`.{0,60} has (\S+):",
+        r"`diagnosed` is first with a gain of (\S+) \((\S+) to (\S+)\), "
+        r"`shifted`.{0,60} has (\d\.\d+)\.",
         text_of("README.md"),
     )
     own = rows["diagnosed"]
     figures = [own["gain"], own["gain_low"], own["gain_high"], rows["shifted"]["gain"]]
     assert said is not None
     assert [as_printed(text) for text in said.groups()] == figures
-    assert own["rank"] == 2
+    assert own["rank"] == 1
+    assert "shifted" not in own["better_than"]
+    (both_own,) = (row for row in list_rows(both) if row["strategy"] == "diagnosed")
+    assert "shifted" in both_own["better_than"]
 
 
 def test_a_board_says_what_its_strategies_could_read_and_that_yardsticks_lead_nothing() -> None:
