@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from femubench.core.change.hypothesis import Hypothesis, hypothesis_at
+from femubench.core.change.hypothesis import Hypothesis, hypotheses_of, hypothesis_at
 from femubench.core.errors import FemubenchError, ModelError
 from femubench.core.fit.extended_model import check_joint_fit, extend_model
 from femubench.core.fit.modal_fit import Fit, Problem, State, bounds_of, fit, state_at
 from femubench.core.fit.projection import Projection, Projector
 from femubench.core.inference.coordinates import modes_for, place_data
-from femubench.core.inference.examine import Examination, is_innate
+from femubench.core.inference.examine import Examination, damage_of, is_innate
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.prior import Base, textbook_bases
 from femubench.core.roles import Effect
@@ -141,7 +141,9 @@ def _fits_on(
         place = next((place for place in places if same(place, finding.place)), None)
         if effect is None or place is None:
             return None
-        found = hypothesis_at(model, effect, place, len(places))
+        every = hypotheses_of(model, (effect,), damage_of(model, examination.reference))
+        found = next((h for h in every if h.place == place), None)
+        found = found or hypothesis_at(model, effect, place, len(places))
         return None if examination.reference is not None and is_innate(found) else found
 
     known = [[(h, f) for f in ways if (h := offered(f)) is not None] for ways in causes]

@@ -222,9 +222,10 @@ def test_wide_priors_are_not_sampled_over_useless_polynomials() -> None:
 def test_what_a_group_is_says_how_far_it_may_change() -> None:
     joint = replace(MODEL, group_kinds={"left": "joint"})
     assert GroupPriors(joint).std("left") == pytest.approx(GroupPriors(MODEL).std("foot"))
-    (stiffer,) = MemberStiffness().parameters(joint, "group:left")
-    assert stiffer.value(stiffer.range[1]) == pytest.approx(1.0)
-    assert stiffer.value(stiffer.range[0]) < -0.999
+    assert GroupPriors(joint).std("left", "mass") == 0.5
+    (softer,) = MemberStiffness().parameters(joint, "group:left")
+    assert softer.value(softer.range[1]) == pytest.approx(0.0)
+    assert softer.value(softer.range[0]) < -0.999
     uppers = {
         change.places[0]: change.parameters[0].upper
         for change in Changes(joint).groups("stiffness", own_prior=True)

@@ -149,6 +149,10 @@ def _points(parameter: EffectParameter, sizes: Sequence[float]) -> list[float]:
     if parameter.scaling == "compliance":
         # Its arm stays rigid however stiff the spring: x = 0 is no model without the effect.
         sizes = (_STIFF, *sizes)
+    if parameter.scaling == "factor" and parameter.scale > 1.0:
+        # At a step by a factor of three and more modes change places.
+        steps = np.arange(2 * len(sizes) - 1)
+        sizes = np.interp(steps, steps[::2], sizes).tolist()
     wanted = list(sizes) if parameter.one_sided else [-s for s in reversed(sizes)] + list(sizes)
     inside = [x for x in wanted if low <= x <= high]
     return inside or [0.5 * (low + high)]

@@ -480,7 +480,7 @@ def _list_groups(model: Model) -> list[Entry]:
     pairs: tuple[tuple[Matrix, str], ...] = ("stiffness", "E"), ("mass", "density")
     for matrix, quantity in pairs:
         for place in groups.places(matrix):
-            std = priors.std(place.removeprefix(groups.PREFIX))
+            std = priors.std(place.removeprefix(groups.PREFIX), matrix)
             term = Term.of(matrix, groups.matrix(matrix, place))
             found.append(_alone(place, matrix, term, std, (quantity,), ()))
     if not model.mass_groups:

@@ -261,22 +261,31 @@ def _candidates(
     model: Model, effects: tuple[Effect, ...], reference: Measurement | None
 ) -> tuple[tuple[Hypothesis, ...], tuple[Effect, ...]]:
     """Return the hypotheses that are screened, and the effects that may come in."""
+    damage = damage_of(model, reference)
     if reference is None:
         effects = tuple(e for e in effects if not getattr(e, "acquired", False))
-        return hypotheses_of(model, by_themselves(effects)), effects
+        return hypotheses_of(model, by_themselves(effects), damage), effects
     alone = by_themselves(effects)
-    offered = hypotheses_of(model, alone, settings.damage_of_part)
+    offered = hypotheses_of(model, alone, damage)
     innate = {id(h.effect) for h in offered if is_innate(h)}
     kept = tuple(e for e in effects if id(e) not in innate)
     return tuple(h for h in offered if id(h.effect) not in innate), kept
+
+
+def damage_of(model: Model, reference: Measurement | None) -> float:
+    """Return how far damage goes, as ln of a factor; 0 where a cause may be mere tolerance.
+
+    That of groups is a class of the model error.
+    """
+    grouped = model.structure is None and bool(model.groups)
+    return settings.damage_of_part if grouped or reference is not None else 0.0
 
 
 def list_left_out(
     model: Model, effects: Iterable[Effect], reference: Measurement | None
 ) -> tuple[LeftOut, ...]:
     """Return the effects that are no candidates, with their places and the reason."""
-    damage = 0.0 if reference is None else settings.damage_of_part
-    offered = model, by_themselves(effects), damage
+    offered = model, by_themselves(effects), damage_of(model, reference)
     free = Counter(h.effect.name for h in holding_to_ground(*offered))
     innate: Counter[str] = Counter()
     if reference is not None:

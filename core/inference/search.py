@@ -283,7 +283,8 @@ class Search:
                     more = (s for s in screened if id(s) not in tried and _are_alike(s, first))
                     queue += [(s, first.state.x) for s in more]
                     known |= {id(other) for other, _ in queue}
-        return fits
+        leading = {id(f) for f in in_order(fits, _by_evidence)[: settings.candidates]}
+        return [_from_both_sides(problem, f) if id(f) in leading else f for f in fits]
 
     def combine(self, found: Sequence[Found]) -> list[Explanation]:
         """Return explanations with two causes, then greedily more while that is worth it."""
@@ -384,6 +385,28 @@ class Search:
                 seed = Explanation(found.base, alone, self.names)
                 result += self.grow(found, seed, tried)
         return result
+
+
+def _by_evidence(found: Fit) -> float:
+    return -found.log_evidence
+
+
+def _from_both_sides(problem: Problem, found: Fit) -> Fit:
+    """Return the best fit of a cause from where it is and from its neighbours on the grid.
+
+    Where modes change places in between, chi-square rises, and no step leads over that. What is
+    as good stays as it is.
+    """
+    grid, x = found.parts[0].hypothesis.grid, found.state.x
+    if len(x) > 1:
+        return found
+    near = int(np.abs(grid - x).argmin())
+    starts = (grid[i] for i in (near - 1, near + 1) if 0 <= i < len(grid))
+    more = (fit(problem, found.parts, x, give_up=found.state.cost) for x in starts)
+    better = [
+        new for new in more if new and new.log_evidence > found.log_evidence + settings.as_well
+    ]
+    return in_order(better, _by_evidence)[0] if better else found
 
 
 def _first_of_a_name(screened: Sequence[Screened]) -> list[Screened]:

@@ -96,7 +96,7 @@ class Settings:
     damage_of_part: float = _prior(
         0.4,
         "of ln(factor)",
-        "of a part where there is a reference: damage is not tolerance",
+        "of a part where there is a reference, of a group always: damage is not tolerance",
     )
     prior_missed_mode: float = _prior(
         0.05, "probability", "a test does not find a mode among those that it finds"
@@ -182,9 +182,9 @@ class Settings:
         "of two modes; a larger one is no matter of what sensors see",
     )
     tolerance_of_groups: tuple[float, ...] = _prior(
-        tuple(kind.std for kind in KINDS.values()),
+        tuple(s for kind in KINDS.values() for s in (kind.std, kind.mass_std)),
         "of ln(factor)",
-        "of parts, joints, supports: within tolerances, loose, hardly known",
+        "stiffness and mass of parts, joints, supports: within tolerances, loose, hardly known",
     )
     stiffest_joint: float = _prior(
         KINDS["joint"].most, "factor", "a joint is drawn whole and stiffens by a fillet at most"

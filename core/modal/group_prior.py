@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.fem.model import Model
+from femubench.core.fem.slopes import Matrix
 from femubench.core.modal.eigen import cache_by_model
 from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.typing import FloatArray, SparseArray
@@ -22,20 +23,22 @@ class GroupKind:
     Arguments:
         std: standard deviation of ln(factor).
         most: the largest factor that is believed.
+        mass_std: standard deviation of ln(factor) of its mass.
         why: one line.
     """
 
     std: float
     most: float
+    mass_std: float
     why: str
 
 
 _LOOSE = float(np.log(5.0) / QUARTILE)  # a factor of five is as likely as not
 KINDS = {
-    "part": GroupKind(0.1, np.inf, "moduli and thicknesses are delivered within tolerances"),
-    "joint": GroupKind(_LOOSE, 2.0, "a joint is drawn whole: it gapes or slips, and stiffens by no "
-                       "more than what a fillet adds"),
-    "support": GroupKind(_LOOSE, np.inf, "ground and clamps are hardly ever known"),
+    "part": GroupKind(0.1, np.inf, 0.03, "moduli and walls have tolerances, masses can be weighed"),
+    "joint": GroupKind(_LOOSE, 2.0, 0.5, "a joint is drawn whole: it gapes or slips, stiffens by "
+                       "no more than a fillet, and is as heavy as what nobody drew on it"),
+    "support": GroupKind(_LOOSE, np.inf, _LOOSE, "ground and clamps are hardly ever known"),
 }  # fmt: skip
 STRUCTURE_STD = KINDS["part"].std
 _FREE = 1e-8  # of the energy that the entries would have without cancelling each other
@@ -70,7 +73,7 @@ class GroupPriors:
         """
         return _supports(self.model)
 
-    def std(self, name: str) -> float:
+    def std(self, name: str, matrix: Matrix = "stiffness") -> float:
         """Return the standard deviation of ln(factor) of a group.
 
         What the case states: a factor of so much up or down is as likely as not. Else that of its
@@ -78,6 +81,7 @@ class GroupPriors:
 
         Arguments:
             name: of a group of the stiffness or the mass.
+            matrix: of which of them.
 
         Examples:
             >>> modal.GroupPriors(model).std("deck")
@@ -85,7 +89,7 @@ class GroupPriors:
         """
         if name in self.model.group_priors:
             return float(np.log(self.model.group_priors[name]) / QUARTILE)
-        return self._kind(name).std
+        return self._kind(name).std if matrix == "stiffness" else self._kind(name).mass_std
 
     def largest_factor(self, name: str) -> float:
         """Return the largest factor on a group that is believed; infinite for most kinds.

@@ -209,7 +209,7 @@ class Changes:
         for place in Groups(model).places(matrix):
             name, std = place.removeprefix(GROUP), None
             if own_prior:
-                std = GroupPriors(model).std(name)
+                std = GroupPriors(model).std(name, matrix)
                 limit = max(20.0, float(np.exp(_WIDEST * std)))
             else:
                 limit = (

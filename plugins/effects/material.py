@@ -48,8 +48,11 @@ class MaterialEffect(FrameEffect):
         group = place.removeprefix(Groups.PREFIX)
         known = {*model.group_priors, *model.group_kinds, *GroupPriors(model).supports}
         if model.structure is None and place.startswith(Groups.PREFIX) and group in known:
-            most = GroupPriors(model).largest_factor(group) if self.constant == "E" else np.inf
-            given = GroupPriors(model).std(group), 0.0, -np.inf, most - 1.0
+            matrix: Literal["mass", "stiffness"] = "stiffness" if self.constant == "E" else "mass"
+            # What a joint is stiffer by, as by a fillet, is no defect: the drawing lacks it.
+            soft = self.constant == "E" and np.isfinite(GroupPriors(model).largest_factor(group))
+            most = 1.0 if soft else np.inf
+            given = GroupPriors(model).std(group, matrix), 0.0, -np.inf, most - 1.0
             return (Parameter(name, "", *given, scaling="factor", wording="change"),)
         return (Parameter(name, "", 0.1, lower=-0.9, wording="change"),)
 

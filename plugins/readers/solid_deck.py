@@ -147,13 +147,15 @@ def _model_of(
     names = {n: name for n, (name, _) in deck.couplings.items()}
     groups, heavy = deck.groups(), {}
     parts: dict[str, SparseArray] = {}
+    masses: dict[str, SparseArray] = {}
     mass = sp.csc_array(_point_masses(deck, found) + hung.mass(deck.attached.masses))
     for name, numbers in (groups or {REST: list(material)}).items():
         stiffness, inertia = _assemble(
             replace(deck, elements=solid.elements), numbers, row, xyz, material
         )
         parts[name] = hung.reduced(stiffness)
-        mass += hung.reduced(inertia)
+        masses[name] = hung.reduced(inertia)
+        mass += masses[name]
         heavy[name] = float(inertia.sum())
     at = {(motion.node, motion.direction): i for i, motion in enumerate(found)}
     axes = np.array([motion.axes for motion in found])
@@ -174,7 +176,9 @@ def _model_of(
     stiffness = sp.csc_array(sum(parts.values()))
     if len(left := hung.kept(stiffness + mass)) < len(found):
         stiffness, mass = stiffness[left][:, left], mass[left][:, left]
-        parts = {name: part[left][:, left] for name, part in parts.items()}
+        parts, masses = (
+            {name: part[left][:, left] for name, part in own.items()} for own in (parts, masses)
+        )
         found, axes = [found[i] for i in left], axes[left]
     labels = [names.get(motion.node, str(motion.node)) for motion in found]
     parts = {name: part for name, part in parts.items() if part.count_nonzero()}
@@ -199,7 +203,8 @@ def _model_of(
     least = JOINT_SHARE * sum(heavy.values())
     small = {name for name in model.groups if heavy.get(name, 0.0) < least}
     grounds = GroupPriors(model).supports - heavy.keys()
-    return replace(model, group_kinds=dict.fromkeys(small - grounds, "joint"))
+    kinds = dict.fromkeys(small - grounds, "joint")
+    return replace(model, mass_groups=masses if len(masses) > 1 else {}, group_kinds=kinds)
 
 
 def _tie(
@@ -337,9 +342,11 @@ def write_factors(model: Model, path: Path, original: Path) -> bool:
     before = _model_of(deck, material, nodes.read_nodes(original))
     groups = deck.groups() or {REST: list(material)}
     found = factors_of(before, model)
-    if "instances" in deck.named or found is None or (deck.masses and found[1] != 1.0):
+    if "instances" in deck.named or found is None:
         return False
     factors, heavier = found
+    if deck.masses and heavier.get(REST, 1.0) != 1.0:  # of all that there is
+        return False
     section = {
         n: pair for name, pair in deck.sections.items() for n in deck.sets[name] if n in material
     }
@@ -357,7 +364,7 @@ def write_factors(model: Model, path: Path, original: Path) -> bool:
             of_shells = np.isfinite(thickness)
             kind = "SHELL" if of_shells else "SOLID"
             sections += [
-                repr(density * heavier),
+                repr(density * heavier.get(name, heavier.get(REST, 1.0))),
                 f"*{kind} SECTION, ELSET={label}, MATERIAL={label}",
             ]
             sections += [repr(thickness)] if of_shells else []
@@ -370,20 +377,27 @@ def write_factors(model: Model, path: Path, original: Path) -> bool:
     return True
 
 
-def factors_of(before: Model, model: Model) -> tuple[dict[str, float], float] | None:
-    """Return factors of the groups and of the mass that make a model; None where there are none."""
-    parts = before.groups or {REST: before.stiffness}
-    whole = model.groups if before.groups else {REST: model.stiffness}
-    heavier = float(model.mass.diagonal().sum() / before.mass.diagonal().sum())
-    heavier = 1.0 if abs(heavier - 1.0) < _SAME else heavier
-    if set(whole) != set(parts) or model.mass.shape != before.mass.shape:
-        return None
-    factors = {n: float(whole[n].diagonal().sum() / k.diagonal().sum()) for n, k in parts.items()}
-    made = sp.csc_array(sum(factors[name] * part for name, part in parts.items()))
-    for own, other in ((made, model.stiffness), (heavier * before.mass, model.mass)):
-        if abs(own - other).max() > _SAME * abs(other).max():
+def factors_of(before: Model, model: Model) -> tuple[dict[str, float], dict[str, float]] | None:
+    """Return factors of stiffness and mass of the groups that make a model; None where none do."""
+    found = []
+    for groups, whole, updated, made in (
+        (before.groups, before.stiffness, model.groups, model.stiffness),
+        (before.mass_groups, before.mass, model.mass_groups, model.mass),
+    ):
+        parts, own = groups or {REST: whole}, updated if groups else {REST: made}
+        if set(own) != set(parts) or made.shape != whole.shape:
             return None
-    return factors, heavier
+        factors = {n: float(own[n].diagonal().sum() / k.diagonal().sum()) for n, k in parts.items()}
+        grown = sum(((factors[n] - 1.0) * k for n, k in parts.items()), start=whole)
+        every = float(made.diagonal().sum() / grown.diagonal().sum())  # a factor on all there is
+        every = 1.0 if abs(every - 1.0) < _SAME else every
+        factors = {n: every * factor for n, factor in factors.items()}
+        factors = {n: 1.0 if abs(f - 1.0) < _SAME else f for n, f in factors.items()}
+        grown = sum(((factors[n] - 1.0) * k for n, k in parts.items()), start=whole)
+        if abs(grown - made).max() > _SAME * abs(made).max():
+            return None
+        found.append(factors)
+    return found[0], found[1]
 
 
 def _other_lines(

@@ -79,20 +79,21 @@ def _scaled(reading: BulkPlates, model: Model, path: Path) -> _Changes:
     """Return the cards of factors on groups of plates, solids and springs; raises InputError."""
     found = factors_of(reading.model(), model)
     expected = ".op4 or .mtx, which hold any"
-    if found is None or (found[1] != 1.0 and reading.attached.masses):
+    if found is None or (reading.attached.masses and found[1].get(REST, 1.0) != 1.0):
         what = "the update is no factor on properties"
         raise InputError(what, file=path, expected=expected)
     factors, heavier = found
     edits = _Factors(reading.deck)
     for name in [*reading.solid.sets, *reading.attached.groups()]:
         factor = factors.get(name, factors.get(REST, 1.0))
+        grown = heavier.get(name, heavier.get(REST, 1.0))
         word, number = name.split()
         card = number_cards(reading.deck, word).get(int(number))
         if card is None:  # the second PELAS of a card
             raise InputError(f"{name} is not the first of its card", file=path, expected=expected)
         material = reading.materials[card.id(2, "MID")] if name in reading.solid.sets else None
-        if factor != 1.0 or (heavier != 1.0 and material):
-            edits.scale(card, factor, heavier, material)
+        if factor != 1.0 or (grown != 1.0 and material):
+            edits.scale(card, factor, grown, material)
     return edits.edits
 
 
