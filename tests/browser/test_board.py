@@ -107,6 +107,8 @@ def test_opens_from_disk_and_is_the_leaderboard(page: Page, real: Any) -> None:
         assert shown_range.inner_text() == "–"
     assert page.locator("tr[data-strategy=nobari] .flags").inner_text().startswith("▲")
     assert "1 failed" in page.locator("tr[data-strategy=kabe] .coverage").inner_text()
+    figures = page.locator("figure:has(svg)")
+    assert page.locator("figure .saves").count() == figures.count() > 0  # legends have drawings too
 
 
 def test_the_headline_and_the_lines_below_are_made_from_the_figures(page: Page, real: Any) -> None:

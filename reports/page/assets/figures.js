@@ -37,12 +37,14 @@
   }
   function offer() {
     for (const drawing of document.querySelectorAll("figure svg:not([data-saved]), svg.case-view:not([data-saved])")) {
-      if (drawing.parentElement.closest("svg")) continue;
+      if (drawing.parentElement.closest("svg, .legend")) continue;
       drawing.dataset.saved = "";
       const figure = drawing.closest("figure");
       const words = figure?.querySelector("figcaption b, figcaption")?.textContent ?? "structure";
       const name = words.trim().toLowerCase().replace(/[^a-z0-9]+/g, "-").slice(0, 40) || "figure";
-      const line = Object.assign(document.createElement("p"), { className: "saves" });
+      // A chart that was drawn again left its buttons.
+      for (const left of figure?.querySelectorAll(".saves") ?? []) if (!left.drawing.isConnected) left.remove();
+      const line = Object.assign(document.createElement("p"), { className: "saves", drawing });
       for (const [title, act] of [["SVG", () => save(`data:image/svg+xml;charset=utf-8,${encodeURIComponent(copyOf(drawing, true))}`, `${name}.svg`)], ["PNG", () => png(drawing, `${name}.png`)]]) {
         const button = Object.assign(document.createElement("button"), { type: "button", className: "button", textContent: title, title: `Save this figure as ${title}` });
         button.addEventListener("click", act);
