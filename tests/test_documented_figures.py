@@ -133,8 +133,8 @@ def test_what_the_readme_says_of_the_board(rows: dict[str, dict[str, Any]]) -> N
 
 def test_the_stated_uncertainties(run: Run) -> None:
     pattern = (
-        r"above the given band (\d+) % lie in the 90 % intervals of `diagnosed` and (\d+) % in those "
-        r"of `bayesian-sampling`,.{0,60} in those of `bayesian`, which does not, (\d+) %"
+        r"above the given band (\d+) % lie in the 90 % intervals of `diagnosed` and (\d+) % in "
+        r"those of `bayesian-sampling`,.{0,60} in those of `bayesian`, which does not, (\d+) %"
     )
     rows = {row["strategy"]: row for row in PredictiveBoard.of(run).rows}
     said = only(pattern, "README.md")
