@@ -184,9 +184,9 @@ class TestEveryCommandOfTheReadme:
             case.model, case.used_measurement(), np.random.default_rng(0)
         )
         femubench.write_model(result.model, "written", like="ours/chain.npz")
-        theirs, ours = np.load("updated/chain.npz"), np.load("written/chain.npz")
-        assert_allclose(theirs["K"], 1.05**2 * stiffness, rtol=1e-6)
-        assert_allclose(ours["K"], theirs["K"], rtol=1e-12)
+        with np.load("updated/chain.npz") as theirs, np.load("written/chain.npz") as ours:
+            assert_allclose(theirs["K"], 1.05**2 * stiffness, rtol=1e-6)
+            assert_allclose(ours["K"], theirs["K"], rtol=1e-12)
 
     def test_reproduce(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(
