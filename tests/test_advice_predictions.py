@@ -17,7 +17,7 @@ from femubench import Model, solve_modes
 from femubench.core.advise.advice import align_shapes
 from femubench.core.advise.point_attachments import antiresonances, predict_loaded_frequencies
 from femubench.core.advise.prediction import Outlook, Points, Predicted, distance
-from femubench.core.fit.modal_fit import Fit, state_at
+from femubench.core.fit.modal_fit import Fit, Problem, state_at
 from femubench.core.inference.settings import overridden
 from femubench.core.modal.antiresonances import predict_antiresonances
 from femubench.core.modal.receptances import PredictedResponses
@@ -29,12 +29,21 @@ from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.material import YoungsModulus
 
 FrameBuilder = Callable[..., Frame]
+STEP = 1e-3  # deviations
 
 
 @pytest.fixture(scope="module")
 def symmetric(ladder: FrameBuilder) -> Model:
     """Return the ladder with its two mirror symmetries."""
     return Model.of(ladder(polar=False, accelerometer=False))
+
+
+def views_around(problem: Problem, found: Fit) -> list[list[Outlook]]:
+    """Return what is seen a step down and up along each column of the root of a covariance."""
+    steps = STEP * np.linalg.cholesky(found.covariance).T
+    ends = [(found.state.x - step, found.state.x + step) for step in steps]
+    at = [[Fit(state_at(problem, found.parts, x), 0.0) for x in pair] for pair in ends]
+    return [[one_outlook(problem, moved)[0] for moved in pair] for pair in at]
 
 
 def seen_values(view: Outlook, points: Points, shapes: FloatArray) -> list[Predicted]:
@@ -105,15 +114,10 @@ class TestPredictions:
         assert problem.space.rigid == 0
         shapes, _ = middle.shapes()
         centre = seen_values(middle, points, shapes)
-        root = np.linalg.cholesky(found.covariance)
-        for column in range(2):
-            ends = []
-            for sign in (-1.0, 1.0):
-                x = found.state.x + 1e-3 * sign * root[:, column]
-                moved = Fit(state_at(problem, found.parts, x), 0.0)
-                ends.append(seen_values(one_outlook(problem, moved)[0], points, shapes))
+        for column, views in enumerate(views_around(problem, found)):
+            ends = [seen_values(view, points, shapes) for view in views]
             for own, low, high in zip(centre, *ends, strict=True):
-                slope = (high.values - low.values) / 2e-3
+                slope = (high.values - low.values) / (2.0 * STEP)
                 scale = np.abs(own.spread).max(initial=1e-12)
                 assert np.abs(own.spread[:, column] - slope).max(initial=0.0) < 1e-4 * scale
 
@@ -143,15 +147,10 @@ class TestPredictions:
         assert (pairs >= 0).mean() > 0.9
         apart = np.abs(own.frequencies / exact.frequencies[pairs] - 1.0)[pairs >= 0]
         assert apart.max() < 1e-3
-        root = np.linalg.cholesky(found.covariance)
-        for column in range(2):
-            ends = []
-            for sign in (-1.0, 1.0):
-                x = found.state.x + 1e-3 * sign * root[:, column]
-                moved = Fit(state_at(problem, found.parts, x), 0.0)
-                end, _ = one_outlook(problem, moved)[0].zeros(0, highest)
-                ends.append(end.frequencies[own.pair(end)])
-            slope = (ends[1] - ends[0]) / 2e-3
+        for column, views in enumerate(views_around(problem, found)):
+            low, high = (view.zeros(0, highest)[0] for view in views)
+            slope = high.frequencies[own.pair(high)] - low.frequencies[own.pair(low)]
+            slope /= 2.0 * STEP
             gap = np.abs(spread[:, column] - slope)
             assert np.median(gap) < 1e-4 * np.abs(spread).max()
             assert gap.max() < 1e-2 * np.abs(spread).max()
