@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import pickle
+import weakref
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -17,6 +20,7 @@ from femubench.core.modal.eigen import (
     count_evaluations,
     dense_matrices,
     modes_of,
+    once_for,
     solve_dense,
     solve_modes,
 )
@@ -117,3 +121,16 @@ def test_what_is_known_of_a_large_model_is_not_solved_again(ladder: FrameBuilder
     with count_evaluations() as made:
         assert len(modes_of(changed, 15)) == len(modes_of(changed, 14)) + 1 == 16
     assert made.count == 1
+
+
+def test_what_is_made_of_a_model_ends_with_it_and_does_not_travel(ladder: FrameBuilder) -> None:
+    def use() -> weakref.ref[Model]:
+        model = Model.of(ladder())
+        assert once_for(model, "itself", lambda: model) is model
+        copy = pickle.loads(pickle.dumps(model))
+        assert once_for(copy, "itself", lambda: copy) is copy
+        return weakref.ref(model)
+
+    held = use()
+    gc.collect()
+    assert held() is None

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.linalg as la
@@ -162,6 +162,10 @@ class Model(Shown):
     group_priors: Mapping[str, float] = field(default_factory=dict)
     group_kinds: Mapping[str, str] = field(default_factory=dict)
     finer: Callable[[], tuple[Model, Model]] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return its fields alone: what was made of this very model stays with it."""
+        return {part.name: getattr(self, part.name) for part in fields(self)}
 
     @classmethod
     def of(cls, source: Frame | Structure) -> Model:

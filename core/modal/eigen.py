@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, TypeVar
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy.linalg as la
@@ -248,7 +247,8 @@ def zero_tolerance(modes: Modes) -> float:
 
 _Kept = TypeVar("_Kept")
 _Given = ParamSpec("_Given")
-_kept: WeakKeyDictionary[Model, dict[Hashable, Any]] = WeakKeyDictionary()
+# In the model: a table of models by weak references would never lose one to which a value refers.
+_KEPT = "_kept"
 
 
 def once_for(model: Model, key: Hashable, make: Callable[[], _Kept]) -> _Kept:
@@ -262,7 +262,7 @@ def once_for(model: Model, key: Hashable, make: Callable[[], _Kept]) -> _Kept:
         >>> effect.once_for(model, "size", lambda: model.size)
         81
     """
-    entry = _kept.setdefault(model, {})
+    entry: dict[Hashable, Any] = vars(model).setdefault(_KEPT, {})
     if key not in entry:
         entry[key] = make()
     value: _Kept = entry[key]
@@ -344,7 +344,7 @@ def modes_of(model: Model, count: int | None = None) -> Modes:
     """
     small = model.size <= DENSE_LIMIT
     few = count is not None and model.size > max(_FEW_FROM, _FEW_SHARE * count)
-    if small and not (few and "modes" not in _kept.get(model, {})):
+    if small and not (few and "modes" not in vars(model).get(_KEPT, {})):
         modes = once_for(model, "modes", lambda: solve_modes(model))
         return modes if count is None else modes.take(np.arange(min(count, len(modes))))
     wanted = _MANY if count is None else count
