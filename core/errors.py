@@ -101,8 +101,6 @@ def require(package: str, extra: str, what: str) -> None:
     """Make sure that a package of an extra is there.
 
     Arguments:
-        package: that is imported next.
-        extra: of femubench, which brings it.
         what: needs it, e.g. ``"format parquet"``.
 
     Raises:

@@ -22,7 +22,6 @@ def check_regular(path: Path, largest: int) -> None:
     A pipe would be waited for and a device may act on being opened.
 
     Arguments:
-        path: may be a link.
         largest: the size in bytes up to which it is read.
 
     Raises:
@@ -86,11 +85,7 @@ def read_text(path: Path, largest: int) -> str:
 
 
 def resolve_path(path: Path) -> Path:
-    """Return the path without links.
-
-    Raises:
-        InputError: where links lead round in a circle.
-    """
+    """Return the path without links; raises InputError where links lead round in a circle."""
     try:
         return path.resolve()
     except (OSError, RuntimeError) as error:  # the latter before Python 3.13

@@ -13,7 +13,6 @@ class Advance:
 
     Arguments:
         done, total: pieces of work, as far as they are known.
-        what: what is done now.
         left: seconds that the rest takes; None where that is not known.
         current: seconds of those that the present piece takes: for so long, time that goes by is
             time less.

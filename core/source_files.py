@@ -20,11 +20,7 @@ def stamps(top: str) -> tuple[Stamp, ...]:
 
 
 def files_of(top: str) -> list[str]:
-    """Return the Python files of a package, or that of a lone module; none where it is not there.
-
-    Arguments:
-        top: its name, without a dot.
-    """
+    """Return the Python files of a package, or that of a lone module; none without it."""
     try:
         spec = find_spec(top)
     except (ImportError, ValueError, AttributeError):

@@ -16,7 +16,6 @@ class Column:
     """A column of a table.
 
     Arguments:
-        title: its header.
         width: the most characters that a cell takes on the screen; 0 for what the others leave.
         left: whether it holds words rather than figures.
         wrap: whether a longer cell goes on below, instead of being cut.
@@ -52,7 +51,6 @@ class Table:
     """Rows of cells; a table that is wider than the screen goes on below there.
 
     Arguments:
-        columns, rows: headers and cells.
         caption: one line on the whole, may be empty.
         tones: a word for each row that HTML may know it by; nothing may rest on it alone.
         most: rows on the screen; None for all.
@@ -81,7 +79,6 @@ class Items:
         entries: label, which may be empty, text, and what is said about it.
         whole: whether words wider than the screen stay whole, as commands must to be copied.
         look: in HTML ``tiles`` or ``parameters``, or a list that is styled by this word.
-        folded: as of a table.
     """
 
     entries: Sequence[tuple[str, ...]]
@@ -133,7 +130,6 @@ class Drawing:
     """A figure.
 
     Arguments:
-        title: one line.
         caption: what it shows and where it comes from.
         svg: its drawing, for HTML; may be empty.
         file: where the drawing lies from the Markdown document; empty for nowhere.
@@ -162,7 +158,6 @@ class Passage:
     Arguments:
         level: 2 for a chapter, 3 for a part of one.
         area: where HTML has it: ``first`` under the heading, ``aside`` next to it, or in its turn.
-        look: what HTML styles it by.
     """
 
     title: str

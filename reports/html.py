@@ -26,7 +26,6 @@ def to_html(
 
     Arguments:
         sections: of level 2 and 3, in reading order.
-        title: in the title bar.
         heading: at the top, the line that matters most.
         lead: a line above it; may be empty.
         brand, foot: one line above all, and one below; may be empty.

@@ -32,7 +32,6 @@ def identification_html(found: Identification, source: str = "") -> str:
     """Return a page on an identification that needs nothing but itself.
 
     Arguments:
-        found: what was identified.
         source: name of the file that it comes from.
     """
     from femubench.reports.html import to_html

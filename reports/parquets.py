@@ -19,11 +19,7 @@ class ParquetReporter:
     suffix = ".parquet"
 
     def render(self, run: RunData) -> NoReturn:
-        """Refuse: this is no text.
-
-        Raises:
-            InputError: always.
-        """
+        """Refuse: this is no text; raises InputError always."""
         raise InputError("format parquet is not a text format", expected="a file")
 
     def render_bytes(self, run: RunData) -> bytes:

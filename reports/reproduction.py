@@ -131,11 +131,7 @@ def _chapters(studies: Iterable[Study], words: Words, folder: str) -> Iterator[P
 
 
 def parts_of(study: Study, drawn: Callable[[Figure], Drawing]) -> Iterator[Passage]:
-    """Yield what follows the tables of a paper.
-
-    Arguments:
-        drawn: makes the block of a figure.
-    """
+    """Yield what follows the tables of a paper."""
     yield from _remarks("What the re-run shows", study.findings)
     for extra in study.extras:
         yield Passage(extra.title, list(_extra_blocks(extra)), level=3)

@@ -85,12 +85,7 @@ class _Option(NamedTuple):
 
 
 class _Paper:
-    """A study as the page has it.
-
-    Arguments:
-        study: shown.
-        name: the stem of all ids.
-    """
+    """A study as the page has it."""
 
     def __init__(self, study: Study, name: str) -> None:
         self.study, self._name = study, name
@@ -149,8 +144,6 @@ def _tally(
     """Return how many cells have one of some verdicts; the number follows what is chosen.
 
     Arguments:
-        cells: as judged.
-        options: that change some of them.
         table: the only one that counts; empty: all.
     """
     judged = sum(cell.verdict in verdicts for cell in cells)

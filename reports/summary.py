@@ -162,11 +162,7 @@ def shortfalls(run: RunData) -> list[str]:
 
 
 def finding(run: RunData, board: Sequence[Mapping[Any, Any]]) -> list[str]:
-    """Return what a run shows, in sentences made from its figures; the first is the headline.
-
-    Arguments:
-        board: rows of its leaderboard.
-    """
+    """Return what a run shows, in sentences made from its figures; the first is the headline."""
     kind = Standings.interval_of(run)
     structures = {run.structures.get(case, case) for case in cases_of(run)}
     count = len(seeds_of(run) if kind == "seeds" else structures)
@@ -187,9 +183,6 @@ def headline(
 
     Arguments:
         board: rows of a leaderboard, best first.
-        where: which errors are meant.
-        models: those that all are measured against.
-        structures: their number.
         over: what the intervals are over; empty where there are none.
     """
     # Who never gave a model may share the first rank with who gave back the one that was given.

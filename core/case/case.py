@@ -72,7 +72,6 @@ class Match:
     """Where a sensor was taken to sit.
 
     Arguments:
-        sensor: its label.
         place: the node, the joint or the station of a member.
         xyz: where that is in m.
         measured: where the test says that the sensor is, in m along the axes of the model.

@@ -28,7 +28,6 @@ def with_floor(
 
     Arguments:
         measurement: as read; nan where no deviation is known.
-        file: for the sentences.
         frequency_share, shape_share: relative deviations where no other one is stated.
     """
     m, stated = measurement, []

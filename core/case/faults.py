@@ -25,8 +25,6 @@ class BadKey(Exception):  # noqa: N818 - becomes an InputError before anybody se
 
     Arguments:
         path: keys and list positions from the top of the file.
-        what: the fault.
-        expected: what would have been right.
     """
 
     def __init__(self, path: KeyPath, what: str, expected: str | None = None) -> None:

@@ -67,7 +67,6 @@ def name_tables(
     Arguments:
         contents: the member's name and the content of its table, for every member.
         own: the name that a member used before.
-        tables: what the names meant before.
         plain: a name for what never had one.
     """
     found: list[str | None] = []
@@ -221,7 +220,6 @@ def keys_of(item: Any, without: Collection[str] = ()) -> Keys:  # noqa: ANN401 -
 
     Arguments:
         item: any of the dataclasses of `fem.frame`.
-        without: fields to leave out.
     """
     keys = {}
     for f in fields(item):
@@ -250,9 +248,7 @@ def section_keys(section: Section, nu: float, plane: Plane, hint: SectionSpec | 
     """Return the table of a section: its shape with what differs from it, or numbers.
 
     Arguments:
-        section: any section.
         nu: Poisson's ratio of the material, for a shear coefficient that no key can say.
-        plane: of the frame.
         hint: a table with the shape and the sizes that the section may have had.
 
     Raises:

@@ -238,8 +238,6 @@ def attachments(key: str, specs: Sequence[TomlTable], site: Site) -> tuple[Any, 
 
     Arguments:
         key: ``masses``, ``springs``, ``supports`` or ``oscillators``.
-        specs: the tables of that list.
-        site: the structure.
 
     Raises:
         BadKey: with a path from the key on.
@@ -262,8 +260,6 @@ def alteration_of(
     """Return what a modification changes apart from further masses and springs.
 
     Arguments:
-        spec: its table.
-        site: the structure as drawn.
         model: the table of the model, whose sections and materials may be named.
 
     Raises:

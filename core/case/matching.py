@@ -90,8 +90,6 @@ class Placed(NamedTuple):
     """Sensors on a structure.
 
     Arguments:
-        sensors: that fit it.
-        matches: where each was taken to sit.
         stated: what to say of units and places.
         alignment: by which coordinates of the test become those of the model.
     """
@@ -133,10 +131,7 @@ class Placement:
     """Coordinates of a test and those of the structure.
 
     Arguments:
-        site: the structure.
-        alignment: how the test lies to it.
         every: all coordinates of the test as they were given, finite, (k, 3).
-        labels, directions: of the sensors that are there.
     """
 
     site: Site
@@ -390,9 +385,6 @@ def match_sensors(
     structure is an error.
 
     Arguments:
-        read: what the plugin read.
-        file: for messages.
-        site: the structure.
         alignment: how the test lies to it; the unit is detected where it has none.
         wanted: labels with a shape; None for all.
 
@@ -438,12 +430,7 @@ def match_sensors(
 
 
 def describe_matches(matches: Sequence[Match], file: str) -> tuple[str, ...]:
-    """Return what to say of sensors between nodes, and of those moved to the structure.
-
-    Arguments:
-        matches: of all sensors.
-        file: that lists them.
-    """
+    """Return what to say of sensors between nodes, and of those moved to the structure."""
     moved = [match for match in matches if match.distance > ON_MEMBER]
     amid = [match for match in matches if BETWEEN in match.place]
     stated: tuple[str, ...] = ()

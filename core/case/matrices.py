@@ -50,11 +50,7 @@ class MatrixText(BufferedIOBase):
         return True
 
     def read(self, size: int | None = -1) -> bytes:
-        """Return the next bytes.
-
-        Raises:
-            InputError: behind the limit, and for what is no text.
-        """
+        """Return the next bytes; raises InputError behind the limit, and for what is no text."""
         wanted = self._left + 1 if size is None or size < 0 else min(size, self._left + 1)
         content = self._stream.read(wanted)
         self._left -= len(content)
@@ -89,7 +85,6 @@ def read_matrix(file: Path, size: int, readers: Sequence[Reader]) -> SparseArray
     Arguments:
         file: Matrix Market, or whatever one of the readers knows by its suffix.
         size: the number of rows that it must have.
-        readers: reader plugins.
 
     Raises:
         InputError: when it is not real, square, of that size, finite and symmetric.
@@ -102,7 +97,6 @@ def matrix_of(file: Path, readers: Sequence[Reader], size: int | None = None) ->
 
     Arguments:
         file: Matrix Market, or whatever one of the readers knows by its suffix.
-        readers: reader plugins.
         size: the number of rows that a header must claim; None for any.
     """
     if is_matrix_market(file):

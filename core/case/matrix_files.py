@@ -127,11 +127,7 @@ def node_names(structure: Structure) -> list[str]:
 
 
 def frame_places(model: Model, places: Sequence[Place]) -> dict[Place, Place]:
-    """Return the nodes, by name, at places of a frame.
-
-    Raises:
-        BadKey: for a place between nodes.
-    """
+    """Return the nodes, by name, at places of a frame; raises BadKey for a place between nodes."""
     structure = model.frame_structure
     names, found = node_names(structure), {}
     for place in places:
@@ -173,8 +169,6 @@ def matrix_keys(
 
     Arguments:
         mass, stiffness: sparse, (n, n).
-        geometry: what their rows are.
-        model: whose groups are written.
     """
     files = _three(mass, stiffness, geometry)
     keys: Keys = {"kind": "matrices", **{file.partition(".")[0]: file for file in files}}

@@ -78,11 +78,7 @@ def read_model(paths: ModelFiles, readers: Sequence[Reader], unit: LengthUnit = 
 
 
 def read_as_it_is(paths: ModelFiles, readers: Sequence[Reader]) -> Model:
-    """Return the model that files hold, in their units.
-
-    Raises:
-        InputError: as in `read_model`.
-    """
+    """Return the model that files hold, in their units; raises InputError as in `read_model`."""
     model = _read(paths, readers)
     if not isinstance(model.geometry, MatrixGeometry):
         return model

@@ -35,7 +35,6 @@ def read_modes(
             LABEL_std.
         sensors: whose labels the columns bear; a sensor without a column was not measured.
         shape_std: deviation of a shape, of the largest reading, where the table gives none.
-        without: sensors whose columns are passed over.
 
     Raises:
         InputError: for an unknown column, a mode listed twice, a number that cannot be.
@@ -180,10 +179,6 @@ def observe_at(measurement: Measurement, sensors: Sensors) -> Measurement:
 
     What was measured at the same point along the same axis is taken over, turned where the axis
     looks the other way; the shapes at other sensors are missing.
-
-    Arguments:
-        measurement: on sensors of its own.
-        sensors: that are wanted.
     """
     own = measurement.sensors
     if own is sensors or not len(own):

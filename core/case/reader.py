@@ -447,7 +447,6 @@ def check_labels(
 
     Arguments:
         listed: the key of every label, and the label.
-        measurement: what was read.
         file: where, as `case.toml` names it.
 
     Raises:

@@ -30,7 +30,6 @@ def record_tables(
     """Return the tables of a case that hold what was identified, by name.
 
     Arguments:
-        measurement: the modes.
         references: what every response was measured to, the forces or with a roving hammer the
             accelerometers; None where there is none.
         fitted: whether the deviations are those of a fit alone.
@@ -78,7 +77,6 @@ def mean_record(records: Sequence[Measurement], files: Sequence[Path]) -> tuple[
 
     Arguments:
         records: two or more, of one state, on the same sensors.
-        files: that they come from, for messages.
 
     Raises:
         InputError: for other sensors, or records that share no mode.

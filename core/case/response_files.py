@@ -324,9 +324,7 @@ def locate_sensors(measured: Responses, known: Sensors, file: Path) -> Responses
     """Return responses whose sensors lie where a table says.
 
     Arguments:
-        measured: what was read.
         known: a label without a direction of its own may be the part before the colon.
-        file: that they come from, for messages.
 
     Raises:
         InputError: when a sensor of the responses is not in the table.

@@ -25,9 +25,7 @@ def split_responses(
     The side with more sensors, driven or read, comes first, as reciprocity allows.
 
     Arguments:
-        measured: what the file has.
         spec: the key `responses`.
-        tested: the modes of the case.
         held_out: labels of its modes that no strategy may see.
 
     Raises:

@@ -28,7 +28,6 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
 
     Arguments:
         file: label,x,y,z,direction or label,at,direction.
-        site: the structure.
         alignment: of coordinates and their directions; a unit that it lacks is seen.
 
     Raises:

@@ -179,7 +179,6 @@ def matrix_factors(dofs: Dofs, by: Similarity) -> tuple[SparseArray, SparseArray
 
     Arguments:
         dofs: a rotation bears one length more than a translation.
-        by: the similarity.
     """
     turns = np.abs(dofs.motions[:, 3:]).sum(axis=1) > 0.0
     arms = np.where(turns, by.length, 1.0)

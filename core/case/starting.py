@@ -58,7 +58,6 @@ class Beginning:
             ``[measurement]``.
         reference: the modes or responses of the structure as it was, like `modes`.
         tables: what was identified, by name: the file that it comes from, and the table.
-        stated: what to say of it.
     """
 
     model: Path
@@ -120,7 +119,6 @@ def start_case(
     Arguments:
         folder: new or empty; it appears complete or not at all.
         given: the files, and what was given of them.
-        readers: reader plugins.
         draw: draws the matches of a case into a file; None for no picture.
 
     Raises:

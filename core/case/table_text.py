@@ -76,7 +76,6 @@ def modes_csv(measurement: Measurement, share: float, stated: str = RESERVED[2])
     """Return the table of modes, with a column LABEL_std where deviations are no common share.
 
     Arguments:
-        measurement: any.
         share: the deviation of shapes relative to the largest reading.
         stated: name of the column with the deviations of the frequencies.
     """
@@ -111,7 +110,6 @@ def common_share(measurements: Sequence[Measurement], known: float | None) -> fl
     """Return the deviation of shapes, of the largest reading, that fits the most of them.
 
     Arguments:
-        measurements: those of one case.
         known: what the case's own file says, which wins where others fit as well.
     """
     candidates = [*([] if known is None else [known]), SHAPE_STD]
@@ -134,7 +132,6 @@ def toml_bytes(keys: Keys, comment: Sequence[str]) -> bytes:
 
     Arguments:
         keys: plain data, tables and lists of tables at the top and in ``model``.
-        comment: lines to put on top.
     """
     document = tomlkit.document()
     for line in comment:

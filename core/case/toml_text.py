@@ -35,7 +35,6 @@ def spec_of(
     """Return the content of a TOML text as typed tables.
 
     Arguments:
-        file: that it stands in, for messages.
         schema: its tables; unknown keys are errors.
         parse: turns plain tables into these; the schema's own way where left out.
 

@@ -30,7 +30,6 @@ def propose_axes(case: Case, stated: Alignment) -> str:
 
     Arguments:
         case: with a place for every sensor of the test.
-        stated: by which it was read.
 
     Raises:
         ModelError: when the model has no modes.

@@ -234,7 +234,6 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
     """Return the files of a case folder.
 
     Arguments:
-        case: what to write.
         known: what the file of the case that it comes from says as well.
         comment: lines for the top of `case.toml`.
 

@@ -36,7 +36,6 @@ class Hypothesis:
     """An effect at a place.
 
     Arguments:
-        effect: the effect itself.
         change: what it does there, and its parameters.
         places: number of places that the effect could sit at.
     """

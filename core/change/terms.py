@@ -148,12 +148,7 @@ class Term:
 
 
 def sparse_matrix(operator: Operator, size: int) -> SparseArray:
-    """Return an operator on the dofs of a model as a sparse matrix, (n, n).
-
-    Arguments:
-        operator: without added dofs.
-        size: number of dofs n.
-    """
+    """Return an operator without added dofs on those of a model as a sparse matrix, (n, n)."""
     if isinstance(operator, MatrixOperator):
         return sp.csr_array(operator.matrix)
     if isinstance(operator, RowOperator):

@@ -56,8 +56,6 @@ def telling(
     What ends before a run has begun is as it was.
 
     Arguments:
-        store: of the run.
-        jobs: number that it has.
         screen: shows the board; None shows none.
         added, dropped: words that make the command go on with the run, see `resuming`.
 

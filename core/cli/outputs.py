@@ -26,14 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RunOutput:
-    """What becomes of a run: its store, the files that the user named, and what is shown.
-
-    Arguments:
-        ctx: of the verb.
-        plugins: where reporters come from.
-        store: keeps the results.
-        files: by their path what writes them.
-    """
+    """What becomes of a run: its store, the files that the user named, and what is shown."""
 
     ctx: click.Context
     plugins: Plugins
@@ -71,7 +64,6 @@ class RunOutput:
 
         Arguments:
             header: returns what is shown first, from a clause on where the jobs run.
-            exhibits: what reports show of single jobs.
             resumed_with: words that make the same command go on, and those that do not.
         """
         from femubench.core.library.report import reporter

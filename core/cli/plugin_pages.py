@@ -36,7 +36,6 @@ def pages_of(name: str, plugins: Plugins) -> Iterator[str]:
 
     Arguments:
         name: of what a plugin offers, or of the plugin.
-        plugins: what there is.
     """
     found = False
     for kind in CHECKS:

@@ -31,7 +31,6 @@ def progress(what: str = "", *, quiet: bool = False) -> Iterator[OnAdvance | Non
 
     Arguments:
         what: the piece is of, such as a case.
-        quiet: show nothing.
     """
     if quiet:
         yield None
@@ -53,8 +52,6 @@ def say_progress(
     """Give the function that takes what a line says, of which one is written every ten seconds.
 
     Arguments:
-        write: takes a line.
-        clock: seconds from any time on.
         every: so many seconds, `EVERY` by default, in a thread: one piece may be long.
     """
     begin = last = clock()
@@ -82,11 +79,7 @@ def say_progress(
 
 @contextmanager
 def show_progress(what: str, console: Console, clock: Callable[[], float]) -> Iterator[OnAdvance]:
-    """Give the function that changes a line of a terminal; see `progress`.
-
-    Arguments:
-        clock: seconds from any time on.
-    """
+    """Give the function that changes a line of a terminal; see `progress`."""
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -129,11 +122,7 @@ def show_progress(what: str, console: Console, clock: Callable[[], float]) -> It
 
 
 def format_time_left(advance: Advance, since: float) -> str:
-    """Return the time that is left as h:mm:ss, dashes where it is not known.
-
-    Arguments:
-        since: seconds since the advance.
-    """
+    """Return the time that is left as h:mm:ss, dashes where it is not known."""
     if advance.left is None:
         return "-:--:--"
     seconds = round(max(advance.left - min(since, advance.current), 0.0))

@@ -22,11 +22,7 @@ def store() -> None:
 
 
 def _open(folder: Path | None) -> Store:
-    """Return the store that is meant.
-
-    Raises:
-        InputError: where there is none.
-    """
+    """Return the store that is meant; raises InputError where there is none."""
     from femubench.core.library.rank import store_in
 
     found = store_in(folder)

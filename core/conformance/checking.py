@@ -66,9 +66,6 @@ def subjects(
 
     Arguments:
         name: of a plugin; a strategy may have options, as in ``bench run -s``.
-        plugins: those that are installed.
-        cases: further problems for strategies.
-        seconds: what one trial may take.
 
     Raises:
         InputError: when there is none of that name.

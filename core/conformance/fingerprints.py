@@ -21,7 +21,6 @@ def fingerprint(item: object, path: str) -> dict[str, str]:
     Arguments:
         item: dataclasses, mappings, sequences, arrays and sparse arrays are looked into; of
             anything else the type counts.
-        path: what the object is called.
     """
     return dict(_walk(item, path, 0))
 

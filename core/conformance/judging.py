@@ -28,7 +28,6 @@ class Handed:
     """What a strategy handed back, and what it is judged by.
 
     Arguments:
-        problem: untouched.
         answer: from the strategy's worker; nobody has looked into it yet.
         promises: what the strategy says that it keeps.
     """
@@ -66,7 +65,6 @@ def confirm_observation(seen: Observation, ending: Ending) -> Observation:
     """Return what a worker saw of a result, with what was found outside of it.
 
     Arguments:
-        seen: of the strategy's worker.
         ending: of `judge_handed`.
     """
     if ending.how != "answer":

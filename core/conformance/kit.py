@@ -70,7 +70,6 @@ class Check:
     """One thing that a plugin must keep.
 
     Arguments:
-        role: of the plugins that it concerns.
         name: one word, for the command line and the docs.
         sentence: what must hold.
         judge: from a bench to a verdict.
@@ -136,11 +135,8 @@ class Bench:
     """Where one plugin is tried; every trial runs once, in a process of its own.
 
     Arguments:
-        subject: the strategy, effect, reader or scenario.
         reference: the strategy that time and memory are compared with, if there is one.
-        cases: further problems.
         helpers: what a check in a worker is given as well, e.g. readers.
-        seconds, memory: what one trial may take.
         jobs: number of workers; None for the number of processors.
     """
 
@@ -226,7 +222,6 @@ class Bench:
 
         Arguments:
             function: importable by name; its first argument is the subject.
-            further: its other arguments.
         """
         if isinstance(self.code, str):
             return not_applicable(UNSENT)

@@ -47,13 +47,7 @@ _SPRINGS: Mapping[Plane, Mapping[str, float]] = {
 
 @dataclass(frozen=True)
 class UpdatingProblem:
-    """What a strategy is given in a check.
-
-    Arguments:
-        name: for messages.
-        model: the nominal model.
-        measurement: the used modes.
-    """
+    """What a strategy is given in a check."""
 
     name: str
     model: Model

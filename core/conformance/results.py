@@ -33,7 +33,6 @@ class Given:
 
     Arguments:
         problem: the nominal model and the used modes, untouched.
-        result: of the strategy.
         promises: what the strategy says that it keeps.
     """
 

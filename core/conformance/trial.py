@@ -42,7 +42,6 @@ class Want:
     """A trial that a check looks at.
 
     Arguments:
-        problem: its name.
         scramble: seed of the global random generators, which no strategy should look at.
         traced: whether memory is traced, which slows Python down.
         reference: whether it is the strategy to compare with that runs.
@@ -68,7 +67,6 @@ class Observation:
     """What was seen, by the word of the worker in which the strategy ran.
 
     Arguments:
-        problem: its name.
         kind: ``lacking`` where the problem has not what the strategy says that it needs,
             ``error`` for an exception that is no verdict, ``stopped`` for a worker that died or
             had to be stopped.
@@ -78,7 +76,6 @@ class Observation:
         faults: what is wrong with the result, by check.
         changed: the part of model or measurement that was changed in place.
         disturbed: what of the process was changed and not restored.
-        prints: of the result.
     """
 
     problem: str

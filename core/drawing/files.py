@@ -185,11 +185,7 @@ def _seal(body: bytes) -> bytes:
 
 
 def _whole(path: Path) -> bytes:
-    """Return the content of a file.
-
-    Raises:
-        InputError: when it is not as it was written.
-    """
+    """Return the content of a file; raises InputError when it is not as it was written."""
     content = read_bytes(path, MOST_BYTES)
     if content != _seal(content[:-_TAIL]):
         raise InputError("damaged", file=path, expected="the picture that was written")

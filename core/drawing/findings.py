@@ -70,7 +70,6 @@ def changes_found(source: Case | Model, parameters: Sequence[Data]) -> list[Find
     """Return what an update changed at each place; what stayed as it was is left out.
 
     Arguments:
-        source: the nominal structure.
         parameters: of the update, as a result has them: name, before, after, unit, places.
     """
     changed = [item for item in parameters if item["after"] != item["before"]]

@@ -75,7 +75,6 @@ def find_wireframe(source: Case | Model, words: Iterable[str]) -> PlacedWirefram
     """Return a structure with the places that some words stand for.
 
     Arguments:
-        source: of the structure.
         words: in the grammar of places.
     """
     wireframe = wireframe_of(source)

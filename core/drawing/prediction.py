@@ -39,9 +39,6 @@ _POINTS = 400
 def case_drawing(case: Case) -> dict[str, Any] | None:
     """Return the structure of a case and what was measured on it, in plain data.
 
-    Arguments:
-        case: its nominal model gives the picture.
-
     A large frame is thinned out, and `thinned` says how many nodes and elements it has. Returns
     None for large matrices.
     """
@@ -163,7 +160,6 @@ def receptances(case: Case, model: Model, sensor: str | None = None) -> dict[str
 
     Arguments:
         case: gives the sensor, the frequencies, the damping and the modifications.
-        model: of the case, updated or not.
         sensor: its label; None for the drive sensor.
     """
     drive = _drive(case, sensor)
@@ -294,8 +290,6 @@ def node_motions(
     """Return the displacements of the nodes of a picture, (k, 3, m).
 
     Arguments:
-        model: whose shapes they are.
-        nominal: whose nodes are drawn.
         shapes: on the dofs of `model`, (n, m).
         nodes: of a frame, those that are drawn by their numbers, (k,); None for all.
 

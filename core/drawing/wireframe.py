@@ -98,7 +98,6 @@ class Wireframe:
     Arguments:
         plane: in which it lies and moves; ``matrices`` where there are nodes alone.
         joints, members: members are straight lines between joints.
-        sensors, masses, springs, supports: what sits on it.
         nodes: of the mesh in m; empty where the mesh is too fine to draw.
         elements: pairs of nodes; `element_labels` (``member/k``) and `member_of` go with them.
             Without members they are the lines of a test, which belong to none.
@@ -148,21 +147,13 @@ class Wireframe:
 
 
 def check_within(places: Iterable[int], listed: Sized, what: str) -> None:
-    """Check that positions are those of a list.
-
-    Raises:
-        ValueError: naming what is not there.
-    """
+    """Check that positions are those of a list; raises ValueError naming what is not there."""
     if not all(0 <= place < len(listed) for place in places):
         raise ValueError(f"a {what} that is not in the list")
 
 
 def check_same(one: Sized, other: Sized) -> None:
-    """Check that two lists go in pairs.
-
-    Raises:
-        ValueError: when their lengths differ.
-    """
+    """Check that two lists go in pairs; raises ValueError when their lengths differ."""
     if len(one) != len(other):
         raise ValueError(f"{len(one)} entries instead of {len(other)}")
 

@@ -41,9 +41,7 @@ class Alteration:
     """What changes of a structure apart from further masses and springs.
 
     Arguments:
-        supports: further ones.
         removed: parts of the structure as drawn that are taken away.
-        exchanged: members of another section or material.
     """
 
     supports: tuple[Support, ...] = ()

@@ -48,7 +48,6 @@ def attach(
 
     Arguments:
         structure: with its present parameters, which stay.
-        masses, springs: at joints or on members.
 
     Returns None where the frame has to be meshed anew: under a preload or its weight no change is
     local, and an attachment that was there between two nodes moves with the pieces of its element.

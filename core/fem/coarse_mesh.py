@@ -16,7 +16,6 @@ def coarsen_mesh(model: Model, most: int, least: int) -> Model:
     What names an element by its number stays where it is: such a member keeps its elements.
 
     Arguments:
-        model: a frame.
         most: degrees of freedom.
         least: elements of a member, whatever that makes of them.
     """

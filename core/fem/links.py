@@ -47,7 +47,6 @@ def linkage(
     What follows a joint takes part in all six of its motions, so that a rigid body stays one.
 
     Arguments:
-        links: the rigid links.
         names: the joints, or nodes, in the order of the displacements.
         xyz: where they are in m, (n, 3).
         active: which of x, y, z, rx, ry, rz may move at all, (6,).

@@ -59,7 +59,6 @@ class Mesh:
         rigid: rigid lengths in the stiffness matrix in m, (n_elements, 2).
         rigid_mass: rigid lengths in the mass matrix in m, (n_elements, 2).
         arm_factor: nan for an ordinary element, else the massless arm's rigidity factor.
-        connections: the joint springs.
         oscillators: the node of every oscillator's mass; they come last and belong to no element.
     """
 
@@ -170,7 +169,6 @@ class _Piece:
     Arguments:
         xyz: of its own nodes in m, (k, 3).
         rows: two nodes, number, two stations and arm factor of every element, (r, 6).
-        connections: its joint springs.
         arms: how many massless arms stand before the elements.
     """
 
@@ -393,7 +391,6 @@ def nearest_place(frame: Frame, xyz: FloatArray) -> tuple[str, FloatArray]:
     """Return the joint or the station of a member nearest to a point, and where it is in m.
 
     Arguments:
-        frame: any.
         xyz: the point in m, (3,).
     """
     place, foot, _ = _foot(frame, xyz)

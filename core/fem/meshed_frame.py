@@ -58,10 +58,6 @@ class MeshedFrame:
     """A frame with its mesh and the present values of everything that updating may change.
 
     Arguments:
-        frame: the description.
-        mesh: nodes and elements.
-        kinematics: free dofs.
-        properties: present element properties.
         springs: present joint spring stiffnesses, in the order of `spring_labels`.
         changes: parameter values that were set since the frame was built.
     """
@@ -278,7 +274,6 @@ class MeshedFrame:
         """Return motions of points from free dofs, sparse (n, n_dofs).
 
         Arguments:
-            places: of the points.
             taken: of each, what is taken of its displacement and rotation, (p, 6).
         """
         values, columns, counts = [], [], []

@@ -384,7 +384,6 @@ def neighbours_of(model: Model, changed: Model, samples: Iterable[Model]) -> tup
     """Return models near a model as they are after the attachments that made `changed` of it.
 
     Arguments:
-        model: before the attachments.
         changed: what its `attach` returned.
         samples: models on the dofs of `model`.
     """

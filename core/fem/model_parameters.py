@@ -22,7 +22,6 @@ def with_values(
     Arguments:
         model: a frame, of which what an update changed in the matrices is lost, or matrices.
         parameters: at elements and ends of the frame, or at groups of the matrices.
-        values: one a parameter.
 
     Raises:
         ModelError: when there is no such place.

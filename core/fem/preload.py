@@ -323,7 +323,6 @@ def geometric_matrices(structure: MeshedFrame, state: StressState) -> FloatArray
     """Return the local geometric stiffness matrices of the elements, (n, 12, 12).
 
     Arguments:
-        structure: a meshed frame of n elements.
         state: its internal forces, to which they are proportional.
     """
     mesh, force = structure.mesh, state.force

@@ -74,7 +74,6 @@ class JoinedSlopes:
 
     Arguments:
         parts: each with the numbers of its parameters.
-        count: of all parameters.
     """
 
     parts: tuple[tuple[MatrixSlopes, IntArray], ...]

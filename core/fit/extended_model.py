@@ -104,7 +104,6 @@ def departure(found: Fit, model: Model | None = None) -> float:
     """Return how far a fit is from what its own model gives, in deviations of the data in all.
 
     Arguments:
-        found: the fit.
         model: its own, where it is made already.
 
     Raises:

@@ -45,8 +45,6 @@ def mesh_bias(model: Model, count: int, modes: Modes | None = None) -> FloatArra
     cannot be built or solved.
 
     Arguments:
-        model: any model.
-        count: number of modes wanted.
         modes: elastic modes of the model where they are at hand, at least `count`.
     """
     structure = model.structure
@@ -72,7 +70,6 @@ def mesh_corrections(model: Model, hertz: FloatArray) -> FloatArray | None:
     None where `mesh_bias` has none, or knows too few modes.
 
     Arguments:
-        model: any model.
         hertz: some of its natural frequencies, nan where there is none, (k,).
     """
     known = np.flatnonzero(np.isfinite(hertz))

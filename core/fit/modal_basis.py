@@ -35,7 +35,6 @@ class Space:
     Arguments:
         eigenvalues: of the coordinates, ascending, (N,).
         readings: of the coordinates at the sensors, (n_sensors, N).
-        projections: the hypotheses.
         mass: of the structure in kg.
         rigid: number of coordinates that are rigid-body motions.
         condensed: what `condense` has found.
@@ -195,7 +194,6 @@ class Condensed:
 
     Arguments:
         given: the hypotheses in all coordinates.
-        space: the coordinates.
         parts: the hypotheses in them.
         follow: the high ones of all coordinates from the last ones of these, (h, r); None where
             these are all coordinates.
@@ -259,14 +257,7 @@ def rigid_first(modes: Modes) -> Modes:
 def nominal_space(
     model: Model, modes: Modes, sensors: Sensors, hypotheses: Sequence[Hypothesis]
 ) -> Space:
-    """Return the modal coordinates of a model with all of its hypotheses.
-
-    Arguments:
-        model: the nominal model.
-        modes: all of its modes.
-        sensors: where shapes are read.
-        hypotheses: what may be missing.
-    """
+    """Return the modal coordinates of a model with all of its hypotheses."""
     modes = rigid_first(modes)
     project = Projector(model, modes.shapes)
     readings = np.asarray(model.observe(sensors) @ modes.shapes)
@@ -281,7 +272,6 @@ def scatter_terms(
     """Return the modal forces of a relative change of elements' stiffness, then of their mass.
 
     Arguments:
-        structure: the nominal frame.
         vectors: its modes, (n, N).
         eigenvalues: of the modes of interest, which come first among the columns, (q,).
         elements: which ones, (k,).

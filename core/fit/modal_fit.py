@@ -34,10 +34,6 @@ class Problem:
     """What a fit needs apart from the hypotheses.
 
     Arguments:
-        model: that the hypotheses extend.
-        space: its modal coordinates with the hypotheses.
-        data: the used modes.
-        noise: their covariance.
         offset: added to every residual, in standard deviations of the measurement, (n_data,);
             what the modal coordinates are known to get wrong near the point of interest.
         kept: what was worked out for the space and the data, whatever the noise.
@@ -61,7 +57,6 @@ class State:
     """Hypotheses at definite coordinates, and what they predict.
 
     Arguments:
-        problem: data and modal coordinates.
         parts: the hypotheses; none for the model as it is.
         x: coordinates, (k,).
         eigenvalues, vectors: modes in the coordinates of the space, (q,) and (N, q): the lowest
@@ -224,7 +219,6 @@ class Fit:
     """The best fit of some hypotheses.
 
     Arguments:
-        state: at the optimum.
         log_evidence: ln of the probability of the data, up to a constant of the data; without
             the prior of the hypotheses themselves.
     """
@@ -263,11 +257,8 @@ def fit(
     """Return the most probable coordinates of some hypotheses by damped Gauss-Newton steps.
 
     Arguments:
-        problem: data and modal coordinates.
-        parts: the hypotheses.
         start: where to start, (k,).
         give_up: stop when the next step cannot bring the cost below this.
-        steps: how many steps at most.
     """
     low, high = bounds_of(parts)
     try:

@@ -34,7 +34,6 @@ class Projection:
     matrices; where it touches more than there are coordinates, the rows are the identity.
 
     Arguments:
-        hypothesis: what is projected.
         rows: the displacements that it acts on, from the coordinates, (p, N + extra).
         cores: symmetric, one a term, (t, p, p).
         is_mass: which of them belong to the mass, (t,).
@@ -99,7 +98,6 @@ class Projector:
     """Projects changes on given vectors.
 
     Arguments:
-        model: the nominal model.
         vectors: basis on its dofs, (n, N).
     """
 
@@ -163,7 +161,6 @@ class Projector:
         """Return those of some terms that are matrices of elements on motions, (a, b) each.
 
         Arguments:
-            terms: any.
             right: displacements of all elements, (n_elements, n_active, b).
             left: the same, whose rows stand one after the other in the result, (..., a_i) each.
         """

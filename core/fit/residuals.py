@@ -29,7 +29,6 @@ class Data:
     Frequencies whose errors go together are turned so that the residuals are independent.
 
     Arguments:
-        measurement: the used modes.
         bias: relative corrections of predicted frequencies by elastic mode, for the mesh, (k,).
         still: number of modes of zero frequency of the model that they were found on, which come
             first there; what gives these a frequency moves no other mode on in the list. None

@@ -23,7 +23,6 @@ class ZeroRows:
     under a force at either point: a frequency's slope with two motions in place of a shape.
 
     Arguments:
-        problem: of the state.
         vectors: motions under the force in the coordinates of the space, (N, k).
         left: the same under a force where the motion is read, (N, k).
         eigenvalues: w^2, (k,).
@@ -46,9 +45,7 @@ class ZeroRows:
         """Return those of a state.
 
         Arguments:
-            state: of a model.
             zeros: places of the antiresonances, and their relative deviations.
-            measured: the responses that they are of.
             hertz: where the model has them, (k,).
         """
         problem, own = state.problem, np.square(2.0 * np.pi * hertz)

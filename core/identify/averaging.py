@@ -58,7 +58,6 @@ def average_records(
 
     Arguments:
         measured: forces and motions; of decays, motions alone.
-        excitation: hits, random or decay.
         estimator: h1 where the motions have the noise, h2 where the force has it.
 
     Raises:

@@ -38,10 +38,6 @@ def clusters_of(poles: Poles, orders: int) -> list[Cluster]:
 
     A tree of average linkage is cut where a branch has two poles in hardly any order: two modes,
     however close, appear side by side in the same orders, and one mode never does.
-
-    Arguments:
-        poles: that may be modes.
-        orders: number of orders that were tried.
     """
     from scipy.cluster.hierarchy import linkage, to_tree
     from scipy.spatial.distance import squareform

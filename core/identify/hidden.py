@@ -21,10 +21,6 @@ def find_hidden_poles(lines: Lines, fit: ModalModel) -> tuple[AnyArray, AnyArray
     What is left is compared with single resonances on a grid of frequencies and dampings: a mode
     that the forces hardly move is no pole of a model that has to follow its neighbours.
 
-    Arguments:
-        lines: the data.
-        fit: of all modes so far.
-
     Returns participations (n_ref, n).
     """
     left = (lines.responses - predict_responses(fit, lines)) * fit.weights

@@ -58,7 +58,6 @@ def lscf_poles(frequencies: FloatArray, responses: ComplexArray, largest: int) -
     Arguments:
         frequencies: at even distances, in Hz, (n_f,).
         responses: weighted, (n_f, n_out, n_ref), finite.
-        largest: number of poles.
 
     Source: Guillaume, Verboven, Vanlanduit, Van der Auweraer & Peeters (2003), A poly-reference
         implementation of the least-squares complex frequency-domain estimator, (6)-(14);

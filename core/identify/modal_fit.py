@@ -73,7 +73,6 @@ def fit_modes(
     shared unknowns move by steps of Gauss and Newton with Levenberg's damping.
 
     Arguments:
-        lines: the data.
         poles: to start from, in rad/s, (n,).
         participation: likewise, (n_ref, n).
         weights: of the channels, 0 where nothing was measured, (n_out, n_ref).

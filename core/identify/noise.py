@@ -19,7 +19,6 @@ def first_weights(lines: Lines, poles: AnyArray, seen: BoolArray) -> FloatArray:
     """Return one over the noise of every channel that no candidate explains, (n_out, n_ref).
 
     Arguments:
-        lines: the data.
         poles: of the candidates, in rad/s, (n,).
         seen: which channels were measured, (n_out, n_ref).
     """
@@ -48,8 +47,6 @@ def noise_left(
     Its course over frequency is that of all channels together, its level that of each.
 
     Arguments:
-        fit: of the lines.
-        lines: the data.
         seen: which channels were measured, (n_out, n_ref).
         rough: take the course over frequency from second differences of the lines alone, in which
             a mode that the fit lacks does not show.
@@ -100,8 +97,6 @@ def noise_kept(fit: ModalModel, lines: Lines, decay: float) -> FloatArray:
     channel has of them.
 
     Arguments:
-        fit: of the lines.
-        lines: the data.
         decay: of the window, in 1/s.
     """
     half, n = len(lines.omega), len(fit.poles)

@@ -34,7 +34,6 @@ def identify_signals(
     """Return the modes of a structure that moves by forces that are broad and unknown.
 
     Arguments:
-        measured: motions.
         band: lowest and highest frequency in Hz of modes; None for up to half the rate.
         most_order: of the largest model of the stabilisation diagram, two a mode.
 

@@ -235,8 +235,6 @@ def _windowed(fit: ModalModel, lines: Lines, data: FrequencyResponses) -> FloatA
 
     Arguments:
         fit: whose modes decay with a under the window.
-        lines: that it fits.
-        data: whose window decays with w.
     """
     if not data.decay:
         return np.ones((2, len(fit.poles)))

@@ -21,7 +21,6 @@ def find_gain(
     makes up for an error of theirs explains nothing.
 
     Arguments:
-        products: of all poles and the data.
         chosen: positions of the modes so far among the poles.
         candidates: likewise, (n,).
         weights: of the channels, 0 where nothing was measured, (n_out, n_ref).
@@ -63,7 +62,6 @@ def select(lines: Lines, candidates: AnyArray, weights: FloatArray, chosen: AnyA
     """Return the candidates that are modes apart from the chosen ones, the strongest first.
 
     Arguments:
-        lines: the data.
         candidates: poles, in rad/s.
         weights: of the channels, (n_out, n_ref).
         chosen: poles that are in already.
@@ -83,7 +81,6 @@ def find_needed(lines: Lines, poles: AnyArray, weights: FloatArray) -> BoolArray
     """Tell which modes the data need with all others, (n,); at most one is not, the weakest.
 
     Arguments:
-        lines: the data.
         poles: in rad/s, (n,).
         weights: of the channels, (n_out, n_ref).
     """

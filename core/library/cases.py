@@ -94,13 +94,7 @@ def read_case(
 
 
 class Catalogue(Mapping[str, Thing], Generic[Thing]):
-    """Everything of one kind that plugins offer, by name; nothing is loaded before it is asked for.
-
-    Arguments:
-        kind: for messages.
-        names: returns the names that there are.
-        make: returns what has a name.
-    """
+    """Everything of one kind that plugins offer, by name, loaded when it is asked for."""
 
     def __init__(
         self,
@@ -187,7 +181,6 @@ def read_cases(
     Arguments:
         given: names of scenarios, of a group of them (`group`, or `group:class` for those of a
             class), of one case of a scenario, folders, or cases; none for the default set.
-        plugins: where scenarios and readers come from.
         drawing: whose model is taken in place of that of `case.toml`.
 
     Raises:
@@ -223,7 +216,6 @@ def case_folders(
 
     Arguments:
         given: as in `read_cases`.
-        scenarios: the known ones.
         drawing: as in `read_cases`; of several cases, those without it are left out.
 
     Raises:

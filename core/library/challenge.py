@@ -39,10 +39,8 @@ class Scored:
     """A judged answer with all that it was judged by.
 
     Arguments:
-        truth: what was hidden.
         delta_chi2: by how much each cause lowers chi-square; of a truth from outside the
             chi-square of what it changes.
-        judgement: what the answer is worth.
         commitment: sha256 of the truth.
     """
 
@@ -158,11 +156,7 @@ def _given(case: Path, path: Path, seed: int, truths: Path, reference: bool) -> 
 
 
 def _free(folder: str | PathLike[str], truth: str | PathLike[str] | None) -> tuple[Path, Path]:
-    """Return where case and sealed truth go.
-
-    Raises:
-        InputError: when something is there.
-    """
+    """Return where case and sealed truth go; raises InputError when something is there."""
     case, path = Path(folder), Path(folder, SEALED_FILE) if truth is None else Path(truth)
     if case.exists() and (not case.is_dir() or any(case.iterdir())):
         raise InputError("is not empty", file=case, expected="a new or an empty folder")

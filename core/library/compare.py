@@ -68,11 +68,7 @@ def compare(
 
 
 def threshold_of(text: str) -> Threshold:
-    """Return a threshold that is written as METRIC>NUMBER.
-
-    Raises:
-        InputError: for anything else.
-    """
+    """Return a threshold that is written as METRIC>NUMBER; raises InputError for anything else."""
     found = _THRESHOLD.fullmatch(text)
     if found is not None and found[1] in METRICS:
         try:

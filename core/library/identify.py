@@ -148,7 +148,6 @@ def write_identification(found: Identification, folder: Path, *, source: str = "
     """Write the tables of a case, and a page.
 
     Arguments:
-        found: what was identified.
         folder: new or empty.
         source: name of the file that it comes from, for the page.
 

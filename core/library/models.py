@@ -108,10 +108,7 @@ def update_case(
     """Return a case, its model as a strategy updates it, from the drawn one, and its parameters.
 
     Arguments:
-        case: a name or a folder.
         strategy: ``NAME`` or ``NAME:OPTION=VALUE,...``.
-        seed: of its random numbers.
-        plugins: where cases and strategies come from.
 
     Raises:
         InputError: where the strategy gives no model, with its reason.

@@ -33,7 +33,6 @@ def begin_case(folder: Path, given: Beginning, plugins: Plugins) -> Case:
     Arguments:
         folder: new or empty.
         given: the files, and what was given of them.
-        plugins: whose readers read them.
 
     Raises:
         InputError: when the folder holds anything, or for what is wrong in the files.

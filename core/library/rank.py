@@ -247,7 +247,6 @@ def plan_run(
     """Return what is to be run; nothing has been run when something is wrong with it.
 
     Arguments:
-        plugins: where cases and strategies come from.
         given: options by field of `RunOptions`, as `split_keywords` has them.
         store: whose last run is meant where the run resumes, and has neither cases nor strategies.
     """

@@ -187,7 +187,6 @@ def write_apart(origin: Origin, question: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the reporter of a third party writes; runs in a process of its own.
 
     Arguments:
-        origin: the plugin.
         question: ``name`` of the reporter, ``way`` of writing, ``run``, folder of the ``store``.
     """
     found = import_offer(origin, "reporters", question["name"])

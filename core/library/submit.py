@@ -36,7 +36,6 @@ class SubmissionReview:
     """A run that may go to a leaderboard, and what stands against it.
 
     Arguments:
-        run: of the strategies.
         faults: why it should not go there, a line each; none where all is well.
         unverified: why a leaderboard would take it as unverified alone; empty where not.
         comparison: with the baseline, where there is one.
@@ -63,7 +62,6 @@ def submit(
     """Check strategies, run them, compare them with an earlier run, and write the result file.
 
     Arguments:
-        strategies: names.
         cases: names or folders; the default set where there is none.
         given, where: options of the run, and where it is computed, from `split_keywords`.
         output: the file that `publish` takes. Next to it comes one with the updated models, of the

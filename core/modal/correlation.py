@@ -65,7 +65,6 @@ def modal_scale_factor(
 
     Arguments:
         measured: (n_sensors, m) or (n_sensors,); nan where missing.
-        predicted: of the same shape.
         weights: W >= 0, e.g. 1/sigma^2, (n_sensors,) or (n_sensors, m); None for equal ones.
 
     Source: Allemang 1980, Investigation of some multiple input/output FRF techniques.

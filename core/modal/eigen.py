@@ -234,7 +234,6 @@ def enough_modes(model: Model, measured: int) -> int | None:
 
     Arguments:
         model: a small one is solved completely: None.
-        measured: number of measured modes.
     """
     return None if model.size <= DENSE_LIMIT else 2 * measured + 12
 
@@ -336,7 +335,6 @@ def modes_of(model: Model, count: int | None = None) -> Modes:
     A large model is solved anew where more of its modes are wanted than ever before.
 
     Arguments:
-        model: any model.
         count: number of modes wanted, rigid ones included; None as for `solve_modes`.
 
     Raises:

@@ -162,11 +162,7 @@ Definite: TypeAlias = Cholesky | DefiniteLU
 
 
 def factorise_definite(matrix: SparseArray) -> Definite:
-    """Return a factorised matrix.
-
-    Raises:
-        ModelError: when it is not definite.
-    """
+    """Return a factorised matrix; raises ModelError when it is not definite."""
     found = DefiniteLU() if cholmod_obstacle() else Cholesky(matrix)
     if not found.factorise(matrix):
         raise ModelError("a part of the model is not held by its stiffness and has no mass")

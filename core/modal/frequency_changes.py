@@ -45,10 +45,7 @@ def frequency_changes(
     look like a low mode.
 
     Arguments:
-        model: whose modes they are.
-        modes: its elastic modes, mass-normalised.
         other: a model that is much like it.
-        count: number of modes wanted.
         restrict: from shapes of the other model to the dofs of the first.
     """
     further = elastic_modes(other, min(count, len(modes)) + _MARGIN)

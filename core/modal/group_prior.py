@@ -24,7 +24,6 @@ class GroupKind:
         std: standard deviation of ln(factor).
         most: the largest factor that is believed.
         mass_std: standard deviation of ln(factor) of its mass.
-        why: one line.
     """
 
     std: float

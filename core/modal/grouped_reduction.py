@@ -219,7 +219,6 @@ class _Substructures:
     """The motions of a model that the borders of its groups and their insides have.
 
     Arguments:
-        model: with groups.
         kept: rows that are coordinates by themselves, the first ones, (b,).
         rigid: motions as a body, (n, r).
         known: modes of unit strain energy, (n, m).
@@ -437,7 +436,6 @@ class _Reduced:
 
     Arguments:
         span: the coordinates, to which those are added that its modes lack.
-        model: whole.
         exact: rigid motions and modes, (n, m).
         shift: s of A = K + s M, in rad^2/s^2.
     """

@@ -84,7 +84,6 @@ class ManyChanges:
     step, then solved as a whole.
 
     Arguments:
-        model: any model.
         modes: its lowest ones, none missed; those wanted and some more.
         known_to: how closely every frequency has to be known, relative.
 
@@ -106,7 +105,6 @@ class ManyChanges:
         """Return the lowest modes of the model with attachments, on the dofs of `Model.attach`.
 
         Arguments:
-            masses, springs: of this change.
             count: number of modes, rigid ones included; negative ones come on top.
             hertz: a frequency that the highest of them exceeds, where the modes at hand tell.
 

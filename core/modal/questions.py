@@ -44,7 +44,6 @@ def question_measurement(model: Model, measurement: Measurement) -> tuple[str, .
     """Return what seems wrong with units, numbers and order of measured modes, one sentence each.
 
     Arguments:
-        model: the nominal model.
         measurement: the modes and responses that a user may see.
 
     Raises:

@@ -56,9 +56,7 @@ def shape_sensitivities(
     left out.
 
     Arguments:
-        model: a frame, or matrices with groups.
         modes: its modes, mass-normalised; modes that share the eigenvalue must be among them.
-        index: which of them.
         parameters: as in `eigenvalue_sensitivities`.
 
     Raises:

@@ -21,7 +21,6 @@ def softest_smooth_field(model: Model, rigid: FloatArray, weighted: FloatArray) 
     None where no field moves the structure, as without places of the dofs.
 
     Arguments:
-        model: any model.
         rigid, weighted: mass-orthonormal motions to leave out, and the mass times these, (n, r).
 
     Source: Rayleigh and Ritz.

@@ -35,7 +35,6 @@ class ShiftedModel:
     """A factorised K - shift M, low-rank changes by the Woodbury identity.
 
     Arguments:
-        model: any model.
         shift: in rad^2/s^2; negative for models whose K is singular.
         spent: of the same model at another shift: its analysis and memory serve again.
     """

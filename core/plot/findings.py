@@ -111,7 +111,6 @@ def draw_findings(
 
     Arguments:
         taken: points on the page that numbers are to avoid, (n, 2).
-        further: handles that the list ends with.
     """
     from matplotlib.lines import Line2D
 

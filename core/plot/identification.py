@@ -123,7 +123,6 @@ def draw_identified(found: Identification, mode: int, reach: float, ax: Axes | N
     """Draw the real parts of an identified shape as arrows at its sensors.
 
     Arguments:
-        found: what was identified.
         mode: its number, from 1.
         reach: of the largest arrow, in the longest side of the structure.
         ax: to draw on; None for axes of a new figure.

@@ -47,7 +47,6 @@ def view_of(wireframe: Wireframe, *, oblique: bool = False) -> View:
     it is seen from 24 degrees above.
 
     Arguments:
-        wireframe: the structure.
         oblique: from above a corner in any case, e.g. to show motion out of a plane.
 
     Raises:
@@ -124,7 +123,6 @@ def draw_lines(ax: Axes, segments: FloatArray, **look: Any) -> Any:  # noqa: ANN
 
     Arguments:
         segments: (n, 2, 2).
-        look: of the lines.
     """
     from matplotlib.collections import LineCollection
 
@@ -147,7 +145,6 @@ def draw_structure(
     Arguments:
         width: of the lines in points.
         attached: whether known masses (squares) and springs to ground (zigzags) are drawn.
-        look: of the lines.
     """
     width = min(width, 0.8) if wireframe.outlines else width
     draw_lines(ax, view.flat(wireframe.lines), linewidths=width, **{"colors": MEMBER, **look})
@@ -207,7 +204,6 @@ def draw_element_values(ax: Axes, wireframe: Wireframe, values: FloatArray, labe
 
     Arguments:
         values: >= 0, (n_elements,).
-        label: what they are, with unit.
 
     Raises:
         InputError: when there is not one value an element.

@@ -113,7 +113,6 @@ def curve_style(role: str, rank: int, points: int) -> dict[str, Any]:
     Arguments:
         role: a key of `STYLES`.
         rank: how many of that role there are before.
-        points: of the curve.
     """
     style = dict(STYLES[role])
     if rank:
@@ -159,7 +158,6 @@ def place_names(
         names: one a point.
         avoid: further points that no name is to cover, (k, 2).
         size: of the letters in points.
-        look: of the texts.
 
     Returns what the next names have to avoid, (k + 8 n, 2).
     """

@@ -34,7 +34,6 @@ class Origin:
 
     Arguments:
         plugin, value: its name, and the module or object that it stands for.
-        distribution: what was installed, with its version.
     """
 
     plugin: str
@@ -52,10 +51,8 @@ class Origin:
         """Return the answer of the plugin in a process of its own.
 
         Arguments:
-            what: the function of ours that answers.
             seconds, most: that it may take, and bytes of its answer.
             doing: begins the message of a fault that nobody foresaw.
-            details: of the question, plain data.
 
         Raises:
             InputError: as the plugin raised it.

@@ -28,12 +28,7 @@ class PluginDescription(Struct):
 
 
 class Description(Struct, kw_only=True):
-    """One thing that is offered.
-
-    Arguments:
-        name, doc: as it says of itself.
-        module: that its class is written in.
-    """
+    """One thing that is offered."""
 
     name: str
     doc: str = ""

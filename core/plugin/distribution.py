@@ -21,12 +21,7 @@ _LABELS = ("homepage", "repository", "source", "sourcecode", "github", "document
 
 
 def about(name: str, doi: object = "") -> dict[str, str]:
-    """Return what an installed distribution says of itself; nothing where there is none.
-
-    Arguments:
-        name: of the distribution.
-        doi: that the strategy states, if any.
-    """
+    """Return what an installed distribution says of itself; nothing where there is none."""
     return select_known({**_packaged(name), "doi": str(doi)})
 
 

@@ -35,12 +35,7 @@ _LARGEST_REPORT = 256 * 2**20  # bytes
 
 @dataclass(frozen=True)
 class Handle:
-    """One thing that a plugin offers; small, and sent to other processes instead of the thing.
-
-    Arguments:
-        origin: of the plugin.
-        kind, name: of the thing.
-    """
+    """One thing that a plugin offers; small, and sent to other processes instead of the thing."""
 
     origin: Origin
     kind: str
@@ -57,12 +52,7 @@ class Handle:
 
 @dataclass(frozen=True)
 class Described:
-    """What is known of a thing without its code: whatever its description says is an attribute.
-
-    Arguments:
-        handle: by which it is imported.
-        said: its description.
-    """
+    """What is known of a thing without its code: whatever its description says is an attribute."""
 
     handle: Handle
     said: Any

@@ -36,10 +36,8 @@ class BrokenPlugin:
 
     Arguments:
         plugin: name of the entry point.
-        distribution: what was installed, with its version.
         hook: the hook concerned; empty when the plugin could not be loaded at all.
         message: one line.
-        traceback: for anyone who asks for it.
     """
 
     plugin: str
@@ -85,9 +83,6 @@ class Source:
     """Where a plugin comes from: an entry point, or an object given by hand.
 
     Arguments:
-        name: of the plugin.
-        distribution: what was installed, with its version.
-        entry_point, given: either of the two.
         own: whether its code may be imported here.
     """
 
@@ -150,7 +145,6 @@ def take(
     """Import a plugin here and take what it offers.
 
     Arguments:
-        source: of the plugin.
         found, broken: by kind what there is already, and what is wrong; both grow.
 
     Returns:

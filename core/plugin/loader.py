@@ -44,7 +44,6 @@ class LoadedPlugin:
 
     Arguments:
         plugin: name of the entry point.
-        distribution: what was installed, with its version.
         offers: the names of what it offers by kind.
         own: whether its code is imported here: it comes with femubench, or was given by hand.
     """

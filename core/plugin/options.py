@@ -26,11 +26,7 @@ class StatedOptions(ABC):
 
     @abstractmethod
     def with_options(self, options: Mapping[str, object]) -> Any:  # noqa: ANN401 - likewise
-        """Return it with other options.
-
-        Raises:
-            InputError: for a value that it refuses.
-        """
+        """Return it with other options; raises InputError for a value that it refuses."""
 
 
 def options_of(strategy: object) -> dict[str, Any]:

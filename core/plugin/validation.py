@@ -108,11 +108,7 @@ def check_reporter(offered: object) -> Reporter:
 
 
 def check_effect(offered: object) -> Effect:
-    """Return an effect.
-
-    Raises:
-        PluginError: when it lacks a method or a name.
-    """
+    """Return an effect; raises PluginError when it lacks a method or a name."""
     effect: Effect = _filled(offered, "Effect", "places", "parameters", "extend")
     return effect
 
@@ -131,11 +127,7 @@ def check_fault(offered: object) -> Fault:
 
 
 def check_paper(offered: object) -> Paper:
-    """Return a paper.
-
-    Raises:
-        PluginError: when it lacks its method, a name or its cases.
-    """
+    """Return a paper; raises PluginError when it lacks its method, a name or its cases."""
     paper: Paper = _filled(offered, "Paper", "study")
     cases = getattr(paper, "cases", None)
     if not isinstance(cases, (tuple, list)) or not all(map(_is_text, cases)):
@@ -183,11 +175,7 @@ def unknown(
 
 
 def choose_names(kind: str, names: Iterable[str], known: Iterable[str]) -> tuple[str, ...]:
-    """Return the names without repetition.
-
-    Raises:
-        UnknownNameError: for a name that is not known.
-    """
+    """Return the names without repetition; raises UnknownNameError for a name that is not known."""
     known = tuple(known)
     unique = tuple(dict.fromkeys(names))
     for name in unique:
@@ -197,11 +185,7 @@ def choose_names(kind: str, names: Iterable[str], known: Iterable[str]) -> tuple
 
 
 def check_name(filled: object) -> None:
-    """Make sure that a name is one word.
-
-    Raises:
-        PluginError: when it is none.
-    """
+    """Make sure that a name is one word; raises PluginError when it is none."""
     _check_name(filled, filled, _WORD)
 
 

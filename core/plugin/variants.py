@@ -25,7 +25,6 @@ class Variant:
     """A strategy under a name that tells its options.
 
     Arguments:
-        base: the strategy with its options set.
         name: ``strategy:option=value,...``.
     """
 
@@ -68,7 +67,6 @@ def strategy_of(words: str, strategies: Mapping[str, StrategyRole]) -> StrategyR
 
     Arguments:
         words: ``name`` or ``name:option=value,option=value``; the name is a known one.
-        strategies: the known ones.
 
     Raises:
         InputError: for an option that the strategy does not have, or a value of another type.

@@ -23,8 +23,6 @@ class Outcome:
     """What the runs say on one job.
 
     Arguments:
-        result: of the earliest of the runs.
-        runs: those that agree on it.
         others: what the other runs say, each a finding without others.
     """
 

@@ -28,7 +28,6 @@ class Scope:
     """What a ranking is on.
 
     Arguments:
-        cases: of the ranking.
         current: digest of the files of every case.
         scales: what results on a case are measured by.
         structures: by case; one that is not named is a structure of its own.

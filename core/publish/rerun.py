@@ -44,10 +44,6 @@ class Sample:
     ) -> None:
         """Run jobs of strategies again that are installed in the same version, of this femubench.
 
-        Arguments:
-            cases, textbooks: of all jobs, by name.
-            file: for messages.
-
         Raises:
             InputError: for a job that does not give what the run says of it.
         """

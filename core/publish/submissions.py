@@ -112,8 +112,6 @@ class Submission:
     """A run as it is published.
 
     Arguments:
-        run: with gains and ranks computed anew.
-        text: the normalised file.
         name: of that file, from the run's id and a hash of the text.
         proof: ``stated`` where all that can be checked without the answers of its strategies was,
             ``recomputed`` where their errors were computed again from these.

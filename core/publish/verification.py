@@ -91,10 +91,6 @@ def verify(
     its contributor's word.
 
     Arguments:
-        run: as its file says it.
-        data: the content of that file.
-        file: for messages.
-        installed: what the cases are.
         sample: runs some jobs again of a run whose errors were computed again.
 
     Raises:

@@ -60,8 +60,6 @@ class DaskWorkers:
     """The workers of a Dask scheduler, each of which runs one job a thread.
 
     Arguments:
-        client: connected to the scheduler.
-        where: what a user calls it.
         waits: whether workers may come later, as those of a queue do.
         sandbox: whether strategies run in one; each machine finds out for itself.
     """
@@ -400,11 +398,7 @@ def slurm_cluster(queue: str) -> Cluster:
 
 @contextmanager
 def _client(address: str | Cluster) -> Iterator[Client]:
-    """Give a client of a scheduler.
-
-    Raises:
-        InputError: where nobody answers.
-    """
+    """Give a client of a scheduler; raises InputError where nobody answers."""
     from distributed import Client
 
     try:

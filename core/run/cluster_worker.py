@@ -77,11 +77,7 @@ def all_versions(packages: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
 
 
 def unfit(demand: Demand, dask_worker: Any) -> str | None:  # noqa: ANN401 - a distributed.Worker
-    """Return why a worker cannot run the jobs, None where it can.
-
-    Arguments:
-        dask_worker: the worker that this runs in.
-    """
+    """Return why a worker cannot run the jobs, None where it can."""
     found = dict(all_versions(demand.packages))
     there = [
         f"{name} {found[name]} there and {version} here"

@@ -19,9 +19,7 @@ class Companions:
     """Cases whose results are in no figure of a run, but checks of it.
 
     Arguments:
-        twins: of the cases of the run.
         repeated_case: the case whose jobs are run again; None for none.
-        seed: from which the twins were drawn.
         number: of twins that were asked for of each case.
     """
 
@@ -71,8 +69,6 @@ def choose_companions(
     """Return twins, and the case with the smallest model to run again.
 
     Arguments:
-        cases: of the run.
-        twins: of them.
         number, seed: of twins of each case, and what they were drawn from.
     """
     return Companions(twins, min(cases, key=lambda case: case.model.size), seed, number)

@@ -29,7 +29,6 @@ class LocalProcesses:
     """Worker processes of this machine, each job in one of its own, and judged in another.
 
     Arguments:
-        workers: number of them.
         sandbox: whether strategies run in one.
     """
 

@@ -112,11 +112,8 @@ def judge_answers(
     Nothing of a strategy runs, and nothing that a file says of errors counts: an answer is a model.
 
     Arguments:
-        cases: that count.
         files: that `bench submit` wrote next to its results.
         textbooks: the cases with their textbook models, by name.
-        jobs: judges at a time.
-        nominal: the models that were started from.
 
     Raises:
         InputError: for a file that has none, two files with one strategy, or other seeds.

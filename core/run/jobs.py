@@ -64,12 +64,10 @@ class Report:
     """What a strategy says of its update, in plain data.
 
     Arguments:
-        status, reason, traceback: how it ended.
         seconds: wall time of the strategy alone.
         evaluations: eigenvalue solutions it made.
         discrepancy_std: relative standard deviation of a frequency that the samples do not show;
             None where the strategy says nothing of its uncertainty.
-        parameter_count, parameters, history, diagnostics: as it gave them.
     """
 
     status: Status
@@ -237,11 +235,7 @@ def _traceback(error: BaseException | None) -> str:
 
 
 def plain_outcome(result: Result) -> JobOutcome:
-    """Return a result as an outcome.
-
-    Raises:
-        TypeError, ValueError: for figures that are none.
-    """
+    """Return a result as an outcome; raises TypeError, ValueError for figures that are none."""
     if not isinstance(result, Result):
         raise TypeError(f"update returned {type(result).__name__}, expected UpdateResult")
     if not isinstance(result.model, Model):

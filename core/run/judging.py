@@ -91,7 +91,6 @@ def judge_outcome(
         case: with the nominal model that the strategy started from.
         reference: what the textbook model of the case gives.
         job: strategy, seed, and which nominal model it is.
-        outcome: what the strategy left behind.
     """
     strategy, seed, nominal = job
     own = {f.name: getattr(outcome, f.name) for f in fields(outcome) if f.name not in _JUDGED}

@@ -94,7 +94,6 @@ def open_bytes(kind: type[_T], data: bytes | memoryview) -> tuple[_T, list[AnyAr
     No array is allocated before its size is known to be that of the bytes.
 
     Arguments:
-        kind: of the head.
         data: from anybody.
 
     Raises:

@@ -37,7 +37,6 @@ def job_key(case: Case, strategy: str, code: bytes, version: str, seed: int) -> 
 
     Arguments:
         case: its name and the digest of its files go in.
-        strategy: name, with options.
         code: the pickled strategy: its class and its parameters.
         version: from `strategy_version`.
         seed: of the noise.
@@ -132,13 +131,7 @@ def _digest(stamps: tuple[Stamp, ...]) -> str:
 
 
 def provenance(meta: Mapping[str, Any], digest: str, version: str, seed: int) -> dict[str, Any]:
-    """Return where a result comes from, in plain data.
-
-    Arguments:
-        meta: of the run.
-        digest: of the files of the case.
-        version, seed: of the job.
-    """
+    """Return where a result comes from, in plain data."""
     machine = meta["machine"]
     return {
         **meta["versions"],

@@ -67,7 +67,6 @@ class Record:
 
     Arguments:
         kind: ``run``, ``result`` or ``end``.
-        key, status: of a result.
         data: JSON of the result, or of ``meta`` and, where a run begins, the time ``at``.
         file, number: where it stands, from 1.
     """
@@ -80,11 +79,7 @@ class Record:
     number: int = 0
 
     def result(self) -> JobResult:
-        """Return the result.
-
-        Raises:
-            InputError: naming the first field that is wrong.
-        """
+        """Return the result; raises InputError naming the first field that is wrong."""
         try:
             return decode_result(self.data)
         except InputError as fault:
@@ -273,7 +268,6 @@ def read_records(file: Path, faults: list[InputError]) -> Iterator[Record]:
     """Yield the records of a file in their order; what is damaged is left out.
 
     Arguments:
-        file: of the records of one run.
         faults: takes an error for every record that is lost, or one for other damage.
 
     Raises:

@@ -29,7 +29,6 @@ class StoredResults:
 
     Arguments:
         found: those to keep, of this run or of another.
-        own: those of this run.
     """
 
     found: dict[str, Record] = field(default_factory=dict)

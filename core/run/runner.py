@@ -37,7 +37,6 @@ class Receivers:
     """What takes the results of a run as they come.
 
     Arguments:
-        store: keeps them.
         progress: called with (result, jobs done, jobs in all).
         advance: called with how far that is which is not in the store, and how long the rest takes.
         keep_answer: takes the answer of every job that has a model, as the judge is given it.

@@ -40,9 +40,7 @@ class Workload:
     """The jobs of a run with all that it takes to compute and to judge them.
 
     Arguments:
-        slots: the jobs.
         references: what the results of a case are measured against, by its name.
-        limits: on a job, by strategy.
         show: takes the exhibit of a job of the first seed, before its result comes.
         answers: that are there already; these jobs are not run, only judged.
         keep: takes every answer that has a model.
@@ -92,7 +90,6 @@ def compute_jobs(
 
     Arguments:
         wanted: places of jobs; the next is asked for when there is a process for it.
-        count: number of processes.
         pulse: called twice a second and more; what it raises ends the jobs that run.
         processes: that are there already, and stay; else there are some for this time.
     """

@@ -23,12 +23,7 @@ _LASTING = 1.0  # s that a look at the source of a strategy is good for
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A case with the nominal model that its jobs start from.
-
-    Arguments:
-        nominal: which one that is.
-        case: the case with that model.
-    """
+    """A case with the nominal model that its jobs start from."""
 
     nominal: Nominal
     case: Case
@@ -40,13 +35,11 @@ class Slot:
 
     Arguments:
         start: the case and where the job starts from.
-        strategy, seed: the job.
         code: the strategy as a worker is given it, or why it cannot be sent to one.
         key: of everything that decides on its result.
         version: of the strategy when the key was made.
         now: returns that of the strategy as its source is now; None where workers import no source
             of it.
-        meta: of the run.
     """
 
     start: Start
@@ -118,7 +111,6 @@ class Slots(Sequence[Slot]):
 
     Arguments:
         starts: cases, each with a nominal model to start from.
-        strategies, seeds: run on each of them.
     """
 
     def __init__(

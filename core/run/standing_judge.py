@@ -37,7 +37,6 @@ class _Request:
     Arguments:
         case: digest of the case; `Dossier.case` is empty where the judge has it already.
         forget: digests of cases that are sent anew should they come up again.
-        verdict: what is judged.
         memory: bytes that judging may take; None for no limit.
     """
 
@@ -168,7 +167,6 @@ class Judges(Generic[Key]):
         Arguments:
             key: by which `ended` names it.
             case: digest of `verdict.case`.
-            limits: what judging may take.
         """
         try:
             judge = self._free(case)

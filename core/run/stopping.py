@@ -29,11 +29,7 @@ class Stopping:
             yield job
 
     def heed(self, signum: int, frame: FrameType | None) -> None:
-        """Take a Ctrl-C.
-
-        Raises:
-            KeyboardInterrupt: the second time.
-        """
+        """Take a Ctrl-C; raises KeyboardInterrupt the second time."""
         if self.asked:
             raise KeyboardInterrupt
         self.asked = True

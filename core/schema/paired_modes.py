@@ -19,9 +19,7 @@ class PartnerCandidate(Struct, frozen=True, gc=False, array_like=True):
     """A mode of a model that may stand for a measured one, and is the partner of no other.
 
     Arguments:
-        hz: its frequency.
         weight: how far the sensors see it in the measured shape, in parts of the partner's.
-        mac: with the measured shape.
     """
 
     hz: Hertz
@@ -30,12 +28,7 @@ class PartnerCandidate(Struct, frozen=True, gc=False, array_like=True):
 
 
 class ModeBefore(Struct, frozen=True, gc=False, array_like=True):
-    """The mode of the structure as tested that has the shape of a modified one.
-
-    Arguments:
-        number: its label.
-        mac: of the two measured shapes.
-    """
+    """The mode of the structure as tested that has the shape of a modified one."""
 
     number: Whole
     mac: Mac

@@ -136,7 +136,6 @@ def parse_json(
 
     Arguments:
         text: not longer than the caller can bear.
-        file, line: where it stands, for the message.
         expected: what it should have been, for the message.
 
     Raises:
@@ -291,7 +290,6 @@ def meta_from_json(
 
     Arguments:
         data: what `run_to_json` gave under ``meta``.
-        file, line: where they stand, for the message.
 
     Raises:
         InputError: naming the first field that is wrong.

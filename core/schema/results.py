@@ -182,7 +182,6 @@ def origins_of(meta: Mapping[str, Any], *kinds: str) -> dict[str, str]:
     """Return from the names of what ran with the cases of a run to the cases they belong to.
 
     Arguments:
-        meta: of the run.
         kinds: ``of`` for twins, ``again`` for jobs that were run a second time; both by default.
     """
     twins = meta.get("twins") or {}

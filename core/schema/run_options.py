@@ -142,11 +142,7 @@ class RunKeywords(StudyKeywords, total=False):
 
 
 def check_keywords(given: Mapping[str, Any], kind: Any) -> None:  # noqa: ANN401 - a TypedDict
-    """Make sure that keywords exist.
-
-    Raises:
-        TypeError: naming one that does not.
-    """
+    """Make sure that keywords exist; raises TypeError naming one that does not."""
     for name in sorted(given.keys() - kind.__optional_keys__):
         raise TypeError(f"unexpected keyword argument {name!r}")
 

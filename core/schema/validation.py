@@ -31,7 +31,6 @@ def read_plain(
 
     Arguments:
         kind: what `msgspec.convert` can make.
-        data: of JSON.
         file, line, key: where the data stand, for the message.
         hidden: a key of `data` that the file has not, and the message leaves out.
 

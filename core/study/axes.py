@@ -28,9 +28,7 @@ class CaseConditions:
     """A case under conditions.
 
     Arguments:
-        case: its name as it is.
         noise: factor on the stated standard deviations.
-        sensors_left_out: their number.
     """
 
     case: Name
@@ -43,7 +41,6 @@ class OptionSet:
     """A strategy with options.
 
     Arguments:
-        strategy: its name without options.
         options: those of the study's grid, by name.
     """
 

@@ -20,7 +20,6 @@ class Forecast:
     Arguments:
         jobs, done: in all, and in the store already.
         seconds: of strategies and of judging them, for the jobs that are left and known.
-        longest: seconds of the longest of them.
         unknown: how many jobs of which case and strategy nothing is known of.
     """
 
@@ -45,10 +44,7 @@ def forecast(
     """Return what a study will take.
 
     Arguments:
-        jobs: of the study.
         left: case and strategy of those that are left, as the run names them.
-        axes: of the study.
-        before: earlier results.
         judging: seconds that it takes to judge a model, by case without conditions.
     """
     exact: dict[Pair, list[float]] = defaultdict(list)

@@ -115,9 +115,7 @@ class StudyFile:
     """A study file that was read.
 
     Arguments:
-        file: where it is.
         text: as it stands there, for the lines of messages.
-        tables: its content.
     """
 
     file: Path
@@ -158,11 +156,7 @@ class StudyFile:
 
 
 def read_study(file: str | PathLike[str]) -> StudyFile:
-    """Read a study file.
-
-    Raises:
-        InputError: for a key that is unknown, missing or wrong.
-    """
+    """Read a study file; raises InputError for a key that is unknown, missing or wrong."""
     path = Path(file)
     text = read_text(path, _LARGEST)
     try:

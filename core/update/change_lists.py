@@ -69,7 +69,6 @@ def element_sets(structure: Structure, word: str) -> Mapping[str, tuple[str, ...
     """Return the elements of every part of a frame that has a factor, by the name of the part.
 
     Arguments:
-        structure: the meshed frame.
         word: a `PartSet`; every element carries mass, arms of joints are none.
 
     Raises:

@@ -71,7 +71,6 @@ def expand_one_by_dynamics(
     moments to one unit.
 
     Arguments:
-        model: any model.
         sensor_rows: readings from dofs, (n_sensors, n).
         readings: (n_sensors,).
         eigenvalue: measured, in rad^2/s^2; not one of the model's own.

@@ -35,7 +35,6 @@ class EntryPattern:
     Arguments:
         row, column: where they stand, row <= column, (n_entries,).
         values: their nominal values, (n_entries,).
-        size: number of dofs n.
     """
 
     row: IntArray
@@ -309,12 +308,9 @@ class EntryUpdate:
     """A model with other entries in the pattern of the nominal stiffness matrix.
 
     Arguments:
-        model: the updated model.
-        pattern: the entries.
         changes: relative to the nominal sizes, (n_entries,).
         free: number of unknowns that the rigid-body modes leave; None where it was not counted.
         rank: of the equations in the last step; None where it was not counted.
-        residuals: of the used modes.
         history: one mapping an iteration.
         used_error: largest relative error of a used frequency where the equations are met by
             least squares only; None where they are met.
@@ -357,9 +353,6 @@ def equations_of(
     shapes turn with the model, both hold in the end.
 
     Arguments:
-        pattern: entries of the nominal stiffness.
-        model: the current estimate.
-        quasi: measured modes at the current estimate.
         cutoff: change of forces, of the inertia forces for entries that change by 100 %, below
             which a direction is left alone.
 

@@ -210,7 +210,6 @@ class Solution:
 
     Arguments:
         x: relative changes, (n_unknowns,).
-        rank: rank of the equations.
         condition: ratio of the largest to the smallest singular value that counts.
         residual: norm of A x - b over that of the inertia forces.
         equations: number of rows.
@@ -326,8 +325,6 @@ def update_by_equation_error(
     """Return the model after five iterations of expansion and solution.
 
     Arguments:
-        model: the nominal model.
-        measurement: the used modes.
         family: where updated element or group matrices are looked for; with cores they stay
             positive semidefinite.
         orthogonality: whether the orthogonality of the modes adds equations.

@@ -60,12 +60,10 @@ class Target:
     """The posterior density of scaled parameters q and of the discrepancy's coordinate v.
 
     Arguments:
-        iteration: parameters and their priors.
         point: the most probable ones at the prior median of the discrepancy.
         centre: its q, off the bounds, at which there is no density, (p,).
         root: Cholesky factor of the covariance of q about it, (p, p).
         measurement: the modes that have a partner there.
-        discrepancy: its prior.
     """
 
     iteration: Iteration

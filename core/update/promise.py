@@ -44,7 +44,6 @@ def eigenvalue_rounding(model: Model, shapes: FloatArray, eigenvalues: FloatArra
     most: a strategy that makes such a model has spoilt it.
 
     Arguments:
-        model: any model.
         shapes: mass-normalised, (n, m).
         eigenvalues: in rad^2/s^2, (m,).
 
@@ -88,7 +87,6 @@ def measure_residuals(model: Model, shapes: FloatArray, eigenvalues: FloatArray)
     """Return the residuals of modes in a model.
 
     Arguments:
-        model: any model.
         shapes: mass-orthonormal, (n, m).
         eigenvalues: in rad^2/s^2, (m,).
     """

@@ -109,8 +109,6 @@ class WantedModes:
     """What the equations shall hold for, at any current estimate.
 
     Arguments:
-        nominal: the model before the update.
-        measurement: the used modes.
         expansion: `rotation` of the current estimate's shapes, or `force`, the smallest force
             residual in the nominal model.
         frequencies: the measured ones, or those of the nominal model.

@@ -31,7 +31,6 @@ class Targets:
     """What is fitted, and how it is weighted.
 
     Arguments:
-        measurement: the used modes.
         residual: the modal quantity of a mode: absolute eigenvalues (2 pi f)^2, as Horton et al.
             use, eigenvalues relative to the measured ones, or frequencies in Hz.
         statistical: weight every datum by its inverse standard deviation; else by 1.
@@ -119,9 +118,6 @@ class Prediction:
     """A model's answer to the data: one eigenvalue solution, sensitivities on demand.
 
     Arguments:
-        data: what it is compared with.
-        model: with its present parameter values.
-        modes: its modes.
         partner: which of them belongs to every measured mode; -1 where none does, (m,).
         observer: sensor readings from dofs, sparse (n_sensors, n).
         mass: in kg.
@@ -166,7 +162,6 @@ class Prediction:
         """Return d (weighted prediction) / d parameter, 0 without partner, (n_rows, p).
 
         Arguments:
-            slopes: of the matrices by the parameters.
             masses: gives d mass / d parameter in kg, (p,), where the mass is a datum.
         """
         data = self.data
@@ -208,8 +203,6 @@ def predict(
     the mode that continues its previous partner.
 
     Arguments:
-        data: what is measured.
-        model: with its present values.
         previous: the prediction at the iteration before, on the same dofs.
         mass: of the model in kg; None for that of its members.
 

@@ -42,11 +42,7 @@ class ResponseTargets:
 
     @property
     def responses(self) -> FrequencyResponses:
-        """Return the responses.
-
-        Raises:
-            NotApplicable: where there are none.
-        """
+        """Return the responses; raises NotApplicable where there are none."""
         found = self.measurement.responses
         if found is None or found.deviations is None:
             raise NotApplicable("no frequency responses are given: frfs and responses in the case")
@@ -99,13 +95,7 @@ class ResponseTargets:
 
 @dataclass(frozen=True)
 class ResponsePrediction:
-    """A model's answer to the data: one eigenvalue solution, sensitivities on demand.
-
-    Arguments:
-        data: what it is compared with.
-        model: with its present parameter values.
-        answer: its receptances.
-    """
+    """A model's answer to the data: one eigenvalue solution, sensitivities on demand."""
 
     data: ResponseTargets
     model: Model
@@ -177,9 +167,6 @@ class AntiresonancePrediction:
     """A model's answer to frequencies and antiresonances.
 
     Arguments:
-        data: what it is compared with.
-        modal: its frequencies.
-        answer: its receptances.
         zeros: its antiresonances.
     """
 

@@ -298,7 +298,6 @@ def estimate_parameters(
     """Return the parameters before and after.
 
     Arguments:
-        parametric: the model and its changes.
         q: coordinates after, (p,).
         std: their standard deviations, (p,); None where unknown.
     """

@@ -29,7 +29,6 @@ class Transitions:
     Arguments:
         samples: each as probable as the others, (n, p).
         log_evidence: ln of the mean likelihood over the prior.
-        stages: from the prior to the posterior.
         accepted: share of the last moves.
     """
 
@@ -56,7 +55,6 @@ def sample_transitional(
     Arguments:
         prior: samples of it, (n, p).
         log_prior, log_likelihood: from points (n, p) to (n,); the first but for a constant.
-        rng: decides on every draw.
 
     Raises:
         StrategyFailure: when the likelihood is so narrow that a hundred stages do not reach it.

@@ -126,7 +126,6 @@ def soften_ends(
     """Return the frame with rotational springs at member ends, in series with those there.
 
     Arguments:
-        frame: any frame.
         stiffness: from ``member@joint`` to local directions to N m/rad; infinite ones are rigid
             and leave the arm.
         arm: its length as a multiple of `end_arm`.
@@ -163,7 +162,6 @@ def flexible_ends_change(
     """Return what rotational springs at member ends do, in series with those that are there.
 
     Arguments:
-        model: a frame as it is.
         ends: ``member@joint``.
         parts: for every value of the change, the local directions of its springs. The values are
             stiffnesses in N m/rad, infinite for rigid connections, of which the arms remain.

@@ -33,7 +33,6 @@ def soften_supports(frame: Frame, series: Mapping[Held, float]) -> Frame:
     """Return the frame with springs in series with its supports and its springs to ground.
 
     Arguments:
-        frame: any frame.
         series: from the word of a support and a direction, as `supports_of` has them, to N/m or
             N m/rad; infinite for a support that does not give.
     """
@@ -58,7 +57,6 @@ def flexible_supports_change(model: Model, parts: Sequence[Sequence[Held]]) -> C
     """Return what springs in series with supports and springs to ground do.
 
     Arguments:
-        model: a frame as it is.
         parts: for every value of the change what it is the stiffness of, as `supports_of` has it.
             The values are in N/m or N m/rad, infinite for rigid supports. The geometric stiffness
             of preloads at the support is left out.

@@ -202,11 +202,8 @@ class _Spot:
     """A support that could slide on its beam.
 
     Arguments:
-        beam: the line.
         x: where it is on it, in m.
-        low, high: how far it may go.
         inward: 1, or -1 where it sits at the far end and can but go back.
-        directions: what it holds.
     """
 
     beam: Beam

@@ -108,7 +108,6 @@ def _walls(
     """Return what other walls change in stiffness and mass, by kinds of elements.
 
     Arguments:
-        structure: a meshed frame.
         bound: the largest relative change.
         names: of members; those with just this bound where there are none.
 

@@ -30,7 +30,6 @@ def apart(function: Callable[[Path], dict[str, Any]], path: Path, expected: str)
 
     Arguments:
         function: of a module, from the path of a file.
-        path: of the file.
         expected: for the message about a broken one.
 
     Raises:

@@ -89,7 +89,6 @@ class Attachments:
 
         Arguments:
             edges: by new node.
-            places: of all nodes.
         """
         led: dict[int, dict[int, frozenset[int]]] = {}
         for f in self.followers:
@@ -124,12 +123,10 @@ class NodeMotions:
     """The motions of nodes, (6, n), sparse.
 
     Arguments:
-        attached: with followers.
         solid: elements, of which the lines of nodes count.
         motions: none so far; those of what follows are held.
         used: nodes of elements in their order.
         alone: places of others, which come first.
-        path: of the file, for messages.
     """
 
     def __init__(

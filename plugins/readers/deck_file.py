@@ -36,7 +36,6 @@ class SolidDeck:
     """What an input file says of a linear model of solids and shells.
 
     Arguments:
-        path: of the file.
         elements: kind and nodes by number.
         sets, node_sets: numbers by name, in capitals.
         named: names as the file first writes them.

@@ -107,8 +107,6 @@ def save_hdf5(path: Path, original: Path, new: Variables) -> None:
     """Write a copy of a file with some matrices renewed.
 
     Arguments:
-        path: of the copy.
-        original: stays as it is.
         new: matrices by the names that `read_hdf5` gives; symmetric, so that rows and columns
             are alike.
     """

@@ -44,8 +44,6 @@ def read_modal(variables: Mapping[str, Any], path: Path, names: Mapping[str, str
     are not there are nan, nan and x.
 
     Arguments:
-        variables: by their name.
-        path: for messages.
         names: from a key of `NAMES` to the name of a variable, where that is another one.
 
     Raises:
@@ -98,7 +96,6 @@ def named_variables(
         variables: by their name; that of a part of a structure counts without the structure.
         known: what those of a key may be called.
         names: from a key to the name of a variable.
-        path: for messages.
 
     Raises:
         InputError: for a name or a key that is not there.

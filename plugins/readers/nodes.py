@@ -57,7 +57,6 @@ def read_lines(path: Path, above: Path | None = None, depth: int = 0) -> Iterato
     """Return file, number and text of every line that says something, included ones in place.
 
     Arguments:
-        path: of the input file.
         above: the folder that included files must lie in; None for that of the file.
         depth: of the file among those that include each other.
     """

@@ -28,7 +28,6 @@ def open_broken(path: Path, what: str) -> Iterator[None]:
     """Turn whatever a library raises at a broken file into one line; let it print nothing.
 
     Arguments:
-        path: for the message.
         what: was expected, e.g. ``"an OP4 file"``.
     """
     try:
@@ -89,7 +88,6 @@ def symmetric(rows: np.ndarray, columns: np.ndarray, values: np.ndarray, n: int)
     Arguments:
         rows, columns: from 0, (m,) each; where both triangles are there, they must be equal.
         values: (m,).
-        n: the number of rows.
     """
     low, high = np.minimum(rows, columns), np.maximum(rows, columns)
     if (rows < columns).any() and (rows > columns).any():

@@ -70,8 +70,6 @@ def read_response_variables(
     """Return the responses that are among variables.
 
     Arguments:
-        variables: by their name.
-        path: for messages.
         names: from time, rate, motion, force, frequencies, values, responses, references and
             quantity to the name of a variable, where that is not a common one.
 

@@ -30,8 +30,6 @@ class Shell(NamedTuple):
     """A kind of shell element.
 
     Arguments:
-        solid: what it becomes.
-        functions: its class in scikit-fem.
         corners: how many; the nodes amid edges follow them.
     """
 
@@ -98,7 +96,6 @@ class Motion(NamedTuple):
 
     Arguments:
         node, direction: its label, which counts from 0.
-        xyz: its place.
         axes: its unit motion in (x, y, z, rx, ry, rz); zero where no motion of the body moves it.
     """
 
@@ -178,7 +175,6 @@ class _QuarterNode(NamedTuple):
     Arguments:
         old: the node of the whole that it is; None for a new one.
         edge: the nodes of the edge that it is on, if any.
-        near: the nearest corner.
         point: its place in the reference element.
     """
 
@@ -212,7 +208,6 @@ def split_shells(
 
     Arguments:
         elements: kind and nodes by number.
-        places: of the nodes.
     """
     found, own_places = {}, dict(places)
     edges: dict[int, tuple[int, ...]] = {}
@@ -264,7 +259,6 @@ class Thickened:
 
     Arguments:
         elements: all of a deck, solids in place of shells.
-        places: of their nodes.
         lines: of nodes, by the node of shells that they come from.
     """
 
@@ -374,8 +368,6 @@ def thicken(
 
     Arguments:
         elements: kind and nodes by number.
-        places: of the nodes.
-        thickness: of every shell.
 
     Raises:
         ValueError: with the number of an element without an area.

@@ -44,8 +44,6 @@ class BetterElements:
 
     Arguments:
         deck: with elements that better ones stand for.
-        places: of its nodes.
-        whole: its model.
     """
 
     deck: SolidDeck
@@ -122,7 +120,6 @@ def _model_of(
     """Return the model of a deck whose solid elements have these materials.
 
     Arguments:
-        places: of its nodes.
         before: whose degrees of freedom come first.
     """
     path = deck.path
@@ -265,11 +262,7 @@ def _outline(deck: SolidDeck, numbers: Sequence[int], places: Mapping[int, Point
 def _thicken(
     deck: SolidDeck, material: Mapping[int, str], places: Mapping[int, Point]
 ) -> shells.Thickened:
-    """Return solids in place of the shells of a deck.
-
-    Arguments:
-        places: of the nodes of all elements.
-    """
+    """Return solids in place of the shells of a deck."""
     thickness: dict[int, float] = {}
     for name, (_, value) in deck.sections.items():
         thickness |= dict.fromkeys(deck.sets[name], value)
@@ -328,7 +321,6 @@ def write_factors(model: Model, path: Path, original: Path) -> bool:
 
     Arguments:
         model: updated, with the groups of the deck.
-        path: to write.
         original: the deck that the model came from.
 
     Returns:

@@ -89,7 +89,6 @@ def evaluate(
     """Return values (n, q) and slopes (n, d, q) of functions of scikit-fem at points (d, q).
 
     Arguments:
-        functions: the class of the element.
         places: of its nodes in the order that is wanted, (n, d).
     """
     import skfem

@@ -20,7 +20,6 @@ def read_datasets(
     """Return the datasets of some numbers.
 
     Arguments:
-        path: of the file.
         wanted: numbers of datasets.
         spare: those of them that are left out where they are broken.
 

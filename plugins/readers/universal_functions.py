@@ -43,7 +43,6 @@ def read_functions(path: Path, positions: Sensors | None) -> FrequencyResponses 
     """Return the frequency responses of a file, or its signals where there are no responses.
 
     Arguments:
-        path: of the file.
         positions: sensors ``node:direction`` whose coordinates are known.
 
     Raises:

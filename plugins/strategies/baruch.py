@@ -23,7 +23,6 @@ def stiffness_change(model: Model, quasi: QuasiModes) -> LowRank:
     spoil the rigid-body modes of fine meshes.
 
     Arguments:
-        model: the current estimate.
         quasi: measured modes, the shapes made from modes of the same model.
 
     Source: Baruch & Bar-Itzhack (1978); Ahmadian, Gladwell & Ismail (1997), equation (18).

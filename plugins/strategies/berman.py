@@ -28,8 +28,6 @@ def expand_without_momentum(
     rigid-body modes stiffness. Both are conditions of the expansion.
 
     Arguments:
-        model: the nominal one.
-        measurement: the used modes.
         rigid: free rigid-body modes, (n, r).
 
     Raises:

@@ -94,8 +94,6 @@ def cross_equations(
     """Return the equations of all pairs of modes, (n_i m, p) and (n_i m,).
 
     Arguments:
-        parts: the model and its p factors.
-        own: n_i of its elastic modes.
         shapes: measured ones at all dofs, with unit generalised mass, (n, m).
         eigenvalues: measured, in rad^2/s^2, (m,).
     """

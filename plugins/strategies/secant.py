@@ -69,7 +69,6 @@ def stiffness_change(
     """Return M Phi Lambda Phi' M - K Phi (Phi' K Phi)^-1 Phi' K, of rank 2m.
 
     Arguments:
-        model: the nominal one.
         shapes: orthonormal with its mass, (n, m).
         eigenvalues: measured, in rad^2/s^2, (m,).
         rigid: free rigid-body modes, (n, r).

@@ -57,9 +57,6 @@ def page_data(run: RunData, exhibits: ExhibitSource | None = None) -> dict[str, 
     """Return everything that the page of a run shows.
 
     Errors and gains are those of the run to the last digit; other numbers are rounded.
-
-    Arguments:
-        exhibits: what the store has to draw.
     """
     standings = Standings.of(run)
     board, apart = standings.rows, standings.apart

@@ -21,12 +21,7 @@ _ESCAPES = {ord(letter): f"\\u{ord(letter):04x}" for letter in "<>&\u2028\u2029"
 
 
 def document(data: Mapping[str, Any], *, title: str) -> str:
-    """Return the document.
-
-    Arguments:
-        data: for JSON.
-        title: of the window.
-    """
+    """Return the document."""
     from markupsafe import Markup
 
     page = templates().overlay(keep_trailing_newline=True).get_template("run.html")

@@ -40,7 +40,6 @@ class Card:
     Arguments:
         name: upper case, without the star of large fields.
         fields: stripped texts, eight to a row; those behind the last one are blank.
-        file: in which it stands.
         first, last: its lines there, from 0.
     """
 
@@ -121,7 +120,6 @@ class Card:
 
         Arguments:
             first: the field in which the list starts.
-            key: its name.
             known: the grids that there are, sorted; of ranges only these count.
         """
         texts = [text for text in self.fields[first - 1 :] if text]

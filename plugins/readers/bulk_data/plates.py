@@ -74,9 +74,6 @@ def has_plates(deck: Deck) -> bool:
 class BulkPlates(BulkData):
     """Bulk data as a deck of shells and solids.
 
-    Arguments:
-        deck: all cards.
-
     Raises:
         InputError: for a card that is not read and may carry stiffness or mass, and all that is
             wrong in those that are.

@@ -41,8 +41,6 @@ class Bar:
     """What the cards of a property and its material say of a bar.
 
     Arguments:
-        E, G, nu, rho: of the material.
-        of: the numbers of the property.
         card, material: those of the property and of its material.
     """
 
@@ -85,7 +83,6 @@ def bar_of(card: Card, materials: Mapping[int, Card]) -> Bar:
     """Return what a property and its material say.
 
     Arguments:
-        card: PBAR, PBARL, PBEAM or PROD.
         materials: the MAT1 by number.
 
     Raises:

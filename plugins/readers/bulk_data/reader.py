@@ -59,7 +59,6 @@ class BulkDataReader(ProgramReader):
 
         Arguments:
             model: of what is in `original`, its properties multiplied, in the units of that.
-            path: the new file.
             original: the file that the model comes from.
 
         Raises:

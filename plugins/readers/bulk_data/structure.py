@@ -104,7 +104,6 @@ class BulkData:
     """What every reading of bulk data needs: grids, constraints, springs, masses, rigid links.
 
     Arguments:
-        deck: all cards.
         read: names of the cards that are read.
         instead: what is expected in place of any other card.
 
@@ -319,10 +318,8 @@ def lumps(
     Pairs of a sixth of the mass lie on the principal axes, the rest in the centre.
 
     Arguments:
-        mass: of the body.
         moments: I11, I21, I22, I31, I32, I33 about its centre; products with their own sign.
         axes: to which these belong, as rows, (3, 3).
-        card: for errors.
 
     Raises:
         InputError: where no body has such moments.

@@ -19,7 +19,6 @@ class Systems:
     """The coordinate systems of a file by their numbers, 0 for the basic one.
 
     Arguments:
-        cards: of the file, of any kind.
         grids: the GRID cards by number, on which systems may hang.
         usual: the system in which grids lie that name none.
 
@@ -40,9 +39,6 @@ class Systems:
         """Return a system.
 
         Arguments:
-            number: as a card names it.
-            user: the card that names it.
-            key: the field of that card.
             depth: how many systems stand between.
 
         Raises:

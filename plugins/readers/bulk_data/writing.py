@@ -215,11 +215,7 @@ class _Factors(_Edits):
     """Scales properties of plates, solids and springs: a plate or solid gets a MAT1 of its own."""
 
     def scale(self, card: Card, factor: float, heavier: float, material: Card | None) -> None:
-        """Write a property, or a CELAS2, as much stiffer and heavier as stated.
-
-        Arguments:
-            material: of a plate or solid.
-        """
+        """Write a property, or a CELAS2, as much stiffer and heavier as stated."""
         texts = [*card.fields, *[""] * 8]
         if material is None:
             row = texts.index("K") + 1 if card.name == "PBUSH" else 1
