@@ -88,11 +88,7 @@ class UnknownNameError(InputError, KeyError):
 
 
 def _input_error(
-    what: str,
-    file: Path | str | None,
-    line: int | None,
-    key: str | None,
-    expected: str | None,
+    what: str, file: Path | str | None, line: int | None, key: str | None, expected: str | None
 ) -> InputError:
     return InputError(what, file=file, line=line, key=key, expected=expected)
 

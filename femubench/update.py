@@ -23,15 +23,11 @@ from femubench.core.update.low_rank import (
     with_measured_frequencies as with_measured_frequencies,
     with_stiffness_step as with_stiffness_step,
 )
-from femubench.core.update.modal_space import (
-    ModalSpace as ModalSpace,
-)
+from femubench.core.update.modal_space import ModalSpace as ModalSpace
 from femubench.core.update.parametric_strategy import ParametricStrategy as ParametricStrategy
 from femubench.core.update.posterior_sampling import sample_posterior as sample_posterior
 from femubench.core.update.promise import check_used_modes as check_used_modes
-from femubench.core.update.quasi import (
-    QuasiModes as QuasiModes,
-)
+from femubench.core.update.quasi import QuasiModes as QuasiModes
 from femubench.core.update.sensitivity_strategy import SensitivityStrategy as SensitivityStrategy
 from femubench.core.update.sensitivity_update import (
     UpdateOptions as UpdateOptions,

@@ -12,10 +12,7 @@ if TYPE_CHECKING:
     from femubench.reproduction import Study, Workbench
 
 # Slug: the cases that a re-run works with.
-PAPERS = {
-    "frame": ("frame", "frame-beam", "frame-solid"),
-    "hframe": ("hframe", "hframe-solid"),
-}
+PAPERS = {"frame": ("frame", "frame-beam", "frame-solid"), "hframe": ("hframe", "hframe-solid")}
 # Hundredths of a second after which a re-run had done each of its different updates, and all else
 # (benchmarks/reproduce_updates.py): how much is left then, for who waits for it.
 DONE = {

@@ -7,15 +7,7 @@ from functools import partial
 from typing import Any
 
 from femubench.plot import Axis, Chart, Mark, Series
-from femubench.reports.blocks import (
-    Block,
-    Cell,
-    Column,
-    Drawing,
-    Items,
-    Passage,
-    Table,
-)
+from femubench.reports.blocks import Block, Cell, Column, Drawing, Items, Passage, Table
 from femubench.reports.cells import NOTHING, format_fixed, plain, shorten_text
 from femubench.reports.html import to_html
 from femubench.reports.markdown import to_markdown

@@ -10,13 +10,7 @@ from femubench.reports.page.rounding import clean
 from femubench.reports.predictive import predictive_json
 from femubench.reports.summary import finding, lead
 from femubench.reports.twins import twins_by_strategy
-from femubench.results import (
-    RunData,
-    Standings,
-    StudyAxes,
-    run_to_json,
-    unsteady,
-)
+from femubench.results import RunData, Standings, StudyAxes, run_to_json, unsteady
 
 # Columns of the leaderboard that are figures, under the names of the contract.
 _SAME = (

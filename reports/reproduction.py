@@ -6,14 +6,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 
-from femubench.reports.blocks import (
-    Block,
-    Column,
-    Drawing,
-    Items,
-    Passage,
-    Table,
-)
+from femubench.reports.blocks import Block, Column, Drawing, Items, Passage, Table
 from femubench.reports.cells import plain
 from femubench.reports.digits import Digits, off
 from femubench.reports.markdown import escape, to_markdown

@@ -31,14 +31,7 @@ from femubench.reports.summary import (
 )
 from femubench.reports.terminal import to_terminal
 from femubench.reports.twins import MEANING, describe_twins, suspicions
-from femubench.results import (
-    JobResult,
-    PairedMode,
-    RunData,
-    Standings,
-    StudyAxes,
-    twin_gains,
-)
+from femubench.results import JobResult, PairedMode, RunData, Standings, StudyAxes, twin_gains
 
 if TYPE_CHECKING:
     from femubench import Identification

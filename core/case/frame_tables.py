@@ -16,11 +16,7 @@ from femubench.core.errors import InputError
 from femubench.core.typing import IntArray
 
 # A key of a joint or member that is a list stands in one column an entry.
-SPREAD = {
-    "xyz": ("x", "y", "z"),
-    "ends": ("end_1", "end_2"),
-    "up": ("up_x", "up_y", "up_z"),
-}
+SPREAD = {"xyz": ("x", "y", "z"), "ends": ("end_1", "end_2"), "up": ("up_x", "up_y", "up_z")}
 KEYS = {
     "joints": ("name", "xyz", "type"),
     "members": ("name", "ends", "elements", "section", "material", "up"),

@@ -160,10 +160,7 @@ def dofs_csv(geometry: MatrixGeometry) -> bytes:
 
 
 def matrix_keys(
-    mass: SparseArray,
-    stiffness: SparseArray,
-    geometry: MatrixGeometry,
-    model: Model,
+    mass: SparseArray, stiffness: SparseArray, geometry: MatrixGeometry, model: Model
 ) -> tuple[Keys, Files]:
     """Return the table `[model]` of a pair of matrices, and the files that it names.
 

@@ -27,12 +27,7 @@ from femubench.core.case.matrices import (
     with_groups,
 )
 from femubench.core.case.matrix_files import matrices_of, matrix_market
-from femubench.core.case.nodes import (
-    MatrixGeometry,
-    matrix_model,
-    read_dofs,
-    read_nodes,
-)
+from femubench.core.case.nodes import MatrixGeometry, matrix_model, read_dofs, read_nodes
 from femubench.core.case.schema import DrawingSpec, FileSpec, FrameSpec, LengthUnit
 from femubench.core.case.tables import SUFFIXES, read_table
 from femubench.core.case.units import from_si, in_si
@@ -227,11 +222,7 @@ def _placed(
 
 
 def write_model(
-    model: Model,
-    folder: Path,
-    like: ModelFiles,
-    readers: Sequence[Reader],
-    unit: LengthUnit = "m",
+    model: Model, folder: Path, like: ModelFiles, readers: Sequence[Reader], unit: LengthUnit = "m"
 ) -> None:
     """Write a model in the format of the files that it came from, under the same names.
 

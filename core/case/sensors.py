@@ -8,12 +8,7 @@ import numpy as np
 
 from femubench.core.case.faults import Misfit, WrongDirection
 from femubench.core.case.frames import Site
-from femubench.core.case.matching import (
-    Alignment,
-    Placed,
-    Placement,
-    describe_matches,
-)
+from femubench.core.case.matching import Alignment, Placed, Placement, describe_matches
 from femubench.core.case.tables import RESERVED, CsvRow, parse_place, read_table
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Vector

@@ -6,12 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from femubench.core.conformance import (
-    SECONDS,
-    effect_checks,
-    other_checks,
-    strategy_checks,
-)
+from femubench.core.conformance import SECONDS, effect_checks, other_checks, strategy_checks
 from femubench.core.conformance.kit import (
     CHECKS,
     Bench,

@@ -12,12 +12,7 @@ from femubench.core.conformance import kit
 from femubench.core.conformance.fingerprints import fingerprint, first_difference
 from femubench.core.conformance.kit import Bench, Verdict, check, fail_check, pass_check
 from femubench.core.conformance.problems import GROUPED, PLAIN, problem
-from femubench.core.conformance.results import (
-    Given,
-    finite as finite_entries,
-    sendable,
-    symmetric,
-)
+from femubench.core.conformance.results import Given, finite as finite_entries, sendable, symmetric
 from femubench.core.conformance.strategy_checks import own_doc
 from femubench.core.drawing.places import find_wireframe
 from femubench.core.effect.model_places import ModelPlaces

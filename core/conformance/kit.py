@@ -91,12 +91,7 @@ CHECKS: list[Check] = []
 
 
 def check(
-    role: Role,
-    name: str,
-    sentence: str,
-    *,
-    wants: Wants = lambda bench: (),
-    first: bool = False,
+    role: Role, name: str, sentence: str, *, wants: Wants = lambda bench: (), first: bool = False
 ) -> Callable[[Judge], Judge]:
     """Put a function on the list of checks."""
 

@@ -366,11 +366,7 @@ def _density(
 
 
 def _behind_arms(
-    structure: MeshedFrame,
-    pairs: IntArray,
-    arm: FloatArray,
-    force: FloatArray,
-    moment: FloatArray,
+    structure: MeshedFrame, pairs: IntArray, arm: FloatArray, force: FloatArray, moment: FloatArray
 ) -> tuple[SparseArray, FloatArray]:
     """Return motions of the bases and tips of rigid arms, and their forms.
 

@@ -170,11 +170,7 @@ def _local(first: AnyArray, turn: FloatArray, reference: int, size: int) -> Floa
 
 
 def _linear(
-    gram: FloatArray,
-    data: FloatArray,
-    first: AnyArray,
-    turns: list[FloatArray],
-    weight: FloatArray,
+    gram: FloatArray, data: FloatArray, first: AnyArray, turns: list[FloatArray], weight: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the normal matrix of one output's shape and residuals, and the solution."""
     size = len(first) + RESIDUALS * len(turns)

@@ -235,9 +235,7 @@ def close_cases(
 
 
 def judge_closed(
-    folder: str | PathLike[str],
-    answers: Iterable[str | PathLike[str]],
-    jobs: int | None = None,
+    folder: str | PathLike[str], answers: Iterable[str | PathLike[str]], jobs: int | None = None
 ) -> Run:
     """Return the run of strategies that answered on the open halves of a closed set.
 

@@ -59,9 +59,7 @@ def papers_of(plugins: Plugins, papers: str | Sequence[str] | None = None) -> tu
 
 
 def studies_of(
-    papers: Sequence[str],
-    plugins: Plugins,
-    on_advance: OnAdvance | None = None,
+    papers: Sequence[str], plugins: Plugins, on_advance: OnAdvance | None = None
 ) -> tuple[Study, ...]:
     """Return the studies of papers; see `reproduce`.
 

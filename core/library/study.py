@@ -25,12 +25,7 @@ from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
 from femubench.core.schema.records import MOST_RESULTS
 from femubench.core.schema.results import DONE, NOMINALS
-from femubench.core.schema.run_options import (
-    StudyKeywords,
-    Where,
-    check_keywords,
-    split_keywords,
-)
+from femubench.core.schema.run_options import StudyKeywords, Where, check_keywords, split_keywords
 from femubench.core.score.scoring import reference_of
 from femubench.core.study.axes import CaseConditions, OptionSet, StudyAxes
 from femubench.core.study.conditions import vary_case

@@ -43,10 +43,7 @@ def eigenvalue_sensitivities(
 
 
 def shape_sensitivities(
-    model: Model,
-    modes: Modes,
-    index: int,
-    parameters: Sequence[Property] | MatrixSlopes,
+    model: Model, modes: Modes, index: int, parameters: Sequence[Property] | MatrixSlopes
 ) -> FloatArray:
     """Return d phi / d p of one mode, (n, n_parameters).
 

@@ -234,10 +234,7 @@ def ends_of(
     low -= 0.0 if zero and low == 0.0 else grow
     high += 0.0 if zero and high == 0.0 else grow
     ends = (10.0**low, 10.0**high) if axis.log else (low, high)
-    return (
-        ends[0] if axis.low is None else axis.low,
-        ends[1] if axis.high is None else axis.high,
-    )
+    return (ends[0] if axis.low is None else axis.low, ends[1] if axis.high is None else axis.high)
 
 
 def _usable(value: object, axis: Axis) -> TypeGuard[float]:

@@ -26,16 +26,7 @@ from femubench.core.plot.structure import (
     frame_axes,
     view_of,
 )
-from femubench.core.plot.style import (
-    AFTER,
-    BEFORE,
-    COLOURS,
-    PAGE,
-    SERIES,
-    SOFT,
-    name_of,
-    own_axes,
-)
+from femubench.core.plot.style import AFTER, BEFORE, COLOURS, PAGE, SERIES, SOFT, name_of, own_axes
 from femubench.core.schema.validation import read_plain
 
 if TYPE_CHECKING:

@@ -12,16 +12,7 @@ import numpy as np
 
 from femubench.core.drawing.wireframe import Wireframe
 from femubench.core.plot.structure import draw_element_values
-from femubench.core.plot.style import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    PURPLE,
-    SKY,
-    SOFT,
-    draw_curves,
-    figure_of,
-)
+from femubench.core.plot.style import BLUE, GREEN, ORANGE, PURPLE, SKY, SOFT, draw_curves, figure_of
 from femubench.core.plot.svg import svg
 from femubench.core.typing import FloatArray
 

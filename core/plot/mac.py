@@ -27,10 +27,7 @@ Named = tuple[FloatArray, list[str], str]
 
 
 def mac(
-    first: Shapes,
-    second: Shapes | Model | UpdateResult | None = None,
-    *,
-    ax: Axes | None = None,
+    first: Shapes, second: Shapes | Model | UpdateResult | None = None, *, ax: Axes | None = None
 ) -> Axes:
     """Draw the MAC of every pair of shapes, 0 white to 1 dark, with the number in every cell.
 

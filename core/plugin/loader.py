@@ -20,13 +20,7 @@ from femubench.core.errors import PluginError, harmless, harmless_lines
 from femubench.core.plugin import apart
 from femubench.core.plugin.apart import Origin
 from femubench.core.plugin.foreign import Foreign, make_proxy
-from femubench.core.plugin.importing import (
-    PREFIX,
-    BrokenPlugin,
-    Offers,
-    Source,
-    take,
-)
+from femubench.core.plugin.importing import PREFIX, BrokenPlugin, Offers, Source, take
 from femubench.core.plugin.markers import PROJECT
 from femubench.core.plugin.validation import CHECKS, choose_names
 from femubench.core.roles import Effect, Fault, Paper, Reader, Reporter, Scenario, StrategyRole

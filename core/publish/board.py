@@ -9,14 +9,7 @@ from typing import Any, NamedTuple, get_args
 from femubench.core.errors import InputError
 from femubench.core.publish.agreement import Outcome, findings_of, machine_of
 from femubench.core.publish.news import news_of
-from femubench.core.publish.places import (
-    Scope,
-    board_on,
-    counted_on,
-    errors_of,
-    gain_on,
-    on_case,
-)
+from femubench.core.publish.places import Scope, board_on, counted_on, errors_of, gain_on, on_case
 from femubench.core.publish.submissions import Proof, Submission, slug
 from femubench.core.score.ranking import Scale
 from femubench.core.score.repeatability import unsteady

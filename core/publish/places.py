@@ -174,10 +174,7 @@ def _recorded(findings: Sequence[Outcome]) -> list[Outcome]:
 
 
 def _stated(
-    strategy: str,
-    row: Mapping[str, Any],
-    counted: Mapping[str, Sequence[Outcome]],
-    ground: Scope,
+    strategy: str, row: Mapping[str, Any], counted: Mapping[str, Sequence[Outcome]], ground: Scope
 ) -> dict[str, Any]:
     """Return a row of a leaderboard as the site has it; null for what is not known."""
 

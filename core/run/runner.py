@@ -77,10 +77,7 @@ class Plan:
         return Slots(self.starts.of_all(self.cases), self.strategies, self.options.all_seeds)
 
     def run(
-        self,
-        executor: Executor,
-        receivers: Receivers = Receivers(),
-        answers: Answers | None = None,
+        self, executor: Executor, receivers: Receivers = Receivers(), answers: Answers | None = None
     ) -> RunData:
         """Run the jobs, each in a process of its own.
 

@@ -26,14 +26,7 @@ from femubench.core.run.record_file import (
     write_file,
 )
 from femubench.core.schema.records import check_extent, compact, encode_result
-from femubench.core.schema.results import (
-    DONE,
-    NOMINALS,
-    JobName,
-    JobResult,
-    RunData,
-    origins_of,
-)
+from femubench.core.schema.results import DONE, NOMINALS, JobName, JobResult, RunData, origins_of
 from femubench.core.score.ranking import Scale, rate_results
 
 _MOST_NOTES, _MOST_JOBS = 3, 5

@@ -4,15 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct, field
 
-from femubench.core.schema.bounds import (
-    Hertz,
-    Mac,
-    PredictedHertz,
-    StdHertz,
-    Text,
-    Weight,
-    Whole,
-)
+from femubench.core.schema.bounds import Hertz, Mac, PredictedHertz, StdHertz, Text, Weight, Whole
 
 
 class PartnerCandidate(Struct, frozen=True, gc=False, array_like=True):

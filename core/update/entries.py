@@ -469,11 +469,7 @@ def _met(
 
 
 def _fitted(
-    model: Model,
-    measurement: Measurement,
-    pattern: EntryPattern,
-    free: FloatArray,
-    cutoff: float,
+    model: Model, measurement: Measurement, pattern: EntryPattern, free: FloatArray, cutoff: float
 ) -> EntryUpdate:
     """Return the model that comes nearest to the used modes in the least-squares sense."""
     changes, current, rank = np.zeros(len(pattern)), model, 0

@@ -102,8 +102,7 @@ class Hessian:
         thin = rows[~wide]
         used = family.columns >= 0
         own = sp.csr_array(
-            (np.ones(used.sum()), (np.nonzero(used)[0], family.columns[used])),
-            shape=(len(used), n),
+            (np.ones(used.sum()), (np.nonzero(used)[0], family.columns[used])), shape=(len(used), n)
         )
         normal = sp.coo_array(thin.T @ thin + _RIDGE * sp.eye_array(n))
         order = reverse_cuthill_mckee(sp.csr_array(abs(normal) + own.T @ own), symmetric_mode=True)

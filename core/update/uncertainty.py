@@ -68,11 +68,7 @@ class Uncertainty:
 
     @classmethod
     def of_draws(
-        cls,
-        make: Callable[[FloatArray], Model],
-        draws: FloatArray,
-        *,
-        discrepancy_std: float = 0.0,
+        cls, make: Callable[[FloatArray], Model], draws: FloatArray, *, discrepancy_std: float = 0.0
     ) -> Uncertainty:
         """Return the models of parameters that were drawn, without draws that give none.
 

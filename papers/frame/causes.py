@@ -57,11 +57,7 @@ class Ladder:
         return self.tube.kappa(nu)[1] / used(nu)[1]
 
     def frame(
-        self,
-        causes: Iterable[str],
-        *,
-        young: float | None = None,
-        accelerometer: bool = True,
+        self, causes: Iterable[str], *, young: float | None = None, accelerometer: bool = True
     ) -> Frame:
         """Return the paper's model with some causes added.
 

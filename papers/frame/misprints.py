@@ -18,12 +18,7 @@ _TORSION_FACTOR = 140.0
 
 def misprint_table(bench: Workbench) -> Extra:
     """Return what is misprinted or contradictory, and what shows it."""
-    rows = (
-        _rotation(bench),
-        _torsional_mass(bench),
-        _symmetry(bench),
-        _stiffness_parameter(bench),
-    )
+    rows = (_rotation(bench), _torsional_mass(bench), _symmetry(bench), _stiffness_parameter(bench))
     return Extra(
         "Misprints and contradictions",
         ("where", "printed", "should be", "what shows it"),

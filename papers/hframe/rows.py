@@ -98,8 +98,7 @@ _DAMPED = Setup(
     ),
 )
 _HELD = Ground(
-    "input",
-    "the initial value, printed again: that EI was frozen is read from this very figure",
+    "input", "the initial value, printed again: that EI was frozen is read from this very figure"
 )
 _JOINTS = Ground(
     "independent",

@@ -10,14 +10,7 @@ import numpy as np
 
 from femubench import Model
 from femubench.papers.hframe.meshes import LEVERS, frequencies, levered
-from femubench.papers.hframe.rows import (
-    ROWS,
-    Setup,
-    Update,
-    at_printed,
-    parameter_values,
-    run,
-)
+from femubench.papers.hframe.rows import ROWS, Setup, Update, at_printed, parameter_values, run
 from femubench.papers.printed import read_printed
 from femubench.reproduction import Cell, Ground, Page, Workbench
 from femubench.update import Joints

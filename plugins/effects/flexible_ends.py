@@ -22,14 +22,7 @@ from typing import Literal
 import numpy as np
 
 from femubench import Model
-from femubench.effect import (
-    Change,
-    ChebyshevPoints,
-    ElementOperator,
-    RowOperator,
-    Term,
-    once_for,
-)
+from femubench.effect import Change, ChebyshevPoints, ElementOperator, RowOperator, Term, once_for
 from femubench.fem import FloatArray, Frame, IntArray, Structure
 from femubench.update import Joints
 

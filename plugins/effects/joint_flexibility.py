@@ -8,13 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from femubench import Model
-from femubench.effect import (
-    Change,
-    FrameEffect,
-    Parameter,
-    Places,
-    Size,
-)
+from femubench.effect import Change, FrameEffect, Parameter, Places, Size
 from femubench.fem import FloatArray, Frame, Structure
 from femubench.plugins.effects.flexible_ends import end_stiffness, flexible_ends_change, soften_ends
 from femubench.update import JointGroup, Joints

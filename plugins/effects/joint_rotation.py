@@ -8,14 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from femubench import Model
-from femubench.effect import (
-    Change,
-    FrameEffect,
-    Parameter,
-    Places,
-    Site,
-    Size,
-)
+from femubench.effect import Change, FrameEffect, Parameter, Places, Site, Size
 from femubench.fem import Frame, Structure
 from femubench.plugins.effects.flexible_ends import (
     end_arm,

@@ -9,14 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from femubench import Model
-from femubench.effect import (
-    Change,
-    FrameEffect,
-    Parameter,
-    Places,
-    Site,
-    Size,
-)
+from femubench.effect import Change, FrameEffect, Parameter, Places, Site, Size
 from femubench.fem import FloatArray, Frame, Member
 from femubench.plugins.effects.flexible_supports import flexible_supports_change, soften_supports
 

@@ -12,15 +12,7 @@ import scipy.sparse as sp
 
 from femubench import Model
 from femubench.effect import Change, FrameEffect, ModelPlaces, Parameter, Places, RowOperator, Term
-from femubench.fem import (
-    FloatArray,
-    Frame,
-    IntArray,
-    Member,
-    ModelError,
-    Place,
-    SparseArray,
-)
+from femubench.fem import FloatArray, Frame, IntArray, Member, ModelError, Place, SparseArray
 from femubench.plugins.effects.flexible_supports import release_supports
 
 _AXES = ("x", "y", "z", "rx", "ry", "rz")

@@ -27,10 +27,7 @@ _SAME = 1e-6
 _CLOSE = 0.01  # of the polar moment
 _FAR = 3.0  # a torsion constant this many times off is no other approximation of it
 _SOLID = 8.0  # A^2 / sqrt(Iy Iz): 12 for a rectangle, 4 pi for an ellipse, far less for tubes
-_RULES = {
-    "solid-rectangle": "by Saint-Venant's series",
-    "rectangular-tube": "by Bredt's formula",
-}
+_RULES = {"solid-rectangle": "by Saint-Venant's series", "rectangular-tube": "by Bredt's formula"}
 
 
 class TorsionConstant(FrameEffect):

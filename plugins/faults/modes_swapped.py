@@ -36,11 +36,7 @@ class ModesSwapped:
         ]
 
     def _corrected(
-        self,
-        numbers: tuple[int, int],
-        model: Model,
-        measurement: Measurement,
-        value: float,
+        self, numbers: tuple[int, int], model: Model, measurement: Measurement, value: float
     ) -> tuple[Model, Measurement]:
         order = np.arange(len(measurement))
         i, j = (measurement.numbers.index(number) for number in numbers)

@@ -13,12 +13,7 @@ import numpy as np
 from femubench import Measurement, Model
 from femubench.effect import Suspect
 from femubench.fem import Frame, Material
-from femubench.plugins.faults.sections import (
-    correct_section,
-    resize_section,
-    sections_of,
-    sizes_of,
-)
+from femubench.plugins.faults.sections import correct_section, resize_section, sections_of, sizes_of
 
 _KILO = 1e3
 # Below and above which no material of a structure lies, and no member is as thick as the whole.

@@ -62,10 +62,7 @@ class DmigReader(ProgramReader):
     def write_model(self, model: Model, path: Path, original: Path) -> None:
         """Write an updated model, all other matrices as they were; raises InputError."""
         frames = _frames(original)
-        names = (
-            _chosen(frames, STIFFNESS, original),
-            _chosen(frames, MASS, original),
-        )
+        names = (_chosen(frames, STIFFNESS, original), _chosen(frames, MASS, original))
         points = set(frames[names[0]].index) | set(frames[names[1]].index)
         new = dict(zip(names, _labelled(model, points, original), strict=True))
         _write({**frames, **new}, path)

@@ -360,9 +360,7 @@ def _free_of(held: FloatArray) -> FloatArray:
 
 
 def thicken(
-    elements: Mapping[int, Element],
-    places: Mapping[int, Point],
-    thickness: Mapping[int, float],
+    elements: Mapping[int, Element], places: Mapping[int, Point], thickness: Mapping[int, float]
 ) -> Thickened:
     """Return what CalculiX makes of the shells among some elements.
 

@@ -17,14 +17,7 @@ from femubench.fem import FloatArray, MatrixGeometry, SparseArray, matrix_model
 from femubench.modal import GroupPriors
 from femubench.plugins.readers import nodes, shells, solid_elements
 from femubench.plugins.readers.attachments import NodeMotions, rigid
-from femubench.plugins.readers.deck_file import (
-    KINDS,
-    POINTS,
-    REST,
-    SECTIONS,
-    SolidDeck,
-    read_deck,
-)
+from femubench.plugins.readers.deck_file import KINDS, POINTS, REST, SECTIONS, SolidDeck, read_deck
 from femubench.plugins.readers.nodes import Point
 from femubench.plugins.readers.outline import find_outline
 from femubench.plugins.readers.reading import DIRECTIONS, needs

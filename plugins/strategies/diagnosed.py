@@ -8,14 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
-    Measurement,
-    Model,
-    NotApplicable,
-    ParameterEstimate,
-    Strategy,
-    UpdateResult,
-)
+from femubench import Measurement, Model, NotApplicable, ParameterEstimate, Strategy, UpdateResult
 from femubench.diagnosis import Budget, budget_of_modes, list_effects
 from femubench.update import Uncertainty, with_measured_frequencies
 

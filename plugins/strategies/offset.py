@@ -61,11 +61,7 @@ class Offset(SensitivityStrategy):
             start, in_mass = self._initial(structure, group)
             lengths.update(dict.fromkeys(group.ends, (start, in_mass)))
             own[group.role].append(_length(structure, group, start))
-        levels = [
-            own["branch"] + own["end"],
-            [Changes(structure).stiffness()],
-            own["through"],
-        ]
+        levels = [own["branch"] + own["end"], [Changes(structure).stiffness()], own["through"]]
         return Joints(structure).with_rigid_ends(lengths), Changes.determined(levels, count)
 
     def _initial(self, structure: Structure, group: JointGroup) -> tuple[float, float]:

@@ -14,14 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from femubench import InputError, Model
-from femubench.fem import (
-    BeamProperties,
-    FloatArray,
-    GroundSpring,
-    Place,
-    PointMass,
-    Structure,
-)
+from femubench.fem import BeamProperties, FloatArray, GroundSpring, Place, PointMass, Structure
 from femubench.plugins.readers.bulk_data.cards import Card, Deck
 from femubench.plugins.readers.bulk_data.frame import ELEMENTS, PROPERTIES, BulkFrame
 from femubench.plugins.readers.bulk_data.plates import BulkPlates, has_plates
@@ -400,10 +393,7 @@ def real(value: float) -> str:
         sign, figures = "-" * (value < 0.0), mantissa.lstrip("-").replace(".", "")
         figures = figures.rstrip("0") or "0"
         n = int(power)
-        forms = [
-            f"{sign}{figures[0]}.{figures[1:]}{n:+d}",
-            f"{sign}.{figures}{n + 1:+d}",
-        ]
+        forms = [f"{sign}{figures[0]}.{figures[1:]}{n:+d}", f"{sign}.{figures}{n + 1:+d}"]
         if 0 <= n < 16:
             whole = figures.ljust(n + 1, "0")
             forms.append(f"{sign}{whole[: n + 1]}.{whole[n + 1 :]}")
