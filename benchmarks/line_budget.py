@@ -17,14 +17,14 @@ PACKAGE = ("core", "plugins", "reports", "papers", "scenarios", "femubench")
 ALL = "package"  # the rooms of PACKAGE together
 # What the rooms have now: they may shrink, and the package is to come to 73 000 lines.
 BUDGETS = {
-    ALL: 89_035,
+    ALL: 88_938,
     "core": 1_021,
     "core/advise": 751,
     "core/case": 7_334,
     "core/challenge": 2_131,
     "core/change": 1_234,
     "core/child": 2_006,
-    "core/cli": 2_573,
+    "core/cli": 2_546,
     "core/conformance": 2_249,
     "core/diagnosis": 3_110,
     "core/drawing": 1_415,
@@ -47,7 +47,7 @@ BUDGETS = {
     "core/twin": 820,
     "core/update": 4_757,
     "plugins": 13_090,
-    "reports": 4_116,
+    "reports": 4_046,
     "papers": 3_251,
     "scenarios": 750,
     "femubench": 354,

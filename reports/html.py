@@ -8,7 +8,6 @@ from markupsafe import Markup
 
 from femubench.reports.blocks import Passage
 from femubench.reports.cells import plain
-from femubench.reports.svg import embed_svg
 from femubench.reports.templating import asset, templates
 
 
@@ -41,7 +40,6 @@ def to_html(
         sections=list(sections),
         style=Markup(asset("page.css") + asset("report.css")),
         script=Markup("".join(map(asset, scripts))),
-        embedded=embed_svg,
     )
 
 

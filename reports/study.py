@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
+from markupsafe import Markup
+
 import femubench
 from femubench import InputError
 from femubench.reports.blocks import Block, Column, Drawing, Items, Passage, Table
@@ -72,7 +74,7 @@ def _drawing(run: RunData) -> Block:
     title = f"Gain by {x} and {y}"
     draw = partial(heat_map, run, x, y)
     try:
-        found = svg(draw, name="heat-map", title=title, caption=_PICTURE, size=size)
+        found = Markup(svg(draw, name="heat-map", title=title, caption=_PICTURE, size=size))
     except InputError as error:
         return f"No drawing: {error}."
     return Drawing(title, _PICTURE, found)

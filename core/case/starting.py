@@ -77,13 +77,13 @@ class Beginning:
     stated: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, model: Any, modes: Sequence[Any], *more: Any, **stated: Any) -> Beginning:  # noqa: ANN401
+    def of(cls, model: Any, modes: Sequence[Any], **stated: Any) -> Beginning:  # noqa: ANN401
         """Return it with paths; raises InputError where model or modes are missing."""
         if model is None or not modes:
             missing = "--model" if model is None else "--modes"
             expected = "a file with the model and one with the modes"
             raise InputError("is missing", key=missing, expected=expected)
-        return cls(Path(model), tuple(Path(path) for path in modes), *more, **stated)
+        return cls(Path(model), tuple(Path(path) for path in modes), **stated)
 
     def files(self) -> tuple[Path, ...]:
         """Return the files that are at hand."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
@@ -14,7 +14,6 @@ from femubench.core.schema.run_options import Where
 
 if TYPE_CHECKING:
     from femubench.core.challenge.score import Judgement
-    from femubench.core.challenge.truth import DataKind, Hidden
 
 _HIDDEN = ("one", "none", "pair", "outside", "any")
 
@@ -55,35 +54,21 @@ def challenge() -> None:
 @click.pass_context
 def new(
     ctx: click.Context,
+    /,
     folder: Path,
     seed: int,
-    kind: DataKind,
-    structure: str,
-    hidden: Hidden | Literal["any"],
-    scatter: float,
-    truths: Path | None,
-    reference: bool,
     sealed: Path | None,
+    **given: Any,  # noqa: ANN401 - as `challenge` has it
 ) -> None:
     """Write a blind case into FOLDER, which must be new or empty, and a sealed truth."""
     from femubench.core.library.challenge import challenge as blind
 
-    if reference and truths is None:
+    if given["reference"] and given["truths"] is None:
         raise click.UsageError("--reference goes with --truths")
-    for name in ("kind", "structure", "hidden", "scatter") if truths is not None else ():
+    for name in ("kind", "structure", "hidden", "scatter") if given["truths"] is not None else ():
         if ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
             raise click.UsageError(f"--{name} has no effect with --truths")
-    made = blind(
-        folder,
-        seed,
-        kind=kind,
-        structure=structure,
-        hidden=hidden,
-        scatter=scatter,
-        truths=truths,
-        reference=reference,
-        truth=sealed,
-    )
+    made = blind(folder, seed, truth=sealed, **given)
     click.echo(f"wrote {folder}")
     click.echo(f"wrote {made.truth}, the sealed truth, sha256 {made.commitment}")
     click.echo(f"Now say what the model lacks: bench diagnose {folder} --json answer.json")

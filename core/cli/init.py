@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,7 +13,6 @@ from femubench.core.errors import ModelError
 
 if TYPE_CHECKING:
     from femubench.core.case.case import Case
-    from femubench.core.case.schema import LengthUnit
 
 _UNITS = click.Choice(("m", "cm", "mm", "in", "ft"))
 
@@ -71,29 +70,18 @@ def _parse_origin(text: str) -> str:
 @click.pass_context
 def init(
     ctx: click.Context,
+    /,
     folder: Path,
     model: Path | None,
-    mass: Path | None,
-    dofs: Path | None,
     modes: tuple[Path, ...],
-    reference: Path | None,
-    sensors: Path | None,
-    unit: LengthUnit | None,
-    model_unit: LengthUnit | None,
-    frame: str | None,
-    directions: str | None,
-    tolerance: float | None,
-    origin: str | None,
-    without: str | None,
+    **stated: Any,  # noqa: ANN401 - as `Beginning` has it
 ) -> None:
     """Write a case folder into FOLDER, which must be new or empty.
 
     With the files of a model and of a test, these are copied, the sensors matched with the model,
     and a case is written that runs; without any, a commented example.
     """
-    axes = (frame, directions, tolerance, origin, without)
-    others = (mass, dofs, sensors, model_unit, unit, *axes, reference)
-    if model is None and not modes and all(other is None for other in others):
+    if model is None and not modes and all(other is None for other in stated.values()):
         from femubench.core.library.plugins import init_case
 
         for path in init_case(folder):
@@ -103,7 +91,7 @@ def init(
     from femubench.core.case.starting import Beginning
     from femubench.core.library.new_case import begin_case
 
-    given = Beginning.of(model, modes, *others)
+    given = Beginning.of(model, modes, **stated)
     case = begin_case(folder, given, plugins_for(ctx))
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         click.echo(f"wrote {path}")
