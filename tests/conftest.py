@@ -13,17 +13,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from femubench.core.fem.frame import (
-    Frame,
-    Joint,
-    JointSpring,
-    Material,
-    Member,
-    Place,
-    PointMass,
-    RigidEnd,
-)
 from femubench.core.fem.sections import Section
+from femubench.fem import Frame, Joint, JointSpring, Material, Member, Place, PointMass, RigidEnd
 
 FrameBuilder = Callable[..., Frame]
 

@@ -12,13 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from femubench.core.errors import InputError
+from femubench import InputError
 from femubench.core.run.frames import modes_frame
-from femubench.core.run.store import Store
-from femubench.core.schema.paired_modes import PairedMode
-from femubench.core.schema.records import run_from_json, run_to_json
 from femubench.core.schema.results import Block, JobResult, RunData, Status
 from femubench.core.score.ranking import rank_results
+from femubench.results import PairedMode, Store, run_from_json, run_to_json
 from tests.command import run_python
 
 MODES = (
