@@ -252,19 +252,6 @@ def test_numbers_that_json_does_not_know_become_null() -> None:
     assert np.isnan(back.history[0]["residual"])
 
 
-@pytest.mark.parametrize(
-    ("change", "key"),
-    [({"status": "fine"}, "status"), ({"seed": None}, "seed"), ({"gain": "high"}, "gain")],
-)
-def test_wrong_json_is_refused_with_its_place(change: dict[str, Any], key: str) -> None:
-    data = run_to_json(RunData(META, (GOOD, BAD)))
-    data["results"][1].update(change)
-    with pytest.raises(InputError, match=rf"run\.json: results\[1\]\.{key}: "):
-        run_from_json(data, file="run.json")
-    with pytest.raises(InputError, match="meta"):
-        run_from_json({"results": []})
-
-
 def test_one_row_a_mode() -> None:
     frame = modes_frame(RunData(META, (GOOD, BAD)))
     assert frame["block"].tolist() == ["used", "used", "modified"]
