@@ -16,7 +16,7 @@ from tests.simulated import modes_at, sensors_along
 
 # What solves equations for the entries or the elements of the matrices has limits of its own.
 OTHERS = ("kabe", "nobari", "generic", "physical")
-CELLS, ELEMENTS = 1, 60
+CELLS, ELEMENTS = 1, 80
 QUICK = ("baruch", "berman")
 
 
@@ -46,7 +46,8 @@ def every_strategy() -> list[object]:
 def test_no_strategy_makes_a_dense_matrix(
     name: str, tested: tuple[Model, Measurement], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Models of the posterior are kept for judging; forty of this one would weigh half as much.
+    # What a chain takes does not grow with the model: with few walkers it is below the bound.
+    monkeypatch.setattr("femubench.core.update.posterior_sampling._FEWEST_WALKERS", 0)
     monkeypatch.setattr("femubench.core.update.posterior_sampling._SAMPLES", 4)
     model, measurement = tested
     strategy = load_plugins().strategies[name]
