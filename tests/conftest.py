@@ -13,17 +13,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from femubench.core.fem.frame import (
-    Frame,
-    Joint,
-    JointSpring,
-    Material,
-    Member,
-    Place,
-    PointMass,
-    RigidEnd,
-)
 from femubench.core.fem.sections import Section
+from femubench.fem import Frame, Joint, JointSpring, Material, Member, Place, PointMass, RigidEnd
 
 FrameBuilder = Callable[..., Frame]
 
@@ -41,6 +32,7 @@ _STARTED = pytest.StashKey[float]()
 HALF_SIDE, RUNG = 0.2921, 0.2794  # m
 ALUMINIUM = Material(68.367e9, 0.33, 2700.0)  # sqrt(E / rho) = 5032 m/s
 STEEL_E, EI, EA, RHO_A = 207e9, 17015.0, 7.420e7, 2.814
+COMPASS = {"out-of-plane": (0, 1, 2), "3d": (0, 1, 2), "in-plane": (0, 2, 1)}  # axes of a drawing
 
 
 PORTAL_JOINTS = (
@@ -78,9 +70,10 @@ def build_ladder(
     material = replace(ALUMINIUM, E=E)
     x = {"A": 0.0, "B": HALF_SIDE, "C": 2 * HALF_SIDE, "D": 0.0, "E": HALF_SIDE}
     x["F"] = HALF_SIDE * (1.0 + stretch)
+    flat = {name: (x[name], 0.0 if name in "ABC" else RUNG, 0.0) for name in "ABCDEF"}
     joints = tuple(
-        Joint(name, (x[name], 0.0 if name in "ABC" else RUNG, 0.0), "T" if name in "BE" else "L")
-        for name in "ABCDEF"
+        Joint(name, tuple(xyz[i] for i in COMPASS[plane]), "T" if name in "BE" else "L")  # type: ignore[arg-type]
+        for name, xyz in flat.items()
     )
     pairs = ("AB", "BC", "DE", "EF", "AD", "BE", "CF")
     members = tuple(Member(p, (p[0], p[1]), elements, section, material) for p in pairs)

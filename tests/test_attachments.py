@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from femubench.core.errors import ModelError
+from femubench import Model, Sensors, solve_modes
 from femubench.core.fem.frame import (
     Frame,
     GroundSpring,
@@ -23,13 +23,7 @@ from femubench.core.fem.frame import (
     RigidEnd,
     Support,
 )
-from femubench.core.fem.model import LowRank, Model
-from femubench.core.fem.parameters import Property
-from femubench.core.fem.sections import Section
-from femubench.core.fem.sensors import Sensors
-from femubench.core.fem.structure import Structure
-from femubench.core.modal.eigen import solve_modes
-from femubench.core.typing import FloatArray
+from femubench.fem import FloatArray, LowRank, ModelError, Property, Section, Structure
 
 FrameBuilder = Callable[..., Frame]
 

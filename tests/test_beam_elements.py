@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from femubench import Model, solve_modes
 from femubench.core.fem.beam import BeamProperties, shape_functions
-from femubench.core.fem.frame import Frame, Joint, Material, Member, Place, Support
-from femubench.core.fem.model import Model
-from femubench.core.fem.sections import Section
-from femubench.core.modal.eigen import solve_modes
-from femubench.core.typing import FloatArray
+from femubench.fem import FloatArray, Frame, Joint, Material, Member, Place, Section, Support
 
 LENGTH = 0.7
 VALUES = {

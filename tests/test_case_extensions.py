@@ -7,17 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from femubench import InputError
 from femubench.core.case.reader import read_case
-from femubench.core.errors import InputError
-from femubench.core.fem.frame import (
-    Brace,
-    Coupling,
-    Eccentricity,
-    Factor,
-    Oscillator,
-    Place,
-    Preload,
-)
+from femubench.fem import Brace, Coupling, Eccentricity, Factor, Oscillator, Place, Preload
 
 CASES = Path(__file__).parent / "cases"
 LINES = """

@@ -10,14 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from femubench import Case, InputError
 from femubench.core.case import frame_tables, writing
-from femubench.core.case.case import Case
 from femubench.core.case.reader import read_case
 from femubench.core.case.writing import write_case
-from femubench.core.errors import InputError
-from femubench.core.fem.frame import Frame, Joint, Material, Member, Place, PointMass
 from femubench.core.fem.mesh import Mesh, build_mesh
-from femubench.core.fem.sections import Section
+from femubench.fem import Frame, Joint, Material, Member, Place, PointMass, Section
 
 CASES = Path(__file__).parent / "cases"
 JOINTS = "name,x,y,z\nfoot,0,0,0\nknee,0.0,0,0.5\ntip,0.4,0.3,0.6\n"

@@ -20,10 +20,8 @@ import seeds
 from hypothesis import example, given, settings, strategies as st
 from samples import one_of_each
 
-from femubench import Case, InputError, Model, read_case
-from femubench.core.case.nodes import MatrixGeometry
+from femubench import Case, InputError, Measurement, Model, Sensors, read_case
 from femubench.core.case.writing import write_case
-from femubench.core.fem.damping import Damping
 from femubench.core.fem.frame import (
     Brace,
     Coupling,
@@ -42,11 +40,7 @@ from femubench.core.fem.frame import (
     RigidEnd,
     Support,
 )
-from femubench.core.fem.model import LowRank
-from femubench.core.fem.parameters import Property
-from femubench.core.fem.sections import Section
-from femubench.core.fem.sensors import Sensors
-from femubench.core.modal.measurement import Measurement
+from femubench.fem import Damping, LowRank, MatrixGeometry, Property, Section
 
 HERE = Path(__file__).parent
 CASES = HERE / "cases"

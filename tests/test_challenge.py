@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from femubench import InputError, Model, read_case
+from femubench import FemubenchError, InputError, Model, challenge, read_case, score_challenge
 from femubench.core.challenge.answer import Answer, AnswerCause, AnswerParameter, read_answer
 from femubench.core.challenge.draw import draw_case, registered_effects
 from femubench.core.challenge.measuring import QUALITY, chi2, see
@@ -26,14 +26,11 @@ from femubench.core.challenge.structures import STRUCTURES, structure_named
 from femubench.core.challenge.truth import KINDS, DataKind, HiddenCause, Truth, finer
 from femubench.core.challenge.truth_file import KnownCase, TrueCause
 from femubench.core.challenge.visibility import delta_chi2
-from femubench.core.errors import FemubenchError, ModelError
-from femubench.core.fem.frame import Place
 from femubench.core.library.cases import read_cases
-from femubench.core.library.challenge import challenge, score_challenge
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.effect import FrameEffect, Parameter, Site, Size
-from femubench.fem import Frame, PointMass
+from femubench.fem import Frame, ModelError, Place, PointMass
 from femubench.plugins.effects.local_stiffness_loss import LocalStiffnessLoss
 from tests.command import call_bench
 from truths.truth_text import truth_text

@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
-from femubench.core.errors import ModelError
-from femubench.core.fem.frame import Frame, JointSpring, Place, PointMass
-from femubench.core.fem.model import Model
+from femubench import Model
 from femubench.core.modal.eigen import condense_massless, dense_matrices, solve_dense, solve_modes
-from femubench.core.typing import FloatArray
+from femubench.fem import FloatArray, Frame, JointSpring, ModelError, Place, PointMass
 
 FrameBuilder = Callable[..., Frame]
 

@@ -14,16 +14,14 @@ import pytest
 from click.testing import Result
 from distributions import install_module
 
+from femubench import Diagnosis, InputError, NotApplicable, solve_modes
 from femubench.core.case.case import TOLERANCE, Case
 from femubench.core.case.example import write_example
 from femubench.core.case.reader import read_case
-from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_from_json
-from femubench.core.errors import InputError, NotApplicable
 from femubench.core.inference.effort import Effort
 from femubench.core.library import diagnose as library
 from femubench.core.library.cases import read_cases
-from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.score.scoring import score_model
 from femubench.reports.diagnosis import diagnosis_text

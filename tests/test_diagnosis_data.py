@@ -17,13 +17,11 @@ from diagnosis_problems import (
 )
 
 from femubench import Measurement, Model, NotApplicable, Sensors, solve_modes
-from femubench.core.fem.frame import Factor, GroundSpring, Place
-from femubench.core.fem.structure import Structure
 from femubench.core.fit.modal_fit import state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
 from femubench.core.inference.examine import pose_problem
-from femubench.fem import FloatArray, Frame
+from femubench.fem import Factor, FloatArray, Frame, GroundSpring, Place, Structure
 
 FrameBuilder = Callable[..., Frame]
 NOTHING = np.zeros(0)

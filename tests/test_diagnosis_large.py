@@ -13,22 +13,18 @@ import scipy.sparse as sp
 from diagnosis_problems import sensors_on_joints
 from numpy.testing import assert_allclose
 
-from femubench import Measurement, Model, Sensors, solve_modes
-from femubench.core.case.case import Case
-from femubench.core.case.nodes import MatrixGeometry
+from femubench import Case, Measurement, Model, NotApplicable, Sensors, solve_modes
 from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.diagnosis.diagnose import diagnose
-from femubench.core.errors import NotApplicable
 from femubench.core.fem.coarse_mesh import coarsen_mesh
 from femubench.core.fem.frame import Factor, GroundSpring, Joint, Material, Member, Place, Support
 from femubench.core.fem.model import Dofs
-from femubench.core.fem.sections import Section
 from femubench.core.fit.projection import Projector
 from femubench.core.inference.coordinates import modes_for
 from femubench.core.inference.settings import overridden, settings
 from femubench.core.modal.eigen import DENSE_LIMIT, count_evaluations, modes_of
 from femubench.core.roles import Effect
-from femubench.fem import Frame
+from femubench.fem import Frame, MatrixGeometry, Section
 from femubench.plugins.effects.added_mass import AddedMass
 from femubench.plugins.effects.axial_preload import AxialPreload
 from femubench.plugins.effects.material import MemberStiffness, YoungsModulus

@@ -8,16 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from continuous_beams import Cantilever
 from effect_checks import changed_matrices, check_neutral, compare
-from scipy.optimize import brentq
 
-from femubench import Diagnosis, Measurement, Model, Sensors, diagnose
+from femubench import Diagnosis, Measurement, Model, diagnose
 from femubench.core.case.case import Case
 from femubench.core.change.tabulated import change_of
 from femubench.core.inference.examine import examine
 from femubench.core.modal.eigen import solve_dense
 from femubench.fem import (
-    FloatArray,
     Frame,
     Joint,
     Material,
@@ -32,8 +31,7 @@ from femubench.plugins.effects.support_position import SupportPosition
 from femubench.plugins.effects.support_removed import SupportRemoved
 
 LENGTH, SECTION, STEEL = 1.0, Section.solid_rectangle(0.03, 0.012), Material(207e9, 0.3, 7850.0)
-SPEED = np.sqrt(STEEL.E * SECTION.Iy / (STEEL.rho * SECTION.A)) / (2.0 * np.pi)
-STATIONS = np.array([0.2, 0.4, 0.5, 0.75, 0.9, 1.0])
+CANTILEVER = Cantilever(LENGTH, SECTION, STEEL, (0.2, 0.4, 0.5, 0.75, 0.9, 1.0))
 ROLLER = 0.6
 
 
@@ -55,75 +53,10 @@ def beam(
     return Model.of(Frame("in-plane", "euler-bernoulli", joints, row, supports=tuple(held)))
 
 
-def functions(t: float) -> FloatArray:
-    """Return cosh, sinh, cos, sin and their first three derivatives, (4, 4)."""
-    c, s, a, b = np.cosh(t), np.sinh(t), np.cos(t), np.sin(t)
-    return np.array([[c, s, a, b], [s, c, -b, a], [c, s, -a, -b], [s, c, b, -a]])
-
-
-def conditions(beta: float, spans: FloatArray) -> FloatArray:
-    """Return the conditions at a clamp, at rollers between spans and at a free tip, (4 k, 4 k)."""
-    last = 4 * len(spans)
-    rows = [np.pad(row, (0, last - 4)) for row in functions(0.0)[:2]]
-    start = functions(0.0)
-    for i, span in enumerate(spans[:-1]):
-        here = slice(4 * i, 4 * i + 4)
-        there = slice(4 * i + 4, 4 * i + 8)
-        end = functions(beta * span)
-        for left, right in (
-            (end[0], 0.0),
-            (0.0, start[0]),
-            (end[1], -start[1]),
-            (end[2], -start[2]),
-        ):
-            row = np.zeros(last)
-            row[here], row[there] = left, right
-            rows.append(row)
-    rows += [np.pad(row, (last - 4, 0)) for row in functions(beta * spans[-1])[2:]]
-    found = np.array(rows)
-    return found / np.linalg.norm(found, axis=1)[:, None]
-
-
-def exact(rollers: Sequence[float], count: int = 4) -> tuple[FloatArray, FloatArray]:
-    """Return frequencies in Hz and shapes at the stations of the continuous beam.
-
-    Source: Euler and Bernoulli's beam by spans, the roots of the determinant of its conditions.
-    """
-    points = np.array([0.0, *sorted(rollers), LENGTH])
-    spans = np.diff(points)
-
-    def determinant(beta: float) -> float:
-        return float(np.linalg.det(conditions(beta, spans)))
-
-    grid = np.linspace(0.5, 30.0, 600)
-    change = np.flatnonzero(np.diff(np.sign([determinant(b) for b in grid])))[:count]
-    roots = np.array([brentq(determinant, grid[i], grid[i + 1]) for i in change])
-    shapes = []
-    for root in roots:
-        own = np.linalg.svd(conditions(root, spans))[2][-1].reshape(-1, 4)
-        span = np.minimum(np.searchsorted(points, STATIONS, side="right") - 1, len(spans) - 1)
-        pairs = zip(span, STATIONS, strict=True)
-        shape = np.array([own[k] @ functions(root * (x - points[k]))[0] for k, x in pairs])
-        shapes.append(shape / np.abs(shape).max())
-    return SPEED * roots**2, np.array(shapes).T
-
-
 def measure(
     rollers: Sequence[float], noise: float, rng: np.random.Generator, count: int = 4
 ) -> Measurement:
-    hertz, shapes = exact(rollers, count)
-    std = 0.01 if noise < 0.01 else 0.03
-    xyz = np.column_stack([STATIONS, np.zeros((len(STATIONS), 2))])
-    sensors = Sensors(tuple(f"s{x:g}" for x in STATIONS), xyz, ("z",) * len(STATIONS))
-    return Measurement(
-        sensors,
-        tuple(range(1, count + 1)),
-        hertz * (1.0 + noise * rng.standard_normal(count)),
-        noise * hertz,
-        np.full(count, np.nan),
-        shapes + std * rng.standard_normal(shapes.shape),
-        np.full(shapes.shape, std),
-    )
+    return CANTILEVER.measure(count, noise, 0.01 if noise < 0.01 else 0.03, rng, rollers)
 
 
 def tell(
@@ -254,7 +187,7 @@ def test_the_rate_of_change_is_that_of_the_continuous_beam() -> None:
         hertz = np.sqrt(values[:3]) / (2.0 * np.pi)
         rate /= 2.0 * hertz * (2.0 * np.pi) ** 2 * parameter.slope(x)
         step = 1e-4
-        ends = [exact([ROLLER + shift + d], 3)[0] for d in (-step, step)]
+        ends = [CANTILEVER.modes(3, [ROLLER + shift + d])[0] for d in (-step, step)]
         np.testing.assert_allclose(hertz, (ends[0] + ends[1]) / 2.0, rtol=1e-3)
         wanted = (ends[1] - ends[0]) / (2.0 * step)
         np.testing.assert_allclose(rate, wanted, rtol=0.02, atol=0.01 * np.abs(wanted).max())

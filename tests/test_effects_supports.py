@@ -7,18 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from continuous_beams import Cantilever
 from diagnosis_problems import case_of, measured
 from effect_checks import changed_matrices, check_neutral
-from scipy.optimize import brentq
 
-from femubench import Measurement, Model, Sensors, diagnose
+from femubench import Model, diagnose
 from femubench.core.conformance.effect_checks import has_place
 from femubench.core.drawing.places import find_wireframe
 from femubench.core.effect.places import split_direction
 from femubench.core.fem.model import common_dofs
 from femubench.effect import Places, Site
 from femubench.fem import (
-    FloatArray,
     Frame,
     GroundSpring,
     Joint,
@@ -121,7 +120,6 @@ def test_words_of_supports(held: list[Model]) -> None:
 
 LENGTH, SECTION, STEEL = 1.2, Section.solid_rectangle(0.03, 0.012), Material(207e9, 0.3, 7850.0)
 EI = STEEL.E * SECTION.Iy
-STATIONS = np.linspace(0.1, 1.0, 10)
 
 
 def clamped(elements: int = 12) -> Frame:
@@ -131,59 +129,13 @@ def clamped(elements: int = 12) -> Frame:
     return Frame("in-plane", "euler-bernoulli", joints, (beam,), supports=clamp)
 
 
-def boundary(beta: float, turn: float) -> FloatArray:
-    """Return the four conditions on cosh, sinh, cos, sin of beta x: a turning foot, a free tip."""
-    c, s = np.cosh(beta), np.sinh(beta)
-    return np.array(
-        [
-            [1.0, 0.0, 1.0, 0.0],
-            [beta, -turn, -beta, -turn],  # EI w'' = k w'
-            [c / c, s / c, -np.cos(beta) / c, -np.sin(beta) / c],
-            [s / c, c / c, np.sin(beta) / c, -np.cos(beta) / c],
-        ]
-    )
-
-
-def turning_cantilever(spring: float, count: int, rng: np.random.Generator) -> Measurement:
-    """Return the exact modes of a uniform beam whose foot turns on a spring, with noise.
-
-    Source: the frequency equation of Euler and Bernoulli's beam, solved for its roots.
-    """
-    turn = spring * LENGTH / EI
-    grid = np.linspace(0.2, 3.2 * count, 4000)
-    determinant = [np.linalg.det(boundary(b, turn)) for b in grid]
-    change = np.flatnonzero(np.diff(np.sign(determinant)))[:count]
-    beta = [
-        brentq(lambda b: np.linalg.det(boundary(b, turn)), grid[i], grid[i + 1]) for i in change
-    ]
-    columns = []
-    for b in beta:
-        a = np.linalg.svd(boundary(b, turn))[2][-1]
-        x = b * STATIONS
-        columns.append(np.column_stack([np.cosh(x), np.sinh(x), np.cos(x), np.sin(x)]) @ a)
-    shapes = np.column_stack(columns)
-    shapes /= np.abs(shapes).max(axis=0)
-    omega = np.square(np.array(beta) / LENGTH) * np.sqrt(EI / (STEEL.rho * SECTION.A))
-    hertz = omega / (2.0 * np.pi)
-    std = 0.0005 * hertz
-    xyz = np.column_stack([LENGTH * STATIONS, np.zeros((10, 2))])
-    sensors = Sensors(tuple(f"s{i}" for i in range(10)), xyz, ("z",) * 10)
-    return Measurement(
-        sensors,
-        tuple(range(1, count + 1)),
-        hertz + std * rng.standard_normal(count),
-        std,
-        np.full(count, np.nan),
-        shapes + 0.01 * rng.standard_normal(shapes.shape),
-        np.full(shapes.shape, 0.01),
-    )
-
-
 def test_a_foot_that_turns_is_no_damage_next_to_it() -> None:
     """The equation is exact, the model has twelve elements and a rigid clamp."""
     seed = 0
     spring = 20.0 * EI / LENGTH
-    test = turning_cantilever(spring, 7, np.random.default_rng(seed))
+    stations = tuple(LENGTH * np.linspace(0.1, 1.0, 10))
+    beam = Cantilever(LENGTH, SECTION, STEEL, stations, spring)
+    test = beam.measure(7, 0.0005, 0.01, np.random.default_rng(seed))
     found = diagnose(case_of(Model.of(clamped()), test, 5))
     assert found.verdict in ("named", "ambiguous")
     (cause,) = [c for c in found.causes if c.effect == "support-flexibility"]

@@ -11,10 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from femubench.core.errors import ModelError
-from femubench.core.fem.frame import Frame, Joint, Material, Member
-from femubench.core.fem.model import LowRank, Model
-from femubench.core.fem.sections import Section
+from femubench import Model
 from femubench.core.modal.eigen import (
     DENSE_LIMIT,
     count_evaluations,
@@ -24,8 +21,8 @@ from femubench.core.modal.eigen import (
     solve_dense,
     solve_modes,
 )
-from femubench.core.typing import FloatArray
-from femubench.core.update.low_rank import with_stiffness_step
+from femubench.fem import FloatArray, Frame, Joint, LowRank, Material, Member, ModelError, Section
+from femubench.update import with_stiffness_step
 
 FrameBuilder = Callable[..., Frame]
 

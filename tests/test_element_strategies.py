@@ -19,17 +19,14 @@ from femubench.core.fem.frame import (
     Material,
     Member,
     Place,
-    PointMass,
     RigidEnd,
     Support,
 )
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import Section
-from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.update.element_families import (
     ElementFamily,
@@ -53,68 +50,24 @@ from femubench.core.update.quasi import QuasiModes
 from femubench.plugins.strategies.generic import GenericAdjusted, GenericLS
 from femubench.plugins.strategies.nobari import Nobari, NobariRigid
 from femubench.plugins.strategies.physical import Physical
+from tests.conftest import COMPASS, build_asymmetric, build_ladder
+from tests.simulated import modes_at, sensors_along
 
 RNG = np.random.default_rng(0)
 TUBE = Section.rectangular_tube(0.0254, 0.0254, 0.00238)
-STIFF_TUBE = replace(TUBE, J=TUBE.Jp)
 PRINTED = (226.8, 275.2, 537.4)
-WIDTH = 0.2794
-COMPASS = {"out-of-plane": (0, 1, 2), "3d": (0, 1, 2), "in-plane": (0, 2, 1)}
 
 
-def ladder(
-    plane: Any = "out-of-plane",
-    beam: Any = "euler-bernoulli",
-    *,
-    n: int = 4,
-    tube: Any = STIFF_TUBE,
-    E: float = 68.367e9,
-    halves: tuple[float, float] = (0.2921, 0.2921),
-    corner: float = 0.0266,
-    **more: Any,
-) -> Frame:
-    material, order = Material(E, 0.33, 2700.0), COMPASS[plane]
-    xs, names = np.cumsum((0.0, *halves)), ("ABC", "DEF")
-    joints, members = [], []
-    for j, row in enumerate(names):
-        for i, name in enumerate(row):
-            point = np.array([xs[i], j * WIDTH, 0.0])[list(order)]
-            joints.append(Joint(name, tuple(point.tolist()), "T" if i == 1 else "L"))
-        members += [Member(f"side{j}{i}", (row[i], row[i + 1]), n, tube, material) for i in (0, 1)]
-    rungs = zip(*names, strict=True)
-    members += [Member(f"rung{i}", ends, n, tube, material) for i, ends in enumerate(rungs)]
-    masses = (PointMass(Place(joint="A"), corner),) if corner else ()
-    return Frame(plane, beam, tuple(joints), tuple(members), masses=masses, **more)
+def measured(truth: Any, frequencies: Any = None, noise: float = 0.0) -> Any:
+    """Return three modes at the joints and in the middle of all members."""
+    sensors = sensors_along(truth.frame_structure.frame)
+    test = modes_at(truth, sensors, 3, hertz=frequencies, shape_std=0.01)
+    return replace(test, shapes=test.shapes + noise * RNG.standard_normal(test.shapes.shape))
 
 
-def at_13_points(halves: Any = (0.2921, 0.2921)) -> Any:
-    xs = np.cumsum((0.0, *halves))
-    points = [(x, y, 0.0) for y in (0.0, WIDTH) for x in xs]
-    points += [(0.5 * (xs[i] + xs[i + 1]), y, 0.0) for y in (0.0, WIDTH) for i in (0, 1)]
-    points += [(x, WIDTH / 2, 0.0) for x in xs]
-    labels = tuple(f"P{i}" for i in range(len(points)))
-    return Sensors(labels, np.array(points), ("z",) * len(points))
-
-
-def measured(
-    truth: Any, sensors: Any, frequencies: Any = None, count: Any = 3, noise: Any = 0.0
-) -> Any:
-    modes = solve_modes(truth).elastic
-    shapes = truth.observe(sensors) @ modes.shapes[:, :count]
-    shapes = shapes + noise * np.abs(shapes).max(axis=0) * RNG.standard_normal(shapes.shape)
-    f = np.array(modes.natural_frequencies[:count] if frequencies is None else frequencies)
-    m = len(f)
-    return Measurement(sensors, tuple(range(1, m + 1)), f, 1e-3 * f, np.full(m, np.nan), shapes,
-                       np.full(shapes.shape, 0.01))  # fmt: skip
-
-
-NOMINAL = Model.of(ladder())
-TRUTH = Model.of(ladder(beam="timoshenko", tube=TUBE, n=12, E=71e9))
-TEST = measured(TRUTH, at_13_points(), PRINTED)
-SOFT_CORNER = (
-    JointSpring("C", "side01", {"ry": 5.0e4, "rx": 5.0e4}),
-    JointSpring("C", "rung2", {"ry": 5.0e4, "rx": 5.0e4}),
-)
+NOMINAL = Model.of(build_ladder())
+TRUTH = Model.of(build_ladder("timoshenko", polar=False, elements=12, E=71e9))
+TEST = measured(TRUTH, PRINTED)
 
 
 def run(strategy: Any, model: Any = NOMINAL, measurement: Any = TEST) -> Any:
@@ -140,7 +93,7 @@ def lowest_scaled_eigenvalue(model: Any) -> Any:
 
 
 def active(plane: Any) -> Any:
-    return Structure.build(ladder(plane, corner=0.0)).active_local
+    return Structure.build(build_ladder(plane=plane)).active_local
 
 
 @pytest.mark.parametrize(
@@ -215,7 +168,7 @@ def test_tied_cores_do_not_depend_on_the_direction_a_member_is_drawn_in(plane: A
 
 
 def test_symmetry_classes_set_the_number_of_parameters() -> None:
-    structure = Structure.build(ladder())
+    structure = Structure.build(build_ladder())
     assert len(ElementFamily.generic(structure, plain="full", joint="full")) == 28 * 3
     assert len(ElementFamily.generic(structure, plain="mirror", joint="half-turn")) == 28 * 4
     assert len(ElementFamily.generic(structure, plain="none")) == 28 * 6
@@ -223,15 +176,15 @@ def test_symmetry_classes_set_the_number_of_parameters() -> None:
 
 
 ENDS = (
-    RigidEnd("B", "side00", 0.012, 0.004),
-    RigidEnd("B", "side01", 0.012, 0.004),
-    RigidEnd("E", "rung1", -0.005),
+    RigidEnd("B", "AB", 0.012, 0.004),
+    RigidEnd("B", "BC", 0.012, 0.004),
+    RigidEnd("E", "BE", -0.005),
 )
 
 
 @pytest.mark.parametrize(("plane", "beam"), [("in-plane", "euler-bernoulli"), ("3d", "timoshenko")])
 def test_nominal_elements_are_made_of_their_strain_modes(plane: Any, beam: Any) -> None:
-    structure = Structure.build(ladder(plane, beam, rigid_ends=ENDS))
+    structure = Structure.build(replace(build_ladder(beam, plane=plane), rigid_ends=ENDS))
     vectors = scale_strain_vectors(structure, np.arange(28))
     moving = np.outer(structure.active_local, structure.active_local)
     stiffness = structure.properties.stiffness_matrices() * moving
@@ -247,7 +200,7 @@ def all_families(structure: Any) -> Any:
 
 @pytest.mark.parametrize("plane", ["out-of-plane", "3d"])
 def test_families_with_cores_keep_rigid_modes_for_any_parameters(plane: Any) -> None:
-    model = Model.of(ladder(plane, rigid_ends=ENDS))
+    model = Model.of(replace(build_ladder(plane=plane), rigid_ends=ENDS))
     rigid = rigid_modes_of(model)
     assert rigid.shape[1] == (6 if plane == "3d" else 3)
     for family in all_families(model.frame_structure):
@@ -260,21 +213,21 @@ def test_physical_factor_equals_the_parameter_of_the_structure() -> None:
     structure = NOMINAL.frame_structure
     family = ElementFamily.physical(structure)
     x = np.zeros(len(family))
-    x[family.names.index("EI rung1/3")] = 0.25
-    x[family.names.index("GJ side00/1")] = -0.4
+    x[family.names.index("EI BE/3")] = 0.25
+    x[family.names.index("GJ AB/1")] = -0.4
     rebuilt = structure.with_values(
-        [Property("a", "EI", ("rung1/3",)), Property("b", "GJ", ("side00/1",))], [1.25, 0.6]
+        [Property("a", "EI", ("BE/3",)), Property("b", "GJ", ("AB/1",))], [1.25, 0.6]
     )
     expected = Model.of(rebuilt).stiffness.toarray()
     found = family.change_model(NOMINAL, x).stiffness.toarray()
     assert found == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())
-    values = family.values(x)[family.names.index("EI rung1/3")]
+    values = family.values(x)[family.names.index("EI BE/3")]
     assert values == pytest.approx(1.25 * 68.367e9 * TUBE.Iy, rel=1e-12)
 
 
 def test_massless_arms_and_their_joint_springs_stay_as_they_are() -> None:
-    springs = (JointSpring("B", "rung1", {"ry": 1e5, "rx": 1e5}, 0.0127, 5.0),)
-    model = Model.of(ladder(joint_springs=springs))
+    springs = (JointSpring("B", "BE", {"ry": 1e5, "rx": 1e5}, 0.0127, 5.0),)
+    model = Model.of(replace(build_ladder(), joint_springs=springs))
     structure = model.frame_structure
     assert (structure.properties.rhoA == 0.0).sum() == 1
     for family in (*all_families(structure), ElementFamily.nobari(structure)):
@@ -461,9 +414,8 @@ def test_nobari_with_rigid_modes_is_physical_updating() -> None:
 
 
 def asymmetric() -> Any:
-    halves = (1.04 * 0.2921, 0.2921)
-    truth = ladder(beam="timoshenko", tube=TUBE, n=8, halves=halves, joint_springs=SOFT_CORNER)
-    return Model.of(ladder(halves=halves)), measured(Model.of(truth), at_13_points(halves))
+    truth = build_asymmetric(2.0, beam="timoshenko", polar=False, elements=8)
+    return Model.of(build_ladder(stretch=1.04)), measured(Model.of(truth))
 
 
 def test_asymmetric_frame() -> None:
@@ -481,7 +433,7 @@ def test_asymmetric_frame() -> None:
 def test_stiffness_stays_positive_and_free_with_noisy_shapes(
     strategy: Any, orthogonality: Any
 ) -> None:
-    test = measured(TRUTH, at_13_points(), PRINTED, noise=0.05)
+    test = measured(TRUTH, PRINTED, noise=0.05)
     result = run(replace(strategy, orthogonality=orthogonality), measurement=test)
     assert lowest_scaled_eigenvalue(result.model) > -1e-12
     assert result.diagnostics["smallest_core"] >= FLOOR * (1 - 1e-9)
@@ -490,7 +442,7 @@ def test_stiffness_stays_positive_and_free_with_noisy_shapes(
 
 def test_cores_stay_positive_where_plain_least_squares_is_indefinite() -> None:
     # Frequencies that no frame like this has: modes 1 and 3 stiffened, mode 2 softened.
-    contradiction = measured(TRUTH, at_13_points(), (300.0, 170.0, 700.0))
+    contradiction = measured(TRUTH, (300.0, 170.0, 700.0))
     quasi = QuasiModes.of(NOMINAL, contradiction)
     for family in all_families(NOMINAL.frame_structure):
         a, b, _ = equations(NOMINAL, family, quasi, orthogonality=True)
@@ -519,8 +471,8 @@ def test_missing_readings_drop_their_sensors() -> None:
 
 def test_a_supported_frame_has_no_rigid_modes_to_keep() -> None:
     supports = (Support(Place(joint="A"), ("z", "rx", "ry")), Support(Place(joint="C"), ("z",)))
-    truth = Model.of(ladder(beam="timoshenko", tube=TUBE, n=8, supports=supports))
-    model, test = Model.of(ladder(supports=supports)), measured(truth, at_13_points())
+    truth = replace(build_ladder("timoshenko", polar=False, elements=8), supports=supports)
+    model, test = Model.of(replace(build_ladder(), supports=supports)), measured(Model.of(truth))
     with pytest.raises(NotApplicable, match="no free rigid-body modes"):
         run(NobariRigid(), model, test)
     result = run(Physical(), model, test)
@@ -532,11 +484,11 @@ def test_reasons_why_a_case_does_not_apply() -> None:
     with pytest.raises(NotApplicable, match="the case declares"):
         run(Physical(), replace(NOMINAL, structure=None))
     with pytest.raises(NotApplicable, match=r"2240 unknowns.*dense.* 2000 at most"):
-        run(Nobari(), Model.of(ladder(n=80)))
+        run(Nobari(), Model.of(build_ladder(elements=80)))
 
 
 def test_a_joint_type_called_plain_is_a_set_of_its_own() -> None:
-    frame = ladder()
+    frame = build_ladder()
     joints = tuple(replace(j, type="plain") if j.type == "T" else j for j in frame.joints)
     family = ElementFamily.generic(Structure.build(replace(frame, joints=joints)), tied=True)
     assert len(family) == 16

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from effect_checks import as_matrices
 from scipy.sparse.csgraph import connected_components
 
-from femubench.core.case.case import Case
+from femubench import Case, UpdateResult, solve_modes
 from femubench.core.case.reader import read_case
 from femubench.core.drawing import prediction, thinning, wireframe
 from femubench.core.drawing.element_change import relative_changes
@@ -26,11 +26,9 @@ from femubench.core.drawing.prediction import (
     frequency_axis,
     list_receptances,
 )
-from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.run.jobs import _parameter
 from femubench.core.score.scoring import score_model
-from femubench.core.update.strategy import UpdateResult
 from femubench.scenarios import HERE
 
 STRATEGIES = load_plugins().strategies

@@ -8,11 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import ortho_group
 
-from femubench.core.errors import NotApplicable
-from femubench.core.fem.frame import Frame
-from femubench.core.fem.model import Model
-from femubench.core.modal.correlation import mac
-from femubench.core.modal.eigen import solve_modes
+from femubench import Model, NotApplicable, solve_modes
 from femubench.core.modal.expansion import (
     expand_by_dynamics,
     expand_by_rotation,
@@ -21,7 +17,8 @@ from femubench.core.modal.expansion import (
     procrustes_rotation,
     same_length,
 )
-from femubench.core.typing import FloatArray, SparseArray
+from femubench.fem import FloatArray, Frame, SparseArray
+from femubench.modal import mac
 from tests.simulated import sensors_along
 
 FrameBuilder = Callable[..., Frame]

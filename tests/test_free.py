@@ -14,21 +14,16 @@ import pytest
 import scipy.sparse as sp
 
 from femubench import InputError, Measurement, Model, Sensors, cases, read_case, solve_modes
-from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.writing import write_case
-from femubench.core.change.change import Change
 from femubench.core.change.hypothesis import hypotheses_of
-from femubench.core.change.terms import RowOperator, Term
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.diagnosis.serial import diagnosis_to_json
-from femubench.core.effect.model_places import ModelPlaces
-from femubench.core.fem.frame import Place
 from femubench.core.fem.model import Dofs
 from femubench.core.inference.examine import examine
 from femubench.core.look.look import look
 from femubench.diagnosis import list_effects
-from femubench.effect import Parameter
-from femubench.fem import Groups, Property
+from femubench.effect import Change, ModelPlaces, Parameter, RowOperator, Term
+from femubench.fem import Groups, MatrixGeometry, Place, Property
 
 CASES = Path(__file__).parent / "cases"
 

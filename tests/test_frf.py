@@ -9,21 +9,15 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from femubench.core.change.change import Change, scale_property
-from femubench.core.change.parameter import Parameter
-from femubench.core.change.parametric_model import ParametricModel
-from femubench.core.errors import ModelError
-from femubench.core.fem.frame import Frame, Place, Support
-from femubench.core.fem.joints import all_elements
-from femubench.core.fem.model import Model
-from femubench.core.fem.sensors import Sensors
+from femubench import Model, Modes, Sensors, solve_modes
 from femubench.core.fem.slopes import TermSlopes
 from femubench.core.modal import receptances
-from femubench.core.modal.eigen import Modes, solve_modes
-from femubench.core.modal.frf import receptance
 from femubench.core.modal.receptances import receptance_slopes, response_modes
 from femubench.core.typing import AnyArray, FloatArray, SparseArray
-from femubench.effect import ModelPlaces
+from femubench.effect import Change, ModelPlaces, Parameter
+from femubench.fem import Frame, ModelError, Place, Support
+from femubench.modal import receptance
+from femubench.update import ParametricModel, all_elements, scale_property
 
 FrameBuilder = Callable[..., Frame]
 POINTS = Sensors(

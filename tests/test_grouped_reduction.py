@@ -38,6 +38,7 @@ from femubench.fem import (
     matrix_model,
 )
 from femubench.plugins.readers import solid_elements
+from tests.simulated import modes_at
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
 BAR = Section(4e-4, 1.2e-8, 2.4e-8, 2e-8, 3.6e-8)
@@ -98,17 +99,9 @@ KEPT = np.array([row for node in NODES for row in GEOMETRY.rows_of[node]])  # ty
 def measured(truth: Model, count: int = 8) -> Measurement:
     """Return the lowest modes of a model at three directions of the kept nodes."""
     rows = [row for row in KEPT if truth.dofs.direction[row] in "xyz"]
-    modes = solve_modes(truth, count + 6).elastic.take(np.arange(count))
-    f, shapes = modes.natural_frequencies, modes.shapes[rows]
-    sensors = Sensors(
-        tuple(f"S{i}" for i in rows),
-        truth.dofs.xyz[rows],
-        tuple(truth.dofs.direction[i] for i in rows),
-    )
-    std = np.full(shapes.shape, 0.01 * np.abs(shapes).max())
-    return Measurement(
-        sensors, tuple(range(1, count + 1)), f, 1e-3 * f, np.full(count, np.nan), shapes, std, None
-    )
+    directions = tuple(truth.dofs.direction[i] for i in rows)
+    sensors = Sensors(tuple(f"S{i}" for i in rows), truth.dofs.xyz[rows], directions)
+    return modes_at(truth, sensors, count, shape_std=0.01)
 
 
 @pytest.fixture(scope="module")

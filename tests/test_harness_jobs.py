@@ -11,13 +11,10 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from femubench.core.errors import StrategyFailure
-from femubench.core.fem.model import LowRank, Model
-from femubench.core.modal.measurement import Measurement
+from femubench import Measurement, Model, Strategy, StrategyFailure
 from femubench.core.run.jobs import Job, execute, missing_capability, seed_words
 from femubench.core.run.model_checks import check_model
-from femubench.core.typing import SparseArray
-from femubench.core.update.strategy import Strategy
+from femubench.fem import LowRank, SparseArray
 
 CASE = toys.tiny_case()
 

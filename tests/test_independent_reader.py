@@ -12,10 +12,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from femubench.core.case.case import Case
+from femubench import Case, Model, solve_modes
 from femubench.core.case.reader import read_case
-from femubench.core.fem.model import Model
-from femubench.core.modal.eigen import solve_modes
 
 HERE = Path(__file__).parent
 FOLDERS = ("ladder-out-of-plane", "gable-in-plane")

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from femubench import InputError, read_case
+from femubench import InputError, Model, Sensors, read_case, solve_modes
 from femubench.core.case.writing import write_case
-from femubench.core.errors import ModelError
 from femubench.core.fem.frame import (
     ACTIVE,
     Frame,
@@ -28,13 +27,8 @@ from femubench.core.fem.frame import (
     Preload,
     Support,
 )
-from femubench.core.fem.model import Model
-from femubench.core.fem.preload import GeometricStiffness
-from femubench.core.fem.sections import Section
-from femubench.core.fem.sensors import Sensors
-from femubench.core.fem.structure import Structure
-from femubench.core.modal.eigen import solve_modes
-from femubench.core.modal.rigid import rigid_modes_of
+from femubench.fem import GeometricStiffness, ModelError, Section, Structure
+from femubench.modal import rigid_modes_of
 from femubench.plugins.effects.brace_spring import BraceSpring
 
 ALUMINIUM = Material(72e9, 0.3, 2700.0)

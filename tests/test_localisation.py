@@ -9,17 +9,13 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
-from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.fem.frame import Factor, Frame, JointSpring, Place, PointMass
-from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Property
-from femubench.core.fem.sensors import Sensors
+from femubench import Measurement, Model, Sensors
 from femubench.core.look.localisation import locate
-from femubench.core.look.modes import Seen
 from femubench.core.look.shape_expansion import expand
 from femubench.core.modal.eigen import dense_matrices, solve_modes
-from femubench.core.modal.measurement import Measurement
 from femubench.core.schema.diagnosis import LocationRow
+from femubench.effect import Seen
+from femubench.fem import Factor, Frame, JointSpring, MatrixGeometry, Place, PointMass, Property
 from tests.simulated import modes_at, sensors_along
 
 FrameBuilder = Callable[..., Frame]

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from femubench import Measurement, Model, Sensors
 from femubench.core.fem.frame import (
     Factor,
     Frame,
@@ -23,18 +24,12 @@ from femubench.core.fem.frame import (
     Support,
 )
 from femubench.core.fem.joints import whole_members
-from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Property
-from femubench.core.fem.sections import Section
-from femubench.core.fem.sensors import Sensors
-from femubench.core.fem.structure import Structure
 from femubench.core.fit.mesh_error import mesh_bias, refine_mesh
 from femubench.core.look import look as core_look
 from femubench.core.modal.frequency_changes import elastic_modes
-from femubench.core.modal.measurement import Measurement
-from femubench.core.schema.diagnosis import LookWarning
-from femubench.core.typing import FloatArray
 from femubench.diagnosis import list_effects
+from femubench.effect import LookWarning
+from femubench.fem import FloatArray, Property, Section, Structure
 from femubench.plugins.effects.torsion_constant import estimate_torsion_constant, is_round
 from tests.simulated import modes_at, sensors_along
 

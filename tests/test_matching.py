@@ -8,11 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femubench import InputError, Measurement, Sensors, read_case
-from femubench.core.case.case import Case
+from femubench import Case, FemubenchError, InputError, Measurement, Sensors, read_case
 from femubench.core.case.nodes import with_mesh
 from femubench.core.case.writing import write_case
-from femubench.core.errors import FemubenchError
 from femubench.fem import MatrixGeometry, matrix_model
 
 CASES = Path(__file__).parent / "cases"

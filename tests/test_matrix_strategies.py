@@ -20,11 +20,7 @@ from femubench import (
     UpdateResult,
     solve_modes,
 )
-from femubench.core.modal.correlation import mac
 from femubench.core.modal.eigen import dense_matrices
-from femubench.core.modal.expansion import expand_by_dynamics
-from femubench.core.modal.pairing import pair_modes
-from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.update import entries as entry_update
 from femubench.core.update.dynamic import expand_measured_shapes, expand_one_by_dynamics
 from femubench.core.update.entries import (
@@ -34,13 +30,13 @@ from femubench.core.update.entries import (
     smallest_change,
 )
 from femubench.core.update.promise import check_used_modes, measure_residuals
-from femubench.core.update.quasi import QuasiModes
 from femubench.fem import FloatArray, Frame, JointSpring, Place, Support
+from femubench.modal import expand_by_dynamics, mac, pair_modes, rigid_modes_of
 from femubench.plugins.strategies import baruch
 from femubench.plugins.strategies.baruch import Baruch
 from femubench.plugins.strategies.berman import Berman
 from femubench.plugins.strategies.kabe import Kabe, KabeRigid
-from femubench.update import SelfCheckFailed
+from femubench.update import QuasiModes, SelfCheckFailed
 from tests.simulated import modes_at
 
 PAPER = np.array([226.8, 275.2, 537.4])  # Hz, measured modes 1-3 of the paper's ladder

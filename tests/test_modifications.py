@@ -10,16 +10,13 @@ import numpy as np
 import pytest
 
 import femubench
-from femubench import InputError, Model, fem
+from femubench import InputError, Model, NotApplicable, fem
 from femubench.core.case.reader import read_case
 from femubench.core.case.writing import write_case
-from femubench.core.errors import NotApplicable
-from femubench.core.fem.frame import Frame, Place, Support
-from femubench.core.fem.model import LowRank
-from femubench.core.fem.parameters import Property
 from femubench.core.modal.eigen import modes_of
 from femubench.core.score.predicted_spread import Spread
 from femubench.core.score.scoring import pair_modified, score_model
+from femubench.fem import Frame, LowRank, Place, Property, Support
 
 HEAD = """
 [case]

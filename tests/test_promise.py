@@ -9,19 +9,13 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from femubench import strategies
+from femubench import Measurement, Model, Sensors, UpdateResult, strategies
 from femubench.core.conformance.problems import UpdatingProblem
 from femubench.core.conformance.results import Given, find_missing_mode
-from femubench.core.errors import SelfCheckFailed
-from femubench.core.fem.frame import Frame, Joint, Material, Member, Place, PointMass
-from femubench.core.fem.model import Model
-from femubench.core.fem.sections import Section
-from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import Modes, solve_dense, solve_modes
-from femubench.core.modal.measurement import Measurement
-from femubench.core.update.low_rank import with_measured_frequencies
 from femubench.core.update.promise import check_used_modes, eigenvalue_rounding
-from femubench.core.update.strategy import UpdateResult
+from femubench.fem import Frame, Joint, Material, Member, Place, PointMass, Section
+from femubench.update import SelfCheckFailed, with_measured_frequencies
 
 EPS = np.finfo(float).eps
 

@@ -153,11 +153,6 @@ def _improve(data: Data) -> None:
     block["rms_percent"] = 0.0
 
 
-def _without_case(data: Data) -> None:
-    for key in ("results", "companions"):
-        data[key] = [r for r in data[key] if not r["case"].startswith("frame")]
-
-
 def _fail(data: Data) -> None:
     """Say that a good job has failed, as one might of another's strategy."""
     _own(data).update(status="failed", reason="no", gain=None, rank=None, unphysical=False)
@@ -181,10 +176,8 @@ def _repeat_nothing(data: Data) -> None:
 
 PLAIN: dict[str, tuple[Callable[[Data], object], str]] = {
     "error": (_improve, "its modes give another"),
-    "score": (lambda d: _own(d).update(gain=0.9), "gain 0.9"),
     "rank": (lambda d: _own(d).update(rank=2), "rank 2, the gains give 1"),
     "rank on the board": (lambda d: d["leaderboard"][0].update(rank=3), "rank 3, the results give"),
-    "case": (_without_case, "jobs are missing"),
     "good to failed": (_fail, "not the errors of its answer"),
     "entry of a repeat": (
         lambda d: d["meta"]["twins"]["cases"].popitem(),

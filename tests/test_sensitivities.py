@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from femubench import Model, Modes, solve_modes
 from femubench.core.fem.derivatives import derivatives, list_touched
 from femubench.core.fem.frame import (
     Frame,
@@ -19,15 +20,12 @@ from femubench.core.fem.frame import (
     RigidEnd,
     Support,
 )
-from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import QUANTITIES, Property
-from femubench.core.fem.sections import Section
-from femubench.core.fem.structure import Structure
-from femubench.core.modal.eigen import Modes, solve_modes
 from femubench.core.modal.sensitivity import (
     eigenvalue_sensitivities,
     shape_sensitivities,
 )
+from femubench.fem import Section, Structure
 
 STEP = 1e-5
 ELASTIC = 4

@@ -12,20 +12,18 @@ from numpy.testing import assert_allclose
 from study_toys import BROKEN, Spy
 
 import femubench
-from femubench import InputError
-from femubench.core.library.rank import Run
+from femubench import InputError, Run
 from femubench.core.library.report import render_report, reporter
 from femubench.core.library.study import StudyPlan, study_plan
 from femubench.core.plugin.loader import Plugins, load_plugins
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.recording import Progress
 from femubench.core.run.runner import Receivers
-from femubench.core.run.store import Store
-from femubench.core.schema.results import JobResult
 from femubench.core.score.leaderboard import leaderboard
 from femubench.core.study.conditions import vary_case
 from femubench.core.study.gain import gain_by
 from femubench.core.study.study_file import read_study
+from femubench.results import JobResult, Store
 from tests.command import call_bench
 
 ROD = """\

@@ -96,20 +96,26 @@ def matrices_only(model: Model) -> Model:
     return replace(model, structure=None)
 
 
-class Unchanged(Strategy):
-    name = "unchanged"
-    baseline = True
+class Toy(Strategy):
+    """Base of all: the name is that of the class."""
+
     citation = "none"
+
+    def __init_subclass__(cls) -> None:
+        if Toy in cls.__bases__ and "name" not in vars(cls):
+            cls.name = re.sub("(?<!^)(?=[A-Z])", "-", cls.__name__).lower()
+
+
+class Unchanged(Toy):
+    baseline = True
 
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         return UpdateResult(model)
 
 
-class Softer(Strategy):
+class Softer(Toy):
     """Finds the modulus from the first frequency."""
 
-    name = "softer"
-    citation = "none"
     needs = frozenset({"elements"})
 
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
@@ -124,11 +130,8 @@ class Softer(Strategy):
         )
 
 
-class Grounded(Strategy):
+class Grounded(Toy):
     """Ties the structure to ground by a low-rank change: rigid-body modes are lost."""
-
-    name = "grounded"
-    citation = "none"
 
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         basis = np.zeros((model.size, 1))
@@ -137,44 +140,30 @@ class Grounded(Strategy):
         return UpdateResult(replace(model, stiffness_change=change), 1)
 
 
-class Failing(Strategy):
-    name = "failing"
-    citation = "none"
-
+class Failing(Toy):
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         raise SelfCheckFailed("used modes reproduced", 0.25, 1e-8)
 
 
-class Diverging(Strategy):
-    name = "diverging"
-    citation = "none"
-
+class Diverging(Toy):
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         raise Diverged("step 7: the residual grew to 1e9")
 
 
-class Declining(Strategy):
-    name = "declining"
-    citation = "none"
-
+class Declining(Toy):
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         raise NotApplicable("needs two modes\nof one kind")
 
 
-class Needy(Strategy):
-    name = "needy"
-    citation = "none"
+class Needy(Toy):
     needs = frozenset({"geometry"})
 
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         return UpdateResult(model)
 
 
-class Exiting(Strategy):
+class Exiting(Toy):
     """Leaves the process in a chosen way: an exit code, or a signal where it is negative."""
-
-    name = "exiting"
-    citation = "none"
 
     def __init__(self, code: int) -> None:
         self.code = code
@@ -187,26 +176,17 @@ class Exiting(Strategy):
         os._exit(self.code)
 
 
-class Quitting(Strategy):
-    name = "quitting"
-    citation = "none"
-
+class Quitting(Toy):
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         sys.exit("enough")
 
 
-class Interrupting(Strategy):
-    name = "interrupting"
-    citation = "none"
-
+class Interrupting(Toy):
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         raise KeyboardInterrupt
 
 
-class Looping(Strategy):
-    name = "looping"
-    citation = "none"
-
+class Looping(Toy):
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         while True:
             time.sleep(0.05)
@@ -224,11 +204,9 @@ class _LockedError(Exception):
 
 
 @dataclass(frozen=True)
-class Parent(Strategy):
+class Parent(Toy):
     """Starts a process that would outlive it, tells its number in a file, and waits for it."""
 
-    name: ClassVar[str] = "parent"
-    citation: ClassVar[str] = "none"
     file: str = ""
 
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
@@ -238,11 +216,8 @@ class Parent(Strategy):
         return UpdateResult(model)
 
 
-class Locked(Strategy):
+class Locked(Toy):
     """Raises an exception that cannot be pickled and has no text."""
-
-    name = "locked"
-    citation = "none"
 
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         raise _LockedError(1, 2)
@@ -253,52 +228,37 @@ class _Trap:
         raise TypeError("this geometry stays here")
 
 
-class OwnGeometry(Strategy):
+class OwnGeometry(Toy):
     """Returns a model that holds something which no other process could be given."""
-
-    name = "own-geometry"
-    citation = "none"
 
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         return UpdateResult(replace(model, geometry=_Trap(), groups={"trap": _Trap()}))  # type: ignore[arg-type]
 
 
-class Unsendable(Strategy):
+class Unsendable(Toy):
     """Returns a model that cannot be sent back."""
-
-    name = "unsendable"
-    citation = "none"
 
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         return UpdateResult(replace(model, mass=model.mass.toarray()))
 
 
-class WrongSize(Strategy):
-    name = "wrong-size"
-    citation = "none"
-
+class WrongSize(Toy):
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         return UpdateResult(replace(model, stiffness=sp.csc_array(model.stiffness[:-1, :-1])))
 
 
-class Numbers(Strategy):
+class Numbers(Toy):
     """Returns something that is no result at all."""
-
-    name = "numbers"
-    citation = "none"
 
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         return 42
 
 
-class Spy(Strategy):
+class Spy(Toy):
     """Looks for held-out data in everything the process holds, and reports what it finds.
 
     It knows the held-out numbers by their hash alone, and secret words by their pattern.
     """
-
-    name = "spy"
-    citation = "none"
 
     def __init__(self, hashes: frozenset[str]) -> None:
         self.hashes = hashes
@@ -309,14 +269,12 @@ class Spy(Strategy):
         return UpdateResult(model, diagnostics=found)
 
 
-class Rummager(Strategy):
+class Rummager(Toy):
     """Reads all memory of its own process and counts numbers that it was not given.
 
     It knows them masked alone, and masks what it reads: so it does not find its own list.
     """
 
-    name = "rummager"
-    citation = "none"
     mask = 0x5A5A_F00D_1234_8765
 
     def __init__(self, held_out: frozenset[float], used: frozenset[float]) -> None:
@@ -399,11 +357,10 @@ class NoStart(Confinement):
 
 
 @dataclass(frozen=True)
-class OnAdvance(Strategy):
+class OnAdvance(Toy):
     """Leaves the model as it is, draws a number, and tells in a file that it was run."""
 
     name: ClassVar[str] = "stated"
-    citation: ClassVar[str] = "none"
     file: str = ""
 
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
@@ -413,11 +370,8 @@ class OnAdvance(Strategy):
         return UpdateResult(model, diagnostics={"rng": rng.random()})
 
 
-class Murderous(Strategy):
+class Murderous(Toy):
     """Ends whatever started the process that its own was forked from."""
-
-    name = "murderous"
-    citation = "none"
 
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         server = Path(f"/proc/{os.getppid()}/stat").read_text().rpartition(")")[2].split()

@@ -6,22 +6,20 @@ import os
 from dataclasses import replace
 
 import numpy as np
+from harness_toys import Toy
 from numpy.random import Generator
 
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.measurement import Measurement
-from femubench.core.update.strategy import Strategy, UpdateResult
+from femubench.core.update.strategy import UpdateResult
 
 # What stands in the case, copied by hand: the used modes to know it by, and what is held out.
 FRAME_SOLID = (231.4113, 278.1306, 543.2607, 859.9597)
 
 
-class Memory(Strategy):
+class Memory(Toy):
     """Knows a case by its first frequency, and its held-out frequencies by heart."""
-
-    name = "memory"
-    citation = "none"
 
     def __init__(self, known: tuple[float, ...] = FRAME_SOLID) -> None:
         self.known = np.array(known)
@@ -37,22 +35,16 @@ class Memory(Strategy):
         return UpdateResult(replace(model, stiffness_change=change), parameter_count=len(moved))
 
 
-class Chance(Strategy):
+class Chance(Toy):
     """Draws random numbers that nobody gave it."""
-
-    name = "chance"
-    citation = "none"
 
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         factor = 1.0 + 1e-9 * int.from_bytes(os.urandom(4), "big") / 2**32
         return UpdateResult(replace(model, stiffness=(factor * model.stiffness)))
 
 
-class Drawn(Strategy):
+class Drawn(Toy):
     """Draws its random numbers from the generator that it is given."""
-
-    name = "drawn"
-    citation = "none"
 
     def update(self, model: Model, measurement: Measurement, rng: Generator) -> UpdateResult:
         factor = 1.0 + 0.02 * float(rng.uniform())
