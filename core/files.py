@@ -14,6 +14,8 @@ from typing import BinaryIO
 from femubench.core.errors import InputError, OutputError
 
 MIB = 2**20
+# A pipe is not waited for, and Windows leaves the line ends alone.
+_READ = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 
 
 def check_regular(path: Path, largest: int) -> None:
@@ -43,7 +45,7 @@ def open_regular(path: Path, largest: int) -> BinaryIO:
     check_regular(path, largest)
     try:
         # Should a pipe have taken its place meanwhile, this does not wait for a writer.
-        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+        descriptor = os.open(path, _READ)
     except OSError as error:
         raise unreadable(path, error) from None
     try:

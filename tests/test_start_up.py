@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import ast
+import json
+import os
 import re
 import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+import psutil
 import pytest
 
 from femubench.core.plugin.loader import load_plugins
@@ -16,6 +19,7 @@ from femubench.core.plugin.validation import CHECKS
 from tests.command import run_python
 
 ROOT = Path(__file__).parents[1]
+AS_ON_WINDOWS, TOYS = ROOT / "tests" / "as_on_windows", ROOT / "tests" / "toys"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 ROOMS = ("core", "papers", "plugins", "reports", "scenarios", "femubench")
 FILES = sorted({path.resolve() for room in ROOMS for path in (ROOT / room).rglob("*.py")})
@@ -40,17 +44,24 @@ except SystemExit as end:
     print("\\n" + " ".join(sys.modules))
     raise
 """
+ENDINGS = """
+import json, sys
+from pathlib import Path
+import harness_toys as toys
+from children import hoard, shout
+from running import run_jobs
+from femubench.core.child.limits import Limits
+from femubench.core.child.workers import run_apart
 
-# As on Windows, whose Python has no such modules; other packages have ways of their own there.
-AS_ON_WINDOWS = """
-import builtins
-real = builtins.__import__
-def refusing(name, globals=None, *more, **words):
-    mine = str((globals or {}).get("__name__")).startswith("femubench")
-    if mine and name in ("fcntl", "resource"):
-        raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-    return real(name, globals, *more, **words)
-builtins.__import__ = refusing
+parent = Path(sys.argv[1])
+strategies = [toys.Softer(), toys.Looping(), toys.Exiting(3), toys.Parent(str(parent))]
+run = run_jobs([toys.tiny_case()], strategies, jobs=2, timeout=3.0, sandbox="auto")
+found = [[result.status, result.reason] for result in run.results]
+most = {"memory": 2**28, "output": 2**20, "answer": 2**20}
+tasks = {"memory": (hoard, 600 * 2**20), "output": (shout, 2**21), "answer": (bytes, 2**21)}
+light = "femubench.core.child.limits"
+ended = run_apart(tasks, Limits(60.0, **most), 3, light)
+print(json.dumps([found, parent.read_text(), {key: e.how for key, e in ended.items()}]))
 """
 
 
@@ -123,20 +134,45 @@ def test_dependencies_are_what_is_imported() -> None:
     assert not {name for name, at_once in found if at_once} & optional
 
 
-@pytest.mark.slow(10)
-def test_without_modules_of_unix_all_but_runs_works_and_that_is_one_line(tmp_path: Path) -> None:
-    found, store = str(tmp_path / "found.json"), str(tmp_path / "store")
+@pytest.mark.slow(30)
+def test_every_verb_works_as_on_windows_with_the_same_figures(tmp_path: Path) -> None:
+    found, store, board = (str(tmp_path / name) for name in ("found.json", "store", "board.json"))
     effects = ("--effects", "torsion-constant", "--no-pairs")
-    for words, code in (
-        (("--help",), 0),
-        (("plugins", "list"), 0),
-        (("diagnose", "frame", *effects, "-q", "--json", found), 0),
-        (("report", found, "-f", "md"), 0),
-        (("run", "frame", "-s", "unchanged", "--store", store), 2),
+    run = ("run", "frame", "-s", "berman", "--store", store, "--json")
+    for words in (
+        ("--help",),
+        ("plugins", "list"),
+        ("diagnose", "frame", *effects, "-q", "--json", found),
+        ("report", found, "-f", "md"),
+        (*run, board),
+        ("store", "check", "--store", store),
     ):
-        done = run_python("-c", AS_ON_WINDOWS + RUN, *words, code=code)
-        assert len(done.stderr.splitlines()) == (code > 0), done.stderr
-        assert code == 0 or "takes Linux or macOS (on Windows WSL)" in done.stderr
+        done = run_python("-c", RUN, *words, path=AS_ON_WINDOWS)
+        says = "strategies run without a sandbox: namespaces are of Linux"
+        assert done.stderr.startswith(says) if words[0] == "run" else not done.stderr
+    usual = tmp_path / "usual.json"
+    run_python("-c", RUN, *run, usual)
+    errors = [json.loads(Path(file).read_bytes())["results"] for file in (board, usual)]
+    kept = [[{**result, "seconds": 0, "provenance": 0} for result in side] for side in errors]
+    assert kept[0] == kept[1]
+    assert kept[0][0]["status"] == "ok"
+
+
+@pytest.mark.slow(30)
+def test_as_on_windows_what_takes_more_than_its_limits_is_ended(tmp_path: Path) -> None:
+    places = os.pathsep.join(map(str, (AS_ON_WINDOWS, TOYS, ROOT, *filter(None, sys.path))))
+    done = run_python(
+        "-c", ENDINGS, tmp_path / "parent", env={**os.environ, "PYTHONPATH": places}, cwd=tmp_path
+    )
+    results, process, endings = json.loads(done.stdout.splitlines()[-1])
+    assert results == [
+        ["ok", ""],
+        ["timeout", "no result within 3 s"],
+        ["crashed", "the worker process ended with exit code 3"],
+        ["timeout", "no result within 3 s"],
+    ]
+    assert not psutil.pid_exists(int(process))
+    assert endings == {"memory": "memory", "output": "output", "answer": "answer-size"}
 
 
 def test_a_run_and_a_diagnosis_load_no_statistics() -> None:

@@ -77,6 +77,8 @@ def new_folder(folder: Path) -> Iterator[Path]:
             made.append(path)
         fresh.mkdir()
         yield fresh
+        if os.name == "nt" and folder.exists():  # an empty one, of which nothing takes the place
+            folder.rmdir()
         fresh.rename(folder)
         made.clear()
     except OSError as error:

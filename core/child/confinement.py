@@ -11,12 +11,12 @@ import pickle
 import signal
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from femubench.core.child.limits import Limits
+from femubench.core.child.limits import FORKS, Limits
 from femubench.core.child.namespaces import FOLDER, Apart, libc, lower_limit, settle
 from femubench.core.child.syscall_filter import refuse_system_calls
 
@@ -70,6 +70,8 @@ class Confinement:
             raise RuntimeError("the walls of the sandbox are not there")
         if apart is not None:
             settle(apart, room, limits.processes)
+        if not FORKS:
+            return
         import resource
 
         if self.walled:
@@ -96,6 +98,18 @@ def answer_requests(requests: int, answers: int, output: int, apart: Apart | Non
     stand_alone(output, requests, answers)
     if apart is None:  # else it ends with the first process of its namespace
         end_with_parent()
+    answer_all(requests, answers, os.close, apart)
+
+
+def answer_all(
+    requests: int, answers: int, ask_no_more: Callable[[int], None], apart: Apart | None = None
+) -> None:
+    """Answer requests until there are none, in a process that stands alone.
+
+    Arguments:
+        requests, answers, apart: as for `answer_requests`.
+        ask_no_more: called with `requests` after the last.
+    """
     confinement: Confinement = read_object(requests)
     confinement.enter(apart)
     os.write(answers, READY)
@@ -106,7 +120,7 @@ def answer_requests(requests: int, answers: int, output: int, apart: Apart | Non
         except EOFError:
             return
         if confinement.once:
-            os.close(requests)
+            ask_no_more(requests)
             asked = False
         data: bytes = function(argument)
         write_all(answers, len(data).to_bytes(LENGTH_BYTES, "big"))

@@ -12,6 +12,7 @@ import socket
 import stat
 import struct
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, suppress
@@ -22,7 +23,7 @@ from typing import Any, Literal
 import psutil
 
 from femubench.core.child.confinement import LENGTH_BYTES, READY, Confinement, object_frames
-from femubench.core.child.limits import Limits, format_bytes
+from femubench.core.child.limits import FORKS, Limits, format_bytes
 from femubench.core.child.namespaces import FOLDER, libc
 from femubench.core.child.server import LAST_BREATH, NUMBER, WalledServer, end_group, fork_server
 
@@ -37,6 +38,7 @@ _TICK = 0.5  # s between two looks at a server that may have been stopped
 _PIDFD_GETFD = 438
 _SO_MEMINFO, _FIGURES = 55, 9  # of SK_MEMINFO
 _BUFFERS = "ipv4/tcp_rmem", "ipv4/tcp_wmem", "core/rmem_max", "core/wmem_max"
+NEWS = threading.Event()  # something has come of a child that did not fork
 _BASE = 256 * 2**20  # bytes of a fresh child, most of them shared with the server
 
 
@@ -223,7 +225,7 @@ class GuardedChild:
         """Take what has come through a pipe, but not much more than is allowed."""
         for _ in range(_CHUNKS):
             try:
-                data = os.read(getattr(self, name), _CHUNK)
+                data = self._read(name)
             except BlockingIOError:
                 return
             except OSError:
@@ -243,6 +245,10 @@ class GuardedChild:
             self._received += data
             if len(self._received) > self.limits.answer + LENGTH_BYTES:
                 return
+
+    def _read(self, name: str) -> bytes:
+        """Return what has come through a pipe; BlockingIOError for nothing so far."""
+        return os.read(getattr(self, name), _CHUNK)
 
     def _look(self) -> None:
         """Learn whether it has ended, and what it started too."""
@@ -284,8 +290,11 @@ class GuardedChild:
         """End the process and its group; what they are at is lost."""
         self._killed = min(self._killed, time.monotonic())
         if self.alive:
-            end_group(self.pid)
+            self._end()
         self._close("requests", "answers", "output")
+
+    def _end(self) -> None:
+        end_group(self.pid)
 
     def bury(self) -> None:
         """Wait until nothing is left of a child that was ended."""
@@ -316,12 +325,17 @@ def wait_for(children: Iterable[GuardedChild], seconds: float) -> None:
         children: that are asked something.
         seconds: at most.
     """
-    poll, now = select.poll(), time.monotonic()
+    children, now = list(children), time.monotonic()
+    deadlines = [child.deadline for child in children]
+    seconds = max(min([seconds, *(d - now for d in deadlines if d is not None)]), 0.0)
+    if not FORKS:
+        NEWS.wait(seconds)
+        NEWS.clear()
+        return
+    poll = select.poll()
     for child in children:
         child.watch(poll)
-        if child.deadline is not None:
-            seconds = min(seconds, child.deadline - now)
-    poll.poll(max(1000.0 * seconds, 0.0))
+    poll.poll(1000.0 * seconds)
 
 
 def _numbers(status: int) -> tuple[int, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,6 +12,7 @@ Mode = Sandbox | Literal["processes"]  # the last: only a namespace of processes
 MIB = 2**20
 _SHARE = 0.9  # of the memory that is there, for all workers together
 LEAST = 512 * MIB
+FORKS = hasattr(os, "fork")  # not on Windows, which has no limits of a process either
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,12 @@ class Limits:
     sandbox: Mode = "off"
     hidden: tuple[str, ...] = ()
     shown: tuple[str, ...] = ()
+
+
+def count_processors() -> int:
+    """Return the number of processors that this process may use."""
+    usable = getattr(os, "sched_getaffinity", None)  # of Linux
+    return len(usable(0)) if usable else os.cpu_count() or 1
 
 
 def memory_share(workers: int, given: int | None = None) -> int:

@@ -18,8 +18,9 @@ import psutil
 from femubench.core.child import server
 from femubench.core.child.confinement import Confinement
 from femubench.core.child.guarded_child import Ending, GuardedChild, processes_of, wait_for
-from femubench.core.child.limits import Limits
+from femubench.core.child.limits import FORKS, Limits
 from femubench.core.child.sandbox import enclosure, walls_around
+from femubench.core.child.spawned_child import start_child
 
 JOBS = "femubench.core.run.preload"  # what children that run strategies or judge need
 Key = TypeVar("Key")
@@ -54,10 +55,11 @@ class Workers(Generic[Key]):
     def open(self) -> Iterator[Workers[Key]]:
         """Start what the workers need, and leave no process and no file behind."""
         with _scratch_root() as self._root, adopt_orphans():
-            if not server.fork_server().current:
-                server.end_server()
-            with suppress(OSError):
-                server.fork_server().ask(self._module)
+            if FORKS:
+                if not server.fork_server().current:
+                    server.end_server()
+                with suppress(OSError):
+                    server.fork_server().ask(self._module)
             try:
                 yield self
             finally:
@@ -88,7 +90,7 @@ class Workers(Generic[Key]):
         within = None
         try:
             how, within = self._confinement(limits)
-            child = GuardedChild.start(how, self._module, within)
+            child = start_child(how, self._module, within)
         except OSError as error:
             if within is not None and not how.walled:  # no namespace of processes is to be had
                 self._apart = False
@@ -105,10 +107,11 @@ class Workers(Generic[Key]):
         if enclosure(limits.sandbox).sandbox != "none":
             within = self._server(limits.hidden, limits.shown)
             return Confinement(limits, path, own=False, walled=True), within
-        environment = {**os.environ, **server.ONE_THREAD, server.MARK: server.fork_server().mark}
+        mark = server.fork_server().mark if FORKS else ""
+        environment = {**os.environ, **server.ONE_THREAD, server.MARK: mark}
         if limits.sandbox == "processes":
             how = Confinement(limits, path, os.getcwd(), own=False, environment=environment)
-            return how, self._server() if self._apart else None
+            return how, self._server() if FORKS and self._apart else None
         return Confinement(limits, path, self._scratch(), environment=environment), None
 
     def _server(self, *seen: tuple[str, ...]) -> server.WalledServer:
@@ -144,7 +147,6 @@ class Workers(Generic[Key]):
                 ended.append((key, ending))
         self._bury(wait=False)
         if look:
-            server.fork_server().wake()
             self._end_strays()
         return ended
 
@@ -167,7 +169,10 @@ class Workers(Generic[Key]):
 
         It is known by the mark in its environment, or by its folder.
         """
+        if not FORKS:  # what has lost its parent is nobody's child there
+            return
         running = server.fork_server()
+        running.wake()
         with suppress(psutil.Error):
             for child in psutil.Process().children():
                 if child.pid != running.process.pid and self._is_stray(child, running.mark):
@@ -227,6 +232,9 @@ def _scratch_root() -> Iterator[Path]:
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
     """Hold the lock of a folder in use, whose process may have no number in this namespace."""
+    if not FORKS:  # there are no namespaces, and no locks of folders
+        yield
+        return
     import fcntl
 
     descriptor = os.open(folder, os.O_RDONLY)

@@ -102,13 +102,6 @@ class VerbGroup(click.Group):
         """Run a verb; print one line for an error that the user can act upon."""
         try:
             return super().invoke(ctx)
-        except ModuleNotFoundError as fault:
-            if fault.name not in ("fcntl", "resource"):
-                raise
-            raise click.ClickException(
-                "this verb starts processes under limits, which takes Linux or macOS (on Windows "
-                f"WSL): there is no module {fault.name!r}"
-            ) from None
         except (FemubenchError, OSError) as fault:
             if isinstance(fault, OSError) and fault.errno == errno.EPIPE:
                 raise

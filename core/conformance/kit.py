@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import pickle
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -28,6 +27,7 @@ from femubench.core.errors import harmless
 from femubench.core.plugin.foreign import is_foreign
 from femubench.core.plugin.variants import Variant
 from femubench.core.roles import StrategyRole, list_declared
+from femubench.core.run.executor import count_workers
 from femubench.core.run.jobs import missing_capability, one_line, pickle_strategy
 
 Status = Literal["pass", "fail", "warn", "not-applicable"]
@@ -149,7 +149,7 @@ class Bench:
         self.subject, self.reference, self.helpers = subject, reference, helpers
         self.cases = {item.name: item for item in cases}
         self.limits = Limits(seconds=seconds, memory=memory)
-        self._jobs = jobs or len(os.sched_getaffinity(0))
+        self._jobs = count_workers(jobs)
         self._seen: dict[Want, Observation] = {}
 
     @cached_property

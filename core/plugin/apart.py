@@ -88,11 +88,13 @@ def ask(
     """
     if not questions:
         return []
+    import psutil
+
     from femubench.core.child.limits import Limits
     from femubench.core.child.sandbox import enclosure
     from femubench.core.child.workers import run_apart
 
-    physical = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    physical = psutil.virtual_memory().total
     limits = Limits(
         SECONDS if seconds is None else seconds,
         max(_LEAST_MEMORY, physical // 2),

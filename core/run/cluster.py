@@ -352,7 +352,8 @@ def _local(count: int) -> Cluster:
         async def instantiate(self) -> Any:  # noqa: ANN401 - a distributed.Status
             # An interrupt is for the process that has the cluster: one that meets a worker while
             # it imports would print its traceback. The thread of the loop handles no signal.
-            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            if hasattr(signal, "pthread_sigmask"):  # not on Windows
+                signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             with _no_script():
                 return await super().instantiate()
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import atexit
-import os
 import threading
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -12,7 +11,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from femubench.core.child.limits import LEAST, Limits, format_bytes, memory_share
+from femubench.core.child.limits import LEAST, Limits, count_processors, format_bytes, memory_share
 from femubench.core.child.sandbox import enclosure, missing
 from femubench.core.errors import FemubenchError
 from femubench.core.run.jobs import JobOutcome
@@ -89,7 +88,7 @@ def unfit(demand: Demand, dask_worker: Any) -> str | None:  # noqa: ANN401 - a d
     lacking = missing() if demand.sandbox == "require" else None
     if lacking is not None:
         return f"no sandbox: {lacking}"
-    threads, cores = dask_worker.state.nthreads, len(os.sched_getaffinity(0))
+    threads, cores = dask_worker.state.nthreads, count_processors()
     if threads > cores:
         return f"{threads} threads on {cores} cores, and every job takes a core"
     memory = dask_worker.memory_manager.memory_limit

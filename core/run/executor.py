@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from femubench.core.child.limits import memory_share
+from femubench.core.child.limits import count_processors, memory_share
 from femubench.core.child.sandbox import Enclosure, enclosure
 from femubench.core.display import count_noun
 from femubench.core.errors import InputError, require
@@ -90,7 +89,7 @@ def count_workers(jobs: int | None) -> int:
         InputError: for less than one.
     """
     if jobs is None:
-        return len(os.sched_getaffinity(0))
+        return count_processors()
     if jobs < 1:
         raise InputError(f"{jobs} worker processes", key="jobs", expected="1 or more")
     return jobs

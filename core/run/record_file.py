@@ -170,7 +170,9 @@ def write_file(file: Path, records: Iterable[Record]) -> None:
         for end in ("-wal", "-shm"):  # what belongs to the old content
             file.with_name(f"{file.name}{end}").unlink(missing_ok=True)
         part.replace(file)
-        descriptor = os.open(file.parent, os.O_RDONLY | os.O_CLOEXEC)
+        if os.name == "nt":  # which opens no folder
+            return
+        descriptor = os.open(file.parent, os.O_RDONLY)
         try:
             os.fsync(descriptor)
         finally:

@@ -18,8 +18,9 @@ from typing import Any, Generic, cast
 
 from femubench.core.child.confinement import Confinement, address_space
 from femubench.core.child.guarded_child import Ending, GuardedChild
-from femubench.core.child.limits import MIB, Limits
+from femubench.core.child.limits import FORKS, MIB, Limits
 from femubench.core.child.server import search_path
+from femubench.core.child.spawned_child import start_child
 from femubench.core.child.workers import JOBS, Key
 from femubench.core.run.judging import Dossier, run_judge
 
@@ -71,6 +72,10 @@ def _first_peak() -> int:
 
 def _peak() -> int:
     """Return the largest resident memory that this process has had so far in bytes."""
+    if not FORKS:
+        import psutil
+
+        return int(getattr(psutil.Process().memory_info(), "peak_wset", 0))  # of Windows
     import resource
 
     found = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -80,6 +85,9 @@ def _peak() -> int:
 @contextmanager
 def _limit_memory(allowed: int | None) -> Iterator[None]:
     """Limit what the block may take beyond what the process has."""
+    if not FORKS:  # the parent looks at it
+        yield
+        return
     import resource
 
     before = resource.getrlimit(resource.RLIMIT_AS)
@@ -185,7 +193,7 @@ class Judges(Generic[Key]):
                 return judge
             judge.end()
         how = Confinement(Limits(None), search_path(), own=False, once=False, secret=True)
-        return _Judge(GuardedChild.start(how, JOBS))
+        return _Judge(start_child(how, JOBS))
 
     def take_ended(self) -> list[tuple[Key, Ending]]:
         """Return what has been judged since, or could not be."""

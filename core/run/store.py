@@ -51,10 +51,15 @@ def hold_lock(path: Path) -> int:
     Raises:
         BlockingIOError: when another process holds it.
     """
+    if os.name == "nt":  # the system removes the file when its holder closes it, or ends
+        try:
+            return os.open(path, os.O_CREAT | os.O_EXCL | getattr(os, "O_TEMPORARY", 0))
+        except FileExistsError as error:
+            raise BlockingIOError from error
     import fcntl
 
     while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BaseException:

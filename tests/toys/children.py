@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import resource
+import time
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,19 @@ def call_again(folder: str) -> bytes:
     inner = call_apart(str.encode, "inner", 60.0, 2**31, "femubench.core.child.limits")
     left = sorted(path.name for path in Path(folder).glob("femubench-*"))
     return json.dumps([inner.how, inner.reason, left]).encode()
+
+
+def hoard(count: int) -> bytes:
+    """Hold so many bytes for a minute."""
+    held = b"x" * count
+    time.sleep(60.0)
+    return held[:1]
+
+
+def shout(count: int) -> bytes:
+    """Print so many bytes, and wait for a minute."""
+    print("x" * count, flush=True)
+    return hoard(1)
 
 
 def lowered(given: tuple[int, int]) -> bytes:
