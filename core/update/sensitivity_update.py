@@ -258,7 +258,10 @@ class Iteration:
         """Return the posterior covariance of q, (p, p); None without statistics."""
         if not self.data.statistical:
             return None
-        normal = self.concluded(point).normal
+        problem = self.concluded(point)
+        normal = problem.normal
+        if self.options.unknown_noise and isinstance(self.data, ResponseTargets):
+            normal = normal - self.data.conceded(problem.jacobian, problem.residual)
         try:
             return np.asarray(np.linalg.inv(normal))
         except np.linalg.LinAlgError:
