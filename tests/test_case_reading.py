@@ -6,6 +6,7 @@ import typing
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given, settings, strategies as st
 from pydantic import BaseModel
 
@@ -124,6 +125,25 @@ def test_real_modes_follow_the_paper() -> None:
     shapes = np.array([[3 + 4j, 1j], [-3 + 4j, -2j], [np.nan, 0.5], [2.0, 0.0]])
     expected = [[5.0, 1.0], [-5.0, 2.0], [np.nan, 0.5], [2.0, 0.0]]
     np.testing.assert_allclose(real_modes(shapes), expected)
+
+
+def test_what_is_lost_by_turning_a_shape_real_is_said(tmp_path: Path) -> None:
+    """It is the lesser axis of the ellipse of its components."""
+    folder = Path(shutil.copytree(CASES / "in-plane", tmp_path / "case"))
+    case, path = read_case(folder), folder / "modes.csv"
+    parts = np.array([[3.0, 4.0], [-0.5, -0.1], [0.0, 0.0], [-0.2, 0.0]])
+    values = np.linalg.svd(parts, compute_uv=False)
+    assert case.measurement.out_of_phase is not None
+    assert case.measurement.out_of_phase[-1] == pytest.approx(values[1] / np.linalg.norm(parts))
+    assert case.measurement.select([1]).out_of_phase == pytest.approx(0.0, abs=1e-15)
+    assert not any("out of phase" in note for note in case.notes)
+    path.write_text(path.read_text().replace("-0.5-0.1i", "-2+3i"))
+    case = read_case(folder)
+    share = f"{100.0 * case.measurement.out_of_phase[-1]:.0f} % of mode 7"
+    assert [note for note in case.notes if "phase" in note] == [
+        f"modes.csv: shapes were turned real, and what was out of phase in them is lost: {share}."
+    ]
+    assert dict(case.measurement.rows())["mode 7"].endswith("% out of phase")
 
 
 @settings(max_examples=20)

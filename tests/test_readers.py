@@ -106,6 +106,9 @@ def test_complex_modes(tmp_path: Path, phase: float) -> None:
     np.testing.assert_allclose(read.damping, 2.0 / abs(eigenvalue))
     sign = np.sign(read.shapes[0] * SHAPES[:, 0])
     np.testing.assert_allclose(read.shapes * sign, SHAPES.T, rtol=2e-5)
+    parts = [np.c_[shape * scatter.real, shape * scatter.imag] for shape in SHAPES]
+    lost = [np.linalg.svd(p, compute_uv=False)[1] / np.linalg.norm(p) for p in parts]
+    np.testing.assert_allclose(read.out_of_phase, lost, rtol=1e-3)
 
 
 def test_dataset_2414(tmp_path: Path) -> None:

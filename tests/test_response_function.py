@@ -246,11 +246,35 @@ def test_noise_that_was_stated_wrongly_is_found_with_the_factors() -> None:
         UpdateOptions(unknown_noise=True)
 
 
+def test_what_unknown_noise_takes_is_the_curvature_of_the_sum_of_logarithms() -> None:
+    """Of a linear model, with the factors of the channels at their best everywhere."""
+    _, test = simulate(FACTORS, lines=4)
+    responses, rng = test.responses, np.random.default_rng(0)
+    assert responses is not None
+    data = ResponseTargets(test)
+    jacobian = rng.standard_normal((2 * responses.values.size, 2))
+    values = data.weigh(responses.with_noise(rng).values - responses.values)
+    channel = np.tile(np.arange(responses.values.size) % responses.values[0].size, 2)
+    scale = np.sqrt([np.square(values[channel == c]).mean() for c in range(channel.max() + 1)])
+    residual, jacobian = values / scale[channel], jacobian / scale[channel, None]
+
+    def cost(x: np.ndarray) -> float:  # type: ignore[type-arg]
+        left = np.square(residual - jacobian @ x)
+        return 4.0 * sum(np.log(left[channel == c].sum()) for c in range(len(scale)))
+
+    step = 1e-3 * np.eye(2)
+    curvature = [
+        [cost(a + b) - cost(a - b) - cost(b - a) + cost(-a - b) for a in step] for b in step
+    ]
+    expected = jacobian.T @ jacobian - data.conceded(jacobian, residual)
+    assert np.array(curvature) / 4e-6 == pytest.approx(expected, rel=1e-4)
+
+
 @pytest.mark.nightly
 def test_deviations_of_unknown_noise_are_those_of_the_factors() -> None:
-    """Of exact ones 95 in 100 draws lie within two of a factor, and 87 or more within all three."""
+    """Of exact ones 95 in 100 draws lie within two of a factor, and 91, so correlated, of all."""
     off, _ = unknown_noise_off(range(100))
     within = np.abs(off) < 2.0
     assert (within.sum(axis=0) >= 91).all()
-    assert within.all(axis=1).sum() >= 80
+    assert within.all(axis=1).sum() >= 85
     assert np.sqrt(np.mean(np.square(off), axis=0)) == pytest.approx(np.ones(3), abs=0.15)

@@ -137,6 +137,19 @@ def test_an_iteration_is_one_eigenvalue_solution(hframe_case: Any) -> None:
     assert result.diagnostics["converged"] == 1.0
 
 
+def test_a_budget_of_solutions_ends_with_the_best_point_so_far(hframe_case: Any) -> None:
+    whole = Local().update(*hframe_case, RNG)
+    for most in (1, 3, len(whole.history) + 1):
+        limited = Local(options=replace(Local().options, max_solves=most, restarts=most % 2))
+        with count_evaluations() as counter:
+            found = limited.update(*hframe_case, RNG)
+        assert counter.count == min(most, len(whole.history))
+        assert found.history == whole.history[:most]
+        assert found.diagnostics["converged"] == (most > len(whole.history))
+    with pytest.raises(ValueError, match=r"max_solves is -1, not 0 \(no limit\) or more"):
+        replace(Local().options, max_solves=-1)
+
+
 def test_every_step_is_equation_4(hframe_case: Any) -> None:
     model, data = hframe_case
     options = UpdateOptions(damping=0.05, max_iterations=2, max_step=10.0)

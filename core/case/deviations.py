@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from femubench.core.modal.measurement import Measurement
+from femubench.core.modal.measurement import OUT_OF_PHASE, Measurement
 from femubench.core.typing import BoolArray, FloatArray
 
 _ROUNDING = 1e-12  # of the quantity itself
@@ -51,6 +51,24 @@ def with_floor(
     if not stated:
         return m, ()
     return replace(m, frequency_std=frequency_std, shape_std=shape_std), tuple(stated)
+
+
+def say_what_phases_lose(measurement: Measurement, file: str) -> list[str]:
+    """Return a sentence where turning shapes real loses much of them, else none.
+
+    Arguments:
+        measurement: as read.
+        file: for the sentence.
+    """
+    if (lost := measurement.out_of_phase) is None or not (large := lost >= OUT_OF_PHASE).any():
+        return []
+    pairs = zip(lost[large], np.flatnonzero(large), strict=True)
+    named = [f"{100.0 * share:.0f} % of mode {measurement.numbers[k]}" for share, k in pairs]
+    more = [f"{len(named) - _MOST_NAMED} more modes"] if len(named) > _MOST_NAMED else []
+    return [
+        f"{file}: shapes were turned real, and what was out of phase in them is lost: "
+        + f"{', '.join([*named[:_MOST_NAMED], *more])}."
+    ]
 
 
 def _raised(std: FloatArray, size: FloatArray, share: float) -> tuple[FloatArray, BoolArray]:

@@ -13,7 +13,7 @@ from femubench.core.case.tables import PLACES, RESERVED, Complex, CsvTable, read
 from femubench.core.errors import InputError
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.sensors import Sensors
-from femubench.core.modal.complex_modes import real_modes
+from femubench.core.modal.complex_modes import out_of_phase, real_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray
 
@@ -71,7 +71,7 @@ def read_modes(
         ratio = row.number("damping", "a ratio >= 0 and < 1, or nothing", lambda v: 0 <= v < 1)
         columns.append((frequency, std, np.nan if ratio is None else ratio))
     frequencies, frequency_std, damping = np.array(columns).T
-    shapes, shape_stds = _shapes(table, labels)
+    shapes, shape_stds, lost = _shapes(table, labels)
     return Measurement(
         sensors=sensors,
         numbers=tuple(numbers),
@@ -80,6 +80,7 @@ def read_modes(
         damping=damping,
         shapes=shapes,
         shape_std=with_default_std(shapes, shape_stds, shape_std),
+        out_of_phase=lost,
     )
 
 
@@ -87,8 +88,10 @@ def _not_negative(value: float) -> bool:
     return value >= 0.0
 
 
-def _shapes(table: CsvTable, labels: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
-    """Return real shapes and the deviations that are given, nan elsewhere, (n_sensors, m)."""
+def _shapes(
+    table: CsvTable, labels: tuple[str, ...]
+) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """Return real shapes, (n_sensors, m), deviations, nan where none is given, and what is lost."""
     size = (len(labels), len(table.rows))
     shapes, std = np.full(size, np.nan, dtype=complex), np.full(size, np.nan)
     complex_modes = np.zeros(len(table.rows), dtype=bool)
@@ -107,7 +110,7 @@ def _shapes(table: CsvTable, labels: tuple[str, ...]) -> tuple[FloatArray, Float
         if len(measured) and measured.max() < SMALLEST:
             raise row.error("mode", "the shape is zero at every sensor", "a shape, or empty cells")
     real = np.where(complex_modes, real_modes(shapes), shapes.real)
-    return real, std
+    return real, std, out_of_phase(shapes) if complex_modes.any() else None
 
 
 def with_default_std(shapes: FloatArray, std: FloatArray, share: float) -> FloatArray:

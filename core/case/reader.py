@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from femubench.core.case.case import SCATTER, Case, Match, Modification
 from femubench.core.case.checks import FREE_YET_HELD, NOT_HELD, check_unique
-from femubench.core.case.deviations import with_floor
+from femubench.core.case.deviations import say_what_phases_lose, with_floor
 from femubench.core.case.drawn import DRAWN, drawing_of
 from femubench.core.case.faults import BadKey, KeyPath, at_key
 from femubench.core.case.files import LARGEST_CASE, CaseFiles
@@ -372,6 +372,7 @@ class _Building:
             found = read_modes(path, sensors, share, self.spec.measurement.without)
         else:
             found = match_modes(read, path, sensors, share)
+        self.notes |= dict.fromkeys(say_what_phases_lose(found, name))
         spec, fitted = self.spec.measurement.scatter, False
         if read is None and FIT_STD in read_table(path).columns:
             fitted, spec = True, spec or ScatterSpec(frequencies=SCATTER[0], shapes=SCATTER[1])

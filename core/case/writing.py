@@ -156,7 +156,7 @@ def _differing(one: Measurement, other: Measurement) -> str | None:
     """Return a field in which two measurements differ."""
     for f in fields(Measurement):
         first, second = getattr(one, f.name), getattr(other, f.name)
-        if f.name == "assumed":  # what is written is stated
+        if f.name in ("assumed", "out_of_phase"):  # what is written is stated, and real
             continue
         if f.name == "responses" and _same_responses(one.responses, other.responses):
             continue

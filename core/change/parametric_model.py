@@ -212,6 +212,16 @@ class ParametricModel:
         ]
         return np.where(set_alone, self.growth(x), 1.0)
 
+    def answer(
+        self, x: FloatArray, measured: Measurement
+    ) -> tuple[PredictedResponses, MatrixSlopes]:
+        """Return what gives the responses at coordinates, (p,), and slopes of the matrices by x.
+
+        Raises: as of `responses`.
+        """
+        model = self.at(x)
+        return PredictedResponses.of(model, measured), self.slopes(x, model)
+
     def responses(self, x: FloatArray, measured: Measurement) -> tuple[AnyArray, AnyArray]:
         """Return receptances H where responses were measured, and dH/dx, complex.
 
@@ -233,9 +243,8 @@ class ParametricModel:
             >>> members.responses(np.zeros(len(members)), held)[1].shape
             (401, 13, 1, 7)
         """
-        model = self.at(x)
-        found = PredictedResponses.of(model, measured)
-        return found.receptances, found.slopes(self.slopes(x, model)) * self.steps(x)
+        found, slopes = self.answer(x, measured)
+        return found.receptances, found.slopes(slopes) * self.steps(x)
 
     @cached_property
     def start(self) -> Model:

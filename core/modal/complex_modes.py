@@ -33,6 +33,25 @@ def real_modes(shapes: NDArray[np.complex128], align_phase: bool = False) -> Flo
     return np.asarray(np.abs(values) * np.where(np.isnan(values.real), np.nan, sign))
 
 
+def out_of_phase(shapes: NDArray[np.complex128]) -> FloatArray:
+    """Return the share of the norm of every mode that lies across its line, 0 to 0.71, (m,).
+
+    It is what turning the mode real loses; 0 of a real mode, whatever its scale. With the modal
+    phase collinearity it is sqrt((1 - sqrt(MPC)) / 2).
+
+    Arguments:
+        shapes: (n_sensors, m); nan where nothing was measured.
+
+    Examples:
+        >>> print(modal.out_of_phase(np.array([[2j, 3 + 0j], [-1j, 0 + 1j]])).round(3))
+        [0.    0.316]
+    """
+    values = np.nan_to_num(np.asarray(shapes, dtype=np.complex128))
+    across = np.linalg.norm((values * np.exp(-1j * mean_phase(values))).imag, axis=0)
+    size = np.linalg.norm(values, axis=0)
+    return np.asarray(across / np.where(size > 0.0, size, 1.0))
+
+
 def mean_phase(shapes: NDArray[np.complex128]) -> FloatArray:
     """Return the phase of the line that every mode lies closest to, -pi/2..pi/2, (m,).
 

@@ -13,6 +13,7 @@ from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.typing import FloatArray, IntArray
 
 _DAMPING = 0.005  # where none was measured
+OUT_OF_PHASE = 0.2  # of a shape: from there on its loss is said
 
 
 @dataclass(frozen=True, repr=False)
@@ -33,6 +34,8 @@ class Measurement(Shown):
         assumed: whether a scatter that nobody has measured is in the deviations.
         responses: frequency responses at some of the sensors with their standard deviations; None
             where none are given.
+        out_of_phase: share of the norm of every shape that was out of phase with the rest of it and
+            is lost as it was turned real, (m,); None where none was complex.
     """
 
     sensors: Sensors
@@ -46,6 +49,7 @@ class Measurement(Shown):
     frequency_correlation: FloatArray | None = None
     assumed: bool = False
     responses: FrequencyResponses | None = None
+    out_of_phase: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -55,11 +59,14 @@ class Measurement(Shown):
         found = [
             ("", f"{count_noun(len(self), 'mode')} at {count_noun(len(self.sensors), 'sensor')}")
         ]
+        lost = np.zeros(len(self)) if self.out_of_phase is None else self.out_of_phase
         for row in zip(
-            self.numbers, self.frequencies, self.frequency_std, self.damping, strict=True
+            self.numbers, self.frequencies, self.frequency_std, self.damping, lost, strict=True
         ):
-            damping = f", damping {row[3]:.3g}" if np.isfinite(row[3]) else ""
-            found.append((f"mode {row[0]}", f"{row[1]:.6g} Hz, std {row[2]:.2g} Hz{damping}"))
+            text = f"{row[1]:.6g} Hz, std {row[2]:.2g} Hz"
+            text += f", damping {row[3]:.3g}" if np.isfinite(row[3]) else ""
+            text += f", {100.0 * row[4]:.2g} % out of phase" if row[4] >= OUT_OF_PHASE else ""
+            found.append((f"mode {row[0]}", text))
         if self.total_mass is not None:
             found.insert(1, ("mass", "{:.6g} kg, std {:.2g} kg".format(*self.total_mass)))
         if self.responses is not None:
@@ -127,7 +134,7 @@ class Measurement(Shown):
         if missing:
             raise KeyError(f"no measured mode {missing[0]}; there are {list(self.numbers)}")
         columns = [self.numbers.index(number) for number in wanted]
-        correlation = self.frequency_correlation
+        correlation, lost = self.frequency_correlation, self.out_of_phase
         return replace(
             self,
             numbers=wanted,
@@ -137,6 +144,7 @@ class Measurement(Shown):
             shapes=self.shapes[:, columns],
             shape_std=self.shape_std[:, columns],
             frequency_correlation=None if correlation is None else correlation[columns][:, columns],
+            out_of_phase=None if lost is None else lost[columns],
         )
 
     def with_noise(self, rng: np.random.Generator) -> Measurement:

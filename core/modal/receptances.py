@@ -73,6 +73,15 @@ class PredictedResponses:
         out, into = (np.asarray(rows @ self.modes.shapes) for rows in self.at[:2])
         return out, into
 
+    @cached_property
+    def dynamic(self) -> AnyArray:
+        """Return the dynamic stiffness of every mode at every line, complex, (n_f, m)."""
+        return dynamic_stiffness(self.modes.eigenvalues, self.at[2], self.damping)
+
+    def exert(self, motions: AnyArray, slopes: MatrixSlopes) -> Iterator[AnyArray]:
+        """Yield the forces dZ q of the slope of each parameter, of motions q, (m, n_f, n) both."""
+        return _exerted(self.modes, motions, self.at[2], slopes, self.damping)
+
     def slopes(self, slopes: MatrixSlopes) -> AnyArray:
         """Return those of the receptances by parameters, of the slopes of the matrices."""
         return receptance_slopes(self.modes, *self.at, slopes, self.damping)

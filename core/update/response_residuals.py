@@ -78,6 +78,25 @@ class ResponseTargets:
         measured = replace(self.measurement, responses=replace(responses, deviations=wider))
         return ResponseTargets(measured)
 
+    def conceded(self, jacobian: FloatArray, residual: FloatArray) -> FloatArray:
+        """Return the information that the factors of `rescaled` take from the parameters, (p, p).
+
+        With a channel's pull g = s'r and its n numbers it is 2/n g g', what is left when the
+        logarithm of its factor, whose own information is 2 n, is integrated over.
+
+        Arguments:
+            jacobian: s, weighted, (n_rows, p).
+            residual: r, weighted, (n_rows,).
+
+        Source: Beck & Katafygiotis (1998), the Hessian with the variance among the unknowns.
+        """
+        there = self.weight > 0.0
+        channel = np.tile(np.flatnonzero(there) % there[0].size, 2)
+        pulls = np.zeros((there[0].size, jacobian.shape[1]))
+        np.add.at(pulls, channel, jacobian * residual[:, None])
+        count = np.maximum(np.bincount(channel, minlength=len(pulls)), 1)
+        return np.asarray(2.0 * (pulls.T / count) @ pulls)
+
     def predict(self, model: Model, previous: object, mass: float) -> ResponsePrediction:
         """Return the answer of a model, as `Targets` do; raises ModelError without modes."""
         return ResponsePrediction(self, model, PredictedResponses.of(model, self.measurement))

@@ -17,6 +17,7 @@ from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.dual_least_squares import MANY, DualPosterior
 from femubench.core.fit.gauss_newton import Linearised
+from femubench.core.modal.eigen import Evaluations
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import BoolArray, FloatArray
 from femubench.core.update.residuals import Prediction, Residual, Targets, common_rows
@@ -61,6 +62,8 @@ class UpdateOptions:
         cost_tolerance: or when three steps in a row lower the cost by no more than this share:
             parameters that hardly matter drift on for ever.
         max_step: longest step of a scaled parameter in one iteration.
+        max_solves: eigenvalue solutions at most, of all rounds together, each start taking one in
+            any case; the best point so far is the result then, not converged. 0 for no limit.
         restarts: how often the end is left, by half a prior deviation in a random direction, and
             the iteration repeated: a saddle, such as that of a symmetric model, is left.
     """
@@ -77,8 +80,11 @@ class UpdateOptions:
     cost_tolerance: float = 1e-4
     max_step: float = 0.5
     restarts: int = 0
+    max_solves: int = 0
 
     def __post_init__(self) -> None:
+        if self.max_solves < 0:
+            raise ValueError(f"max_solves is {self.max_solves}, not 0 (no limit) or more")
         if self.weighting not in ("unit", "statistical"):
             raise ValueError(f"weighting {self.weighting!r} is neither 'unit' nor 'statistical'")
         if self.shapes and self.weighting != "statistical":
@@ -110,11 +116,18 @@ class Iteration:
         parametric: ParametricModel,
         data: Targets | ResponseTargets | AntiresonanceTargets,
         options: UpdateOptions,
+        solves: Evaluations | None = None,
     ) -> None:
         self.parametric, self.data, self.options = parametric, data, options
+        self.solves = Evaluations() if solves is None else solves
         self.history: list[Mapping[str, float]] = []
         self.beta = 0.0
         self.converged = False
+
+    @property
+    def spent(self) -> bool:
+        """Tell whether no eigenvalue solution is left."""
+        return 0 < self.options.max_solves <= self.solves.count
 
     def model_at(self, q: FloatArray) -> Model:
         """Return the model at coordinates, (p,), taken within their limits."""
@@ -123,6 +136,7 @@ class Iteration:
     def at(self, q: FloatArray, previous: Any = None) -> Iterate:  # noqa: ANN401 - of its kind
         """Return the prediction at coordinates, its pairs continued from a previous one."""
         model = self.parametric.at(q)
+        self.solves.count += 1
         mass = self.parametric.mass(q, model)
         return Iterate(q, self.data.predict(model, previous, mass))
 
@@ -158,7 +172,7 @@ class Iteration:
         precision = self.parametric.precision
         for halving in range(_HALVINGS + 1):
             q = np.clip(point.q + step / 2**halving, self.parametric.lower, self.parametric.upper)
-            if np.abs(q - point.q).max() < _SMALLEST_STEP:
+            if self.spent or np.abs(q - point.q).max() < _SMALLEST_STEP:
                 return None
             try:
                 trial = self.at(q, point.prediction)
@@ -182,6 +196,8 @@ class Iteration:
         self.record(0, point, 0.0)
         point, rng = self.descend(point), np.random.default_rng(0)
         for _ in range(self.options.restarts):
+            if self.spent:
+                break
             point = self.improve(point, rng.standard_normal(len(parametric)))
         self.check(point)
         return point
@@ -210,7 +226,8 @@ class Iteration:
             step = problem.step(low, high, self.options.max_step, ridge=self.beta)
             following = self.advance(point, step)
             if following is None:
-                self.converged = problem.promise(step) < _NO_GAIN * problem.cost
+                little = problem.promise(step) < _NO_GAIN * problem.cost
+                self.converged = little and not self.spent
                 break
             moved = float(np.abs(following.q - point.q).max())
             slow = slow + 1 if self.gain(point, following) < self.options.cost_tolerance else 0
@@ -258,7 +275,10 @@ class Iteration:
         """Return the posterior covariance of q, (p, p); None without statistics."""
         if not self.data.statistical:
             return None
-        normal = self.concluded(point).normal
+        problem = self.concluded(point)
+        normal = problem.normal
+        if self.options.unknown_noise and isinstance(self.data, ResponseTargets):
+            normal = normal - self.data.conceded(problem.jacobian, problem.residual)
         try:
             return np.asarray(np.linalg.inv(normal))
         except np.linalg.LinAlgError:
@@ -351,19 +371,20 @@ def sensitivity_update(
     data: Targets | ResponseTargets | AntiresonanceTargets
     data = Targets(measurement, options.residual, statistical, options.shapes, statistical)
     model = Model.of(source) if isinstance(source, Structure) else source
-    parametric, start = ParametricModel(model, tuple(changes)), None
+    parametric, start, solves = ParametricModel(model, tuple(changes)), None, Evaluations()
     if options.responses or options.antiresonances:
-        start = Iteration(parametric, Targets(measurement, "frequency", True), options).run().q
+        frequencies = Targets(measurement, "frequency", True)
+        start = Iteration(parametric, frequencies, options, solves).run().q
         data = (ResponseTargets if options.responses else AntiresonanceTargets)(measurement)
-    iteration = Iteration(parametric, data, options)
+    iteration = Iteration(parametric, data, options, solves)
     point = iteration.run(start)
     for _ in range(_NOISES * options.unknown_noise):
         prediction, before = point.prediction, point.q
         assert isinstance(prediction, ResponsePrediction)
         rescaled = prediction.data.rescaled(prediction.answer.receptances)
-        iteration = Iteration(parametric, rescaled, options)
+        iteration = Iteration(parametric, rescaled, options, solves)
         point = iteration.run(before)
-        if np.abs(point.q - before).max() < _SETTLED:
+        if iteration.spent or np.abs(point.q - before).max() < _SETTLED:
             break
     std, uncertainty = iteration.estimate_deviations(point)
     return UpdateResult(

@@ -18,7 +18,8 @@ class BayesianResponses(Bayesian):
     normal errors, of noise and of the model alike: their deviations are the stated ones times a
     factor that every channel has for itself and that has no prior (that of its logarithm is even).
     Parameters and factors of least cost are sought in turn, from the parameters that fit the used
-    frequencies. The posterior about them is normal, its covariance the inverse of s'Ws + P.
+    frequencies. The posterior about them is normal, its covariance the inverse of s'Ws + P less
+    what the factors of the channels take of s'Ws.
 
     Where a model cannot follow the responses the factors are large, and priors keep their weight.
     Lines count as independent, which errors of a model are not: deviations are then too small.

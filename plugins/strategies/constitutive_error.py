@@ -12,10 +12,12 @@ from scipy.sparse.linalg import splu
 
 from femubench import InputError, Measurement, Model, NotApplicable, UpdateResult
 from femubench.fem import FloatArray
+from femubench.plugins.strategies.response_error import forced_energy, response_error
 from femubench.update import ParametricModel, ParametricStrategy, expand_measured_shapes
 
 _GAIN = 0.05  # of the error: a zone that takes less of it away is the last
-_STEPS = 10  # of a round, which the next one goes on from
+_A_FEW = {"maxiter": 10.0}  # steps of a round, which the next one goes on from
+_TO_THE_END = {"maxiter": 100.0, "ftol": 1e-15, "gtol": 1e-12}  # a round by responses, cheap steps
 
 
 @dataclass(frozen=True)
@@ -31,11 +33,14 @@ class ConstitutiveError(ParametricStrategy):
         confidence: r of the readings: r/(1 - r) weighs their misfit.
         localise: zones with at least this share of the largest error are corrected, together with
             those before; 0 for all at once.
+        responses: take the given frequency responses in place of the modes: a pair for every line
+            and force, K v in equilibrium with the inertia and damping forces of u.
 
     The authors' are the pair, the error and its weight r/(1 - r), zones by their share of it (0.8)
-    in turn with corrections; ours: the mass is right, the norm of the readings, which is that of
-    their deviations, each mode's error relative to its energy, and that zones are added until one
-    takes away less than 5 % of the error.
+    in turn with corrections, and forced motions with damping; ours: the mass is right, and of
+    responses the damping too, which is the measured one; the norm of the readings, which is that of
+    their deviations, each mode's or line's error relative to its energy, lines of even weight, and
+    that zones are added until one takes away less than 5 % of the error.
 
     Source: Deraemaeker, Ladeveze & Leconte (2002), the basic problem and its 2 n equations.
     """
@@ -51,6 +56,7 @@ class ConstitutiveError(ParametricStrategy):
 
     confidence: float = 0.5
     localise: float = 0.8
+    responses: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -65,14 +71,20 @@ class ConstitutiveError(ParametricStrategy):
         """Return the model with the zones of largest error corrected.
 
         Raises:
-            NotApplicable: when the model has no such parameters, or a mode no shape or deviation.
+            NotApplicable: when the model has no such parameters, or a mode no shape or deviation,
+                or responses are asked for and none is given.
         """
         parts = self.parameterise(model)
-        whole = expand_measured_shapes(parts.start, measurement)
-        inertia = np.einsum("ij,ij->j", whole, parts.start.mass_times(whole))
-        energy = 0.5 * measurement.eigenvalues * inertia
         x = np.clip(np.zeros(len(parts)), parts.lower, parts.upper)
-        cost, _, zones = self.error(parts, measurement, energy, x)
+        of, options = self.error, _A_FEW
+        if self.responses:
+            of, options = self.error_of_responses, _TO_THE_END
+            energy = forced_energy(parts, measurement, x)
+        else:
+            whole = expand_measured_shapes(parts.start, measurement)
+            inertia = np.einsum("ij,ij->j", whole, parts.start.mass_times(whole))
+            energy = 0.5 * measurement.eigenvalues * inertia
+        cost, _, zones = of(parts, measurement, energy, x)
         history, chosen = [{"cost": cost, "zones": 0.0}], np.zeros(len(x), dtype=bool)
         bounds = np.column_stack([parts.lower, parts.upper])
         while not chosen.all():
@@ -83,10 +95,9 @@ class ConstitutiveError(ParametricStrategy):
             def along(z: FloatArray, own: FloatArray = chosen) -> tuple[float, FloatArray]:
                 point = x.copy()
                 point[own] = z
-                value, slope, _ = self.error(parts, measurement, energy, point)
+                value, slope, _ = of(parts, measurement, energy, point)
                 return value, slope[own]
 
-            options = {"maxiter": _STEPS}
             found = minimize(
                 along,
                 x[chosen],
@@ -98,11 +109,21 @@ class ConstitutiveError(ParametricStrategy):
             gained = 1.0 - found.fun / cost
             if gained > 0.0:
                 x[chosen] = found.x
-            cost, _, zones = self.error(parts, measurement, energy, x)
+            cost, _, zones = of(parts, measurement, energy, x)
             history.append({"cost": cost, "zones": float(chosen.sum())})
             if gained < _GAIN:
                 break
         return self.result(parts, x, history, cost=cost, zones=float(chosen.sum()))
+
+    def error_of_responses(
+        self, parts: ParametricModel, measurement: Measurement, energy: FloatArray, x: FloatArray
+    ) -> tuple[float, FloatArray, FloatArray]:
+        """Return what `error` does, of the frequency responses; energy is that of `forced_energy`.
+
+        Arguments: as of `error`.
+        """
+        weight = self.confidence / (1.0 - self.confidence)
+        return response_error(parts, measurement, energy, x, weight)
 
     def error(
         self, parts: ParametricModel, measurement: Measurement, energy: FloatArray, x: FloatArray
