@@ -670,6 +670,16 @@ def advise_modes(budget: Budget, case: Case) -> tuple[Advice, ...]:
     return tuple(in_order(found, lambda advice: -advice.separation))[: settings.of_a_kind]
 
 
+def loosest_mode(budget: Budget) -> int | None:
+    """Return the unused mode whose frequency is known least; None where all are known well."""
+    slopes = frequency_slopes(budget.state)
+    variance = np.einsum("mk,kl,ml->m", slopes, budget.covariance, slopes)
+    variance[[mode.used for mode in budget.modes]] = 0.0
+    row = int(variance.argmax())
+    least = settings.visible_deviations * settings.budget_rest[0] ** 2
+    return budget.modes[row].mode if variance[row] >= least else None
+
+
 def frequency_slopes(state: State, modes: IntArray | None = None) -> FloatArray:
     """Return d ln f / d x of the partner of every measured mode, or of other modes, (m, k)."""
     modes = state.partner if modes is None else modes

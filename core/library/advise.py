@@ -1,0 +1,96 @@
+"""Measure, diagnose, take what is advised, again: ``bench advise``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from femubench.core.case.case import Case
+from femubench.core.diagnosis.budget import Budget, budget_of, loosest_mode
+from femubench.core.errors import InputError, NotApplicable
+from femubench.core.library.cases import CaseLike, one_case
+from femubench.core.library.diagnose import diagnosis_of
+from femubench.core.plugin.loader import Plugins
+from femubench.core.schema.diagnosis import BudgetMode
+
+
+@dataclass(frozen=True)
+class AdviceRound:
+    """What is known after so many of the advised modes were measured.
+
+    Arguments:
+        used: modes.
+        verdict, causes: of a diagnosis by these.
+        unseen: numbers of the budget that these modes do not see.
+        drawing_percent, left_percent: rms errors of the other modes, drawing and extended model;
+            None where no mode is left.
+        std_percent: deviation that the extended model predicts for them, rms.
+        next_mode: that is advised; None at the end.
+    """
+
+    used: tuple[int, ...]
+    verdict: str
+    causes: tuple[str, ...]
+    unseen: int
+    drawing_percent: float | None
+    left_percent: float | None
+    std_percent: float | None
+    next_mode: int | None
+
+
+def play_advice(
+    case: CaseLike, plugins: Plugins, rounds: int | None = None
+) -> Iterator[AdviceRound]:
+    """Yield rounds until a name stands alone, or no held-out mode would say more.
+
+    Arguments:
+        case: whose held-out modes are the laboratory.
+        rounds: that are measured at most; None for as many as it takes.
+
+    Raises:
+        InputError: when the case holds no modes back, or there is no budget of it.
+    """
+    read = one_case(case, plugins)
+    if not read.held_out:
+        expected = "`held_out` modes, which are measured one by one"
+        raise InputError("holds nothing back", file=read.folder, expected=expected)
+    if read.reference is not None:
+        expected = "a case without `[reference]`: `bench diagnose` advises what parts the names"
+        raise InputError("has no budget of its drawing", file=read.folder, expected=expected)
+    left = len(read.held_out) if rounds is None else rounds
+    while True:
+        budget = _budget_of(read, plugins)
+        found = diagnosis_of(read, None, plugins)
+        mode = None if found.verdict == "named" or not left else loosest_mode(budget)
+        others = [one for one in budget.modes if one.mode in read.held_out]
+        yield AdviceRound(
+            tuple(read.used),
+            found.verdict,
+            tuple(f"{cause.effect} at {cause.place}" for cause in found.causes),
+            sum(len(line.unseen) for line in budget.lines),
+            *(_rms(others, name) for name in ("error_percent", "left_percent", "std_percent")),
+            mode,
+        )
+        if mode is None:
+            return
+        held = tuple(number for number in read.held_out if number != mode)
+        read = replace(read, used=tuple(sorted((*read.used, mode))), held_out=held)
+        left -= 1
+
+
+def _budget_of(case: Case, plugins: Plugins) -> Budget:
+    try:
+        found = budget_of(case, plugins.effects.values())
+    except NotApplicable as fault:
+        raise InputError(f"cannot be diagnosed: {fault}", file=case.folder) from fault
+    if found is None:
+        expected = "a frame, or matrices in groups"
+        raise InputError("has no budget of its drawing", file=case.folder, expected=expected)
+    return found
+
+
+def _rms(modes: Sequence[BudgetMode], name: str) -> float | None:
+    values = [getattr(mode, name) for mode in modes]
+    return float(np.sqrt(np.mean(np.square(values)))) if values else None
