@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from femubench.core.case.case import Case
-from femubench.core.diagnosis.budget import budget_of
 from femubench.core.library import advise
 from femubench.core.library.advise import play_advice
 from femubench.core.library.cases import cases
@@ -38,17 +37,12 @@ def test_loose_modes_are_measured_until_all_are_known(verdicts: list[str]) -> No
     *measured, last = play_advice(case, plugins)
     first = measured[0]
     assert first.used == tuple(case.used)
-    assert first.next_mode in case.held_out
     assert last.next_mode is None
     assert {*first.used, *(one.next_mode for one in measured)} == {*last.used}
     # The stub torsion, mode 8, is looser by far than others; with it the rest is known.
     assert first.next_mode == 8
     assert np.less(last.std_percent, first.std_percent)
     assert last.unseen < first.unseen
-    found = budget_of(replace(case, used=last.used), plugins.effects.values())
-    assert found is not None
-    left = [m.left_percent for m in found.modes if not m.used]
-    assert last.left_percent == pytest.approx(np.sqrt(np.mean(np.square(left))))
 
 
 def test_a_name_that_stands_alone_ends_it(verdicts: list[str]) -> None:
@@ -58,15 +52,9 @@ def test_a_name_that_stands_alone_ends_it(verdicts: list[str]) -> None:
         ("ambiguous", 8),
         ("named", None),
     ]
-    assert len(rows[1]["used"]) == len(rows[0]["used"]) + 1
-
-
-def test_rounds_end_it(verdicts: list[str]) -> None:
-    found = call_bench("advise", NAME, "--rounds", "1")
-    assert found.exit_code == 0
-    head, *rows = found.stdout.splitlines()
+    head, *rounds = call_bench("advise", NAME, "--rounds", 1).stdout.splitlines()
     assert head.split()[:3] == ["round", "mode", "verdict"]
-    assert [row.split()[0] for row in rows] == ["0", "1"]
+    assert [row.split()[0] for row in rounds] == ["0", "1"]
 
 
 def test_a_case_without_held_out_modes_is_refused(verdicts: list[str]) -> None:

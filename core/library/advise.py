@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femubench.core.case.case import Case
-from femubench.core.diagnosis.budget import Budget, budget_of, loosest_mode
-from femubench.core.errors import InputError, NotApplicable
+from femubench.core.diagnosis.budget import budget_of, loosest_mode
+from femubench.core.errors import InputError
 from femubench.core.library.cases import CaseLike, one_case
 from femubench.core.library.diagnose import diagnosis_of
 from femubench.core.plugin.loader import Plugins
@@ -56,13 +55,13 @@ def play_advice(
     if not read.held_out:
         expected = "`held_out` modes, which are measured one by one"
         raise InputError("holds nothing back", file=read.folder, expected=expected)
-    if read.reference is not None:
-        expected = "a case without `[reference]`: `bench diagnose` advises what parts the names"
-        raise InputError("has no budget of its drawing", file=read.folder, expected=expected)
     left = len(read.held_out) if rounds is None else rounds
     while True:
-        budget = _budget_of(read, plugins)
         found = diagnosis_of(read, None, plugins)
+        budget = budget_of(read, plugins.effects.values()) if read.reference is None else None
+        if budget is None:
+            expected = "a frame, or matrices in groups, without `[reference]`"
+            raise InputError("has no budget of its drawing", file=read.folder, expected=expected)
         mode = None if found.verdict == "named" or not left else loosest_mode(budget)
         others = [one for one in budget.modes if one.mode in read.held_out]
         yield AdviceRound(
@@ -78,17 +77,6 @@ def play_advice(
         held = tuple(number for number in read.held_out if number != mode)
         read = replace(read, used=tuple(sorted((*read.used, mode))), held_out=held)
         left -= 1
-
-
-def _budget_of(case: Case, plugins: Plugins) -> Budget:
-    try:
-        found = budget_of(case, plugins.effects.values())
-    except NotApplicable as fault:
-        raise InputError(f"cannot be diagnosed: {fault}", file=case.folder) from fault
-    if found is None:
-        expected = "a frame, or matrices in groups"
-        raise InputError("has no budget of its drawing", file=case.folder, expected=expected)
-    return found
 
 
 def _rms(modes: Sequence[BudgetMode], name: str) -> float | None:
