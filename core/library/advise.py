@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +12,6 @@ from femubench.core.errors import InputError
 from femubench.core.library.cases import CaseLike, one_case
 from femubench.core.library.diagnose import diagnosis_of
 from femubench.core.plugin.loader import Plugins
-from femubench.core.schema.diagnosis import BudgetMode
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,9 @@ def play_advice(
             found.verdict,
             tuple(f"{cause.effect} at {cause.place}" for cause in found.causes),
             sum(len(line.unseen) for line in budget.lines),
-            *(_rms(others, name) for name in ("error_percent", "left_percent", "std_percent")),
+            _rms(one.error_percent for one in others),
+            _rms(one.left_percent for one in others),
+            _rms(one.std_percent for one in others),
             mode,
         )
         if mode is None:
@@ -79,6 +80,6 @@ def play_advice(
         left -= 1
 
 
-def _rms(modes: Sequence[BudgetMode], name: str) -> float | None:
-    values = [getattr(mode, name) for mode in modes]
-    return float(np.sqrt(np.mean(np.square(values)))) if values else None
+def _rms(values: Iterable[float]) -> float | None:
+    squares = np.square(list(values))
+    return float(np.sqrt(squares.mean())) if len(squares) else None
