@@ -41,6 +41,7 @@ KINDS = {
     "rotary inertia of masses": "mass",
     **dict.fromkeys(("shear-deformation", "rotary-inertia"), "shear"),
     "GJ": "torsion-constant",
+    "density": "mass",
 }
 
 
@@ -78,7 +79,8 @@ class BudgetScore:
         place, own = place.removeprefix("type:"), KINDS.get(kind, kind)
         if own == "joint":
             held = {types.get(str(one.at)) for one in (*frame.supports, *frame.springs)}
-            if types.get(place, place) in held or (kind, place) == ("support", "all"):
+            grounded = kind == "springs to ground" or (kind, place) == ("support", "all")
+            if grounded or types.get(place, place) in held:
                 return "foot", "all"
         return own, types.get(place, place) if own in ("joint", "mass") else "all"
 

@@ -34,6 +34,7 @@ _OFTEN = {
     "compare": "Compare run B with run A; exit with 1 if B is worse.",
     "update": "Write the updated model of CASE in the format that it came in.",
     "diagnose": "Find what a model lacks, and extend it.",
+    "advise": "Measure the modes that are advised, with held-out ones as the laboratory.",
     "identify": "Find modes in measured responses, without a click.",
     "init": "Write a case folder into FOLDER, which must be new or empty.",
     "help": "Explain a key of a case, an effect, a verdict or a setting.",

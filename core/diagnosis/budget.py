@@ -325,7 +325,7 @@ def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame
     everywhere: dict[str, float] = {}
     zones: dict[tuple[str, str], float] = {}
     added: list[PointMass] = []
-    held: dict[tuple[str, str], float] = {}
+    held: dict[str, float] = {}
     inertia: dict[str, float] = {}
     for entry, own in zip(entries, _split(entries), strict=True):
         values = entry.grow(x[None, own])[0].tolist()
@@ -334,7 +334,7 @@ def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame
                 for label in entry.at:
                     zones[quantity, label] = zones.get((quantity, label), 0.0) + value
         elif entry.kind == _SPRINGS:
-            held |= {(entry.place, k): 1.0 + v for k, v in zip(entry.names, values, strict=True)}
+            held |= {name: 1.0 + value for name, value in zip(entry.names, values, strict=True)}
         elif entry.kind == _LUMPS:
             inertia[entry.place] = values[0]
         elif entry.quantities:
@@ -357,8 +357,9 @@ def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame
     wanted = tuple(factor for factor in factors if factor.factor != 1.0)
     bodies = [(mass, inertia.get(_family(frame, mass.at), 0.0)) for mass in frame.masses]
     masses = [part for mass, share in bodies for part in _spread(mass, share)]
-    firm = [(spring, (_family(frame, spring.at), _along(spring))) for spring in frame.springs]
-    springs = [replace(one, stiffness=one.stiffness * held.get(key, 1.0)) for one, key in firm]
+    springs = [
+        replace(one, stiffness=one.stiffness * held.get(_along(one), 1.0)) for one in frame.springs
+    ]
     return replace(
         frame,
         factors=(*(factor for factor in frame.factors if factor.factor != 1.0), *wanted),
@@ -501,7 +502,11 @@ def _attached(structure: Structure) -> list[Entry]:
     for place, groups in springs.items():
         held = [structure.assemble_attachments((), alike)[1] for alike in groups.values()]
         terms = tuple(Term.of("stiffness", matrix) for matrix in held)
-        root, count = settings.budget_known[4] * np.eye(len(terms)), len(terms)
+        # Pads of one kind are half alike: ground differs from one footing to the next.
+        count, along = len(terms), np.array([name.rpartition(" ")[2] for name in groups])
+        together = np.where(along[:, None] == along, settings.budget_joints[2], 0.0)
+        np.fill_diagonal(together, 1.0)
+        root = settings.budget_known[4] * np.linalg.cholesky(together)
         found.append(Entry(place, _SPRINGS, tuple(groups), terms, root, (_SPRINGS,) * count, ()))
     lumps: dict[str, list[PointMass]] = {}
     for mass in frame.masses:
@@ -520,7 +525,8 @@ def _family(frame: Frame, at: Place) -> str:
 
 
 def _along(spring: GroundSpring) -> str:
-    return spring.direction.lstrip("+-")
+    """Return where a spring is, on a joint or a member, and its direction."""
+    return f"{spring.at.joint or spring.at.member} {spring.direction.lstrip('+-')}"
 
 
 def _spread(mass: PointMass, share: float) -> tuple[PointMass, ...]:
@@ -662,6 +668,16 @@ def advise_modes(budget: Budget, case: Case) -> tuple[Advice, ...]:
         text = f"{what} between {low:.4g} and {high:.4g} Hz, where {where} move most"
         found.append(Advice(text, float(size)))
     return tuple(in_order(found, lambda advice: -advice.separation))[: settings.of_a_kind]
+
+
+def loosest_mode(budget: Budget) -> int | None:
+    """Return the unused mode whose frequency is known least; None where all are known well."""
+    slopes = frequency_slopes(budget.state)
+    variance = np.einsum("mk,kl,ml->m", slopes, budget.covariance, slopes)
+    variance[[mode.used for mode in budget.modes]] = 0.0
+    row = int(variance.argmax())
+    least = settings.visible_deviations * settings.budget_rest[0] ** 2
+    return budget.modes[row].mode if variance[row] >= least else None
 
 
 def frequency_slopes(state: State, modes: IntArray | None = None) -> FloatArray:
