@@ -8,15 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnosis_problems import problem_of
+from diagnosis_problems import effects_named, part_at, problem_of
 
 import femubench
 from femubench import Case, InputError, Measurement, Model, Sensors, read_case, solve_modes
 from femubench.core.case.writing import write_case
 from femubench.core.fem.model_parameters import matrix_slopes, with_values
-from femubench.core.fit.modal_fit import state_at
+from femubench.core.fit.modal_fit import fit, state_at
 from femubench.core.inference.coordinates import modes_for
-from femubench.core.inference.model_error import error_slopes
+from femubench.core.inference.examine import model_error_of, with_scales
+from femubench.core.inference.model_error import error_slopes, general_slopes
+from femubench.core.inference.posterior import Explanation
+from femubench.core.inference.prior import Base
+from femubench.core.inference.search import _from_both_sides
 from femubench.core.run.jobs import missing_capability
 from femubench.effect import Parameter
 from femubench.fem import (
@@ -123,6 +127,21 @@ def test_strategies_find_the_factors_of_groups(strategy: femubench.Strategy) -> 
     assert {name: found[name] for name in TRUTH} == pytest.approx(TRUTH, rel=0.03)
     for name, part in result.model.groups.items():
         np.testing.assert_allclose(part.toarray(), found[name] * MODEL.groups[name].toarray())
+
+
+def test_a_cause_is_also_fitted_from_beyond_where_modes_change_places() -> None:
+    """A head a hundred times softer: from where it is stiffer than drawn no step leads there."""
+    test = measured(changed({"head": 0.01}), 3)
+    test = replace(test, frequency_std=1e-3 * test.frequencies)
+    problem = problem_of(MODEL, test, effects_named("member-stiffness"))
+    part = part_at(problem, "member-stiffness", "group:head")
+    stuck = fit(problem, (part,), np.array([0.5]))
+    assert stuck is not None
+    assert stuck.state.chi2 > 1e6
+    found = _from_both_sides(problem, stuck)
+    assert found.state.chi2 < 0.1
+    assert part.hypothesis.values(found.state.x[None])[0, 0] == pytest.approx(-0.99, rel=1e-3)
+    assert _from_both_sides(problem, found) is found
 
 
 def test_the_whole_stiffness_always_has_a_factor() -> None:
@@ -252,6 +271,26 @@ def test_groups_are_classes_of_model_error() -> None:
             raw = [state_at(problem_of(m, DATA, ()), (), np.zeros(0)).raw for m in ends]
             expected = (raw[1] - raw[0]) / (2.0 * step)
             np.testing.assert_allclose(slope, expected, atol=1e-3 * np.abs(expected).max())
+
+
+def test_what_is_drawn_wrong_acts_on_the_modes_with_the_cause_in_them() -> None:
+    """Next to a head a hundred times softer, error of groups is that of a beam on such a head."""
+    there = changed({"head": 0.01})
+    problem = problem_of(MODEL, measured(there, 4), effects_named("member-stiffness"))
+    part = part_at(problem, "member-stiffness", "group:head")
+    error, nothing = model_error_of(problem, None, 1.0, 0.0), state_at(problem, (), np.zeros(0))
+    x = np.array([part.hypothesis.parameters[0].coordinate(-0.99)])
+    found = fit(problem, (part,), x, steps=0)
+    assert found is not None
+    scaled = with_scales(error, Explanation(Base((), 0.0), found, 1), error.fit(nothing), nothing)
+    noise = scaled.fit.state.problem.noise
+    slopes = error_slopes(problem_of(there, problem.data.measurement, ()), modes_for(there))
+    slopes["general"] = general_slopes(found.state)
+    assert noise.scales is not None
+    own = error.moved(slopes).add_own_error(nothing, found.state).covariance(noise.scales)
+    size = np.sqrt(own.diagonal())
+    share = (noise.factor @ noise.factor.T - own) / np.outer(size, size)
+    np.testing.assert_allclose(share, 0.0, atol=1e-6)
 
 
 def test_groups_read_back_as_they_were_written(tmp_path: Path) -> None:

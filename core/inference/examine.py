@@ -153,11 +153,14 @@ class Examination:
             np.concatenate([np.ones(count), mode < used, np.ones(1)])[: len(data)]
         )
         everything = error_slopes(replace(self.problem, data=data), self.modes)
-        slopes = {k: s[kept] for k, s in everything.items()}
         unseen = np.arange(used, count)
         found = []
         for state, raw in explained:
-            scales = state.problem.noise.scales
+            scales, own = state.problem.noise.scales, everything
+            if scales is not None and _moves_error(state):
+                whole = replace(state.problem, data=data, offset=0.0)
+                own = everything | slopes_with(state_at(whole, state.parts, state.x))
+            slopes = {name: rows[kept] for name, rows in own.items()}
             found.append(
                 (np.zeros(len(unseen)), np.zeros(len(unseen)))
                 if scales is None
@@ -364,7 +367,7 @@ def with_scales(
     """Return an explanation with the scales of model error that suit it best."""
     state = explanation.fit.state
     if state.parts:
-        if len(error.residual):
+        if len(error.residual) or _moves_error(state):
             error = error.moved(slopes_with(state))
         error = error.add_own_error(nothing, state)
     problem = replace(state.problem, noise=error.noise(error.fit(state, near)))
@@ -376,6 +379,16 @@ def with_scales(
         there = replace(state, problem=problem)
         found = Fit(there, log_evidence(there))
     return explanation if found is None else replace(explanation, fit=found)
+
+
+def _moves_error(state: State) -> bool:
+    """Tell whether what matrices get wrong is that of the model with the causes in it.
+
+    A joint may be a thousand times softer than drawn, and the modes are then others.
+    """
+    known = (q for part in state.parts for q in part.hypothesis.parameters)
+    loose = any(q.scaling == "factor" and q.scale > 1.0 for q in known)
+    return loose and state.problem.model.structure is None
 
 
 def slopes_with(state: State) -> dict[str, FloatArray]:
