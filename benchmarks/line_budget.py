@@ -44,7 +44,7 @@ BUDGETS = {
     "core/schema": 1_503,
     "core/score": 2_499,
     "core/study": 623,
-    "core/twin": 820,
+    "core/twin": 817,
     "core/update": 4_807,
     "plugins": 13_238,
     "reports": 4_181,
