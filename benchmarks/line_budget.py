@@ -42,7 +42,7 @@ BUDGETS = {
     "core/reproduction": 617,
     "core/run": 4_626,
     "core/schema": 1_503,
-    "core/score": 2_499,
+    "core/score": 2_495,
     "core/study": 623,
     "core/twin": 817,
     "core/update": 4_807,
