@@ -284,22 +284,38 @@ class Memory(Strategy):
 
 
 def remember(words: Sequence[str]) -> pd.DataFrame:
-    """Return what strategies with memory gain on cases and on their twins, and who is marked."""
+    """Return what strategies with memory gain on cases and on their twins, and who is marked.
+
+    First on the cases with stretched twins, then on all of them.
+    """
     problems = problems_of(words)
     known = [Learnt.of(problem) for problem in problems]
     able = [Memory(known, share, by_make=kind) for kind in (False, True) for share in SHARES]
     names = [problem.case.name for problem in problems]
-    return list_gains(
-        femubench.rank(
-            names, [*able, "meet", "shifted"], nominal="textbook", twins=TWINS, timeout=None
-        )
+    run = femubench.rank(
+        names, [*able, "meet", "shifted"], nominal="textbook", twins=TWINS, timeout=None
     )
+    alone = stretched_alone(run)
+    listed = [alone, run] if len(alone.meta["models"]) < len(names) else [run]
+    return pd.concat(list_gains(one) for one in listed)
+
+
+def stretched_alone(run: Run) -> Run:
+    """Return a run on the cases that have stretched twins."""
+    twins, models = run.meta["twins"], run.meta["models"]
+    kept = {twins["of"][key] for key, kinds in twins["kinds"].items() if "stretched" in kinds}
+    meta = {
+        **run.meta,
+        "models": {case: own for case, own in models.items() if case in kept},
+        "twins": {**twins, "of": {key: case for key, case in twins["of"].items() if case in kept}},
+    }
+    return replace(run, meta=meta, results=tuple(r for r in run.results if r.case in kept))
 
 
 def list_gains(run: Run) -> pd.DataFrame:
     """Return the gains on cases and twins of a run, and who is marked."""
     board, twins = leaderboard(run).set_index("strategy")["gain"], run.meta["twins"]
-    stretched = {twins["of"][key] for key, kinds in twins["kinds"].items() if "stretched" in kinds}
+    stretched = {case for key, case in twins["of"].items() if "stretched" in twins["kinds"][key]}
     rows = [
         {"strategy": name, "structures": len(run.meta["models"]), "stretched": len(stretched),
          "cases": found.original_gain, "twins": found.gain, "board": board[name],
@@ -353,8 +369,7 @@ def main() -> None:
     parser.add_argument("--memory", nargs="*", metavar="CASE", help="who knows cases by heart")
     words = parser.parse_args()
     if words.memory is not None:
-        files = sorted(TABLE.parents[2].glob("scenarios/suite/*/stretch.npz"))
-        table = remember(words.memory or [f"suite/{file.parent.name}" for file in files])
+        table = remember(words.memory or ["suite"])
         print(table.to_string(index=False))
         if not words.memory:
             table.to_csv(MEMORY, index=False, lineterminator="\n")

@@ -154,36 +154,33 @@ def disguise_case(case: Case, rng: np.random.Generator | None) -> Case:
         raise NotApplicable("a model without elements and without nodes has no names to change")
     sensors = [m.sensors for m in (case.measurement, reference) if m is not None]
     labels = _renamed("c", (label for listed in sensors for label in listed.labels), rng)
+
+    def relabelled(measured: Measurement) -> Measurement:
+        """Return modes at sensors of other names, in the order of these or in theirs."""
+        known = measured.sensors
+        new = [labels[label] for label in known.labels]
+        order = list(range(len(known)))
+        if rng is not None:
+            order.sort(key=new.__getitem__)
+        there = replace(known, labels=tuple(new)).take(order)
+        shapes, std = measured.shapes[order], measured.shape_std[order]
+        return replace(measured, sensors=there, shapes=shapes, shape_std=std)
+
     changes = tuple(
         replace(
             change,
             masses=names.place_parts(change.masses),
             springs=names.place_parts(change.springs),
-            measurement=_relabelled(change.measurement, labels, shuffled=rng is not None),
+            measurement=relabelled(change.measurement),
         )
         for change in case.modifications
     )
     return replace(
         case,
         model=model,
-        measurement=_relabelled(case.measurement, labels, shuffled=rng is not None),
+        measurement=relabelled(case.measurement),
         modifications=changes,
-        reference=None
-        if reference is None
-        else _relabelled(reference, labels, shuffled=rng is not None),
-    )
-
-
-def _relabelled(measured: Measurement, labels: Names, *, shuffled: bool) -> Measurement:
-    """Return modes at sensors of other names, in the order of these or in theirs."""
-    known = measured.sensors
-    new = [labels[label] for label in known.labels]
-    order = sorted(range(len(known)), key=new.__getitem__) if shuffled else range(len(known))
-    return replace(
-        measured,
-        sensors=replace(known, labels=tuple(new)).take(order),
-        shapes=measured.shapes[list(order)],
-        shape_std=measured.shape_std[list(order)],
+        reference=None if reference is None else relabelled(reference),
     )
 
 
