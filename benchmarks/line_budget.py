@@ -42,7 +42,7 @@ BUDGETS = {
     "core/reproduction": 617,
     "core/run": 4_572,
     "core/schema": 1_480,
-    "core/score": 2_491,
+    "core/score": 2_495,
     "core/study": 610,
     "core/twin": 817,
     "core/update": 4_797,
