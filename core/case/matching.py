@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
@@ -123,7 +124,8 @@ def parse_frame(text: str) -> FloatArray:
 
 def size_of(points: FloatArray) -> float:
     """Return the diagonal of the box around points in m."""
-    return float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+    low, high = points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)
+    return math.hypot(*(max(b - a, 0.0) for a, b in zip(low.tolist(), high.tolist(), strict=True)))
 
 
 @dataclass(frozen=True)
