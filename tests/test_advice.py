@@ -15,7 +15,7 @@ from femubench import Model
 from femubench.core.advise.advice import advise
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
-from femubench.fem import Frame
+from femubench.fem import Frame, Joint, Material, Member, Place, Section, Support
 from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.material import Density, YoungsModulus
 from femubench.plugins.effects.temperature import Temperature
@@ -145,3 +145,20 @@ class TestGroups:
                 fall = 1.0 / np.sqrt(1.0 + change) - 1.0
                 expected = fall**2 / (2.0 * STD**2 + STD**2) * 6.0
                 assert levels[0].separation == pytest.approx(expected, rel=0.05)
+
+
+def test_modes_that_further_points_do_not_see_say_nothing() -> None:
+    """Of a bar whose bending in z is measured everywhere, those in y alone are left to see."""
+    bar, steel = Section(6e-4, 8e-8, 2e-8, 5e-8, 1e-7), Material(2.1e11, 0.3, 7850.0)
+    joints = Joint("foot", (0.0, 0.0, 0.0)), Joint("tip", (1.0, 0.0, 0.0))
+    foot = Support(Place("foot"), ("x", "y", "z", "rx", "ry", "rz"))
+    member = Member("bar", ("foot", "tip"), 8, bar, steel)
+    frame = Frame("3d", "euler-bernoulli", joints, (member,), supports=(foot,))
+    model = Model.of(frame)
+    test = measured(YoungsModulus().extend(model, "all", [0.02]), frame, shapes=6, weighed=False)
+    kept = [i for i, label in enumerate(test.sensors.labels) if label not in ("bary", "barx")]
+    own = test.sensors.take(kept), test.shapes[kept], test.shape_std[kept]
+    test = replace(test, **dict(zip(("sensors", "shapes", "shape_std"), own, strict=True)))
+    problem = problem_of(model, test, [YoungsModulus(), Density()])
+    fits = [fitted(problem, effect, "all") for effect in (YoungsModulus(), Density())]
+    assert all(np.isfinite(a.separation) for a in advised(model, problem, fits))

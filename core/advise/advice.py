@@ -191,9 +191,11 @@ def _shapes(group: Group) -> Iterator[Option]:
         new = least > settings.slope_step * np.abs(view.seen).max(axis=1)
         pairs = [(shapes[new], spread[new]) for shapes, spread in pairs]
     shapes = pairs[0][0]
-    if len(shapes) < 2:
+    if len(shapes) < 2 or not shapes.any():
         return
-    std = np.hypot(settings.reachable_shape_std, group.tolerance) * np.abs(shapes).max(axis=0)
+    # A mode that does not move there says nothing, and rounding is no reading of it.
+    size = np.maximum(np.abs(shapes).max(axis=0), settings.slope_step * np.abs(shapes).max())
+    std = np.hypot(settings.reachable_shape_std, group.tolerance) * size
     own, *others = [align_shapes(shapes, *pair) for pair in pairs]
     yield group.option(
         "shapes",
