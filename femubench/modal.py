@@ -18,6 +18,7 @@ from femubench.core.modal.group_prior import GroupPriors as GroupPriors
 from femubench.core.modal.many_changes import modes_of_changes as modes_of_changes
 from femubench.core.modal.pairing import pair_measured as pair_measured, pair_modes as pair_modes
 from femubench.core.modal.rigid import rigid_modes_of as rigid_modes_of
+from femubench.core.modal.sensitivity import eigenvalue_sensitivities as eigenvalue_sensitivities
 from femubench.core.modal.signals import TimeSignals as TimeSignals
 
 __all__ = [name for name in dir() if not name.startswith("_")]

@@ -10,9 +10,9 @@ import pytest
 import femubench
 from femubench import InputError, Model, NotApplicable
 from femubench.core.change.change import parameter_of
-from femubench.core.modal.sensitivity import eigenvalue_sensitivities
 from femubench.core.update.change_lists import check_changes
 from femubench.fem import Place, Support
+from femubench.modal import eigenvalue_sensitivities
 from femubench.update import (
     Changes,
     ModalSpace,

@@ -21,7 +21,6 @@ from femubench.core.inference.model_error import error_slopes, general_slopes
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.prior import Base
 from femubench.core.inference.search import _from_both_sides
-from femubench.core.modal.sensitivity import eigenvalue_sensitivities
 from femubench.core.run.jobs import missing_capability
 from femubench.effect import Parameter
 from femubench.fem import (
@@ -37,7 +36,7 @@ from femubench.fem import (
     Section,
     matrix_model,
 )
-from femubench.modal import GroupPriors
+from femubench.modal import GroupPriors, eigenvalue_sensitivities
 from femubench.plugins.effects.interface_spring import InterfaceSpring
 from femubench.plugins.effects.material import GroupMass, MemberStiffness
 from femubench.plugins.strategies.bayesian import Bayesian

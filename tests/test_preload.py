@@ -32,9 +32,8 @@ from femubench.core.fem.preload import (
     geometric_matrices,
     statics_of,
 )
-from femubench.core.modal.sensitivity import eigenvalue_sensitivities
 from femubench.fem import ModelError, Property, Section, Structure
-from femubench.modal import rigid_modes_of
+from femubench.modal import eigenvalue_sensitivities, rigid_modes_of
 
 STEEL = Material(210e9, 0.3, 7850.0)
 SECTION = Section(A=4e-4, Iy=3e-9, Iz=5e-8, J=2e-9, Jp=5.3e-8)

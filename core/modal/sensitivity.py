@@ -31,6 +31,11 @@ def eigenvalue_sensitivities(
             slopes of the matrices, where they are at hand.
 
     Source: Fox & Kapoor (1968); Horton et al. (1999), equation (2).
+
+    Examples:
+        >>> slopes = modal.eigenvalue_sensitivities(model, modes.take([3, 4]), [stiffness])
+        >>> np.allclose(slopes[:, 0], modes.eigenvalues[[3, 4]])
+        True
     """
     change = matrix_slopes(model, parameters) if isinstance(parameters, Sequence) else parameters
     stiffness, mass = change.quadratic(modes.shapes, modes.shapes)
