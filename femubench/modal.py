@@ -1,9 +1,6 @@
 """Modal analysis: pairing and correlation of modes, expansion, sensitivities, receptances."""
 
-from femubench.core.modal.complex_modes import (
-    out_of_phase as out_of_phase,
-    real_modes as real_modes,
-)
+from femubench.core.modal.complex_modes import real_modes as real_modes
 from femubench.core.modal.correlation import mac as mac
 from femubench.core.modal.expansion import (
     expand_by_dynamics as expand_by_dynamics,

@@ -41,10 +41,6 @@ def out_of_phase(shapes: NDArray[np.complex128]) -> FloatArray:
 
     Arguments:
         shapes: (n_sensors, m); nan where nothing was measured.
-
-    Examples:
-        >>> print(modal.out_of_phase(np.array([[2j, 3 + 0j], [-1j, 0 + 1j]])).round(3))
-        [0.    0.316]
     """
     values = np.nan_to_num(np.asarray(shapes, dtype=np.complex128))
     across = np.linalg.norm((values * np.exp(-1j * mean_phase(values))).imag, axis=0)

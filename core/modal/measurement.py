@@ -9,6 +9,7 @@ import numpy as np
 
 from femubench.core.display import Shown, count_noun
 from femubench.core.fem.sensors import Sensors
+from femubench.core.modal.complex_modes import out_of_phase as out_of_phase_share
 from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.typing import FloatArray, IntArray
 
@@ -50,6 +51,8 @@ class Measurement(Shown):
     assumed: bool = False
     responses: FrequencyResponses | None = None
     out_of_phase: FloatArray | None = None
+
+    phase_loss = staticmethod(out_of_phase_share)
 
     def __len__(self) -> int:
         return len(self.numbers)

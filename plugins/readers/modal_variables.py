@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from femubench import InputError, Measurement, Sensors
-from femubench.modal import out_of_phase, real_modes
+from femubench.modal import real_modes
 from femubench.plugins.readers.reading import DIRECTIONS, words_of
 
 # What a variable may be called, without case and underscores; the first is its key in a case.
@@ -81,7 +81,7 @@ def read_modal(variables: Mapping[str, Any], path: Path, names: Mapping[str, str
         damping=np.full(m, np.nan) if damping is None else damping,
         shapes=np.zeros((0, m)) if shapes is None else real_modes(shapes, align_phase=True),
         shape_std=np.full((n, m), np.nan) if std is None else np.abs(std),
-        out_of_phase=None if shapes is None else out_of_phase(shapes),
+        out_of_phase=None if shapes is None else Measurement.phase_loss(shapes),
     )
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from femubench import InputError, Measurement, Sensors
 from femubench.fem import Outline
-from femubench.modal import FrequencyResponses, TimeSignals, out_of_phase, real_modes
+from femubench.modal import FrequencyResponses, TimeSignals, real_modes
 from femubench.plugins.readers.axes import BASIC, System
 from femubench.plugins.readers.reading import DIRECTIONS, ProgramReader, open_broken
 from femubench.plugins.readers.universal_datasets import Dataset, read_datasets
@@ -313,7 +313,7 @@ def _measurement(path: Path, nodes: Mapping[int, _Node], modes: Sequence[_Mode])
         damping=np.array([mode.damping for mode in modes]),
         shapes=shapes,
         shape_std=np.full(shapes.shape, math.nan),
-        out_of_phase=out_of_phase(complex_shapes),
+        out_of_phase=Measurement.phase_loss(complex_shapes),
     )
 
 
