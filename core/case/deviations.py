@@ -64,10 +64,9 @@ def say_what_phases_lose(measurement: Measurement, file: str) -> list[str]:
         return []
     pairs = zip(lost[large], np.flatnonzero(large), strict=True)
     named = [f"{100.0 * share:.0f} % of mode {measurement.numbers[k]}" for share, k in pairs]
-    more = [f"{len(named) - _MOST_NAMED} more modes"] if len(named) > _MOST_NAMED else []
     return [
         f"{file}: shapes were turned real, and what was out of phase in them is lost: "
-        + f"{', '.join([*named[:_MOST_NAMED], *more])}."
+        + f"{_name_first(named, 'modes')}."
     ]
 
 
@@ -90,8 +89,13 @@ def _sentence(file: str, what: str, shares: FloatArray, of: str) -> str:
 
 def _places(m: Measurement, lows: BoolArray) -> str:
     rows, named = np.flatnonzero(lows.any(axis=1)), []
-    for s in rows[:_MOST_NAMED]:
+    for s in rows:
         modes = ", ".join(str(m.numbers[k]) for k in np.flatnonzero(lows[s]))
         named.append(f"{m.sensors.labels[s]} (mode {modes})")
-    more = [f"{len(rows) - _MOST_NAMED} more sensors"] if len(rows) > _MOST_NAMED else []
-    return "the shape at " + ", ".join([*named, *more])
+    return "the shape at " + _name_first(named, "sensors")
+
+
+def _name_first(named: list[str], what: str) -> str:
+    """Return the first of what is named, and how many more there are."""
+    more = [f"{len(named) - _MOST_NAMED} more {what}"] if len(named) > _MOST_NAMED else []
+    return ", ".join([*named[:_MOST_NAMED], *more])

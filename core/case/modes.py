@@ -13,7 +13,7 @@ from femubench.core.case.tables import PLACES, RESERVED, Complex, CsvTable, read
 from femubench.core.errors import InputError
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.sensors import Sensors
-from femubench.core.modal.complex_modes import out_of_phase, real_modes
+from femubench.core.modal.complex_modes import phase_loss, real_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray
 
@@ -110,7 +110,7 @@ def _shapes(
         if len(measured) and measured.max() < SMALLEST:
             raise row.error("mode", "the shape is zero at every sensor", "a shape, or empty cells")
     real = np.where(complex_modes, real_modes(shapes), shapes.real)
-    return real, std, out_of_phase(shapes) if complex_modes.any() else None
+    return real, std, phase_loss(shapes) if complex_modes.any() else None
 
 
 def with_default_std(shapes: FloatArray, std: FloatArray, share: float) -> FloatArray:

@@ -10,7 +10,7 @@ from femubench.core.display import Shown, count_noun
 from femubench.core.fem.sensors import Sensors
 from femubench.core.identify.complexity import mean_phase_deviation, phase_collinearity
 from femubench.core.identify.lscf import Poles
-from femubench.core.modal.complex_modes import out_of_phase
+from femubench.core.modal.complex_modes import phase_loss
 from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import AnyArray, FloatArray
@@ -99,5 +99,5 @@ class Identification(Shown):
             damping=self.damping,
             shapes=np.asarray(self.shapes.real),
             shape_std=np.sqrt(own + np.maximum(beyond, 0.0)),
-            out_of_phase=out_of_phase(self.shapes),
+            out_of_phase=phase_loss(self.shapes),
         )

@@ -33,7 +33,7 @@ def real_modes(shapes: NDArray[np.complex128], align_phase: bool = False) -> Flo
     return np.asarray(np.abs(values) * np.where(np.isnan(values.real), np.nan, sign))
 
 
-def out_of_phase(shapes: NDArray[np.complex128]) -> FloatArray:
+def phase_loss(shapes: NDArray[np.complex128]) -> FloatArray:
     """Return the share of the norm of every mode that lies across its line, 0 to 0.71, (m,).
 
     It is what turning the mode real loses; 0 of a real mode, whatever its scale. With the modal

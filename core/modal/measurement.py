@@ -9,7 +9,7 @@ import numpy as np
 
 from femubench.core.display import Shown, count_noun
 from femubench.core.fem.sensors import Sensors
-from femubench.core.modal.complex_modes import out_of_phase as out_of_phase_share
+from femubench.core.modal.complex_modes import phase_loss
 from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.typing import FloatArray, IntArray
 
@@ -52,7 +52,7 @@ class Measurement(Shown):
     responses: FrequencyResponses | None = None
     out_of_phase: FloatArray | None = None
 
-    phase_loss = staticmethod(out_of_phase_share)
+    phase_loss = staticmethod(phase_loss)
 
     def __len__(self) -> int:
         return len(self.numbers)
