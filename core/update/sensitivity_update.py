@@ -291,9 +291,10 @@ class Iteration:
         covariance = self.covariance(point)
         if covariance is None:
             return None, None
-        std = np.sqrt(np.diagonal(covariance))
-        if not np.isfinite(covariance).all():
-            return std, None
+        variance = np.diagonal(covariance)
+        if not (np.isfinite(variance) & (variance > 0.0)).all():
+            return None, None  # the end is no maximum of the posterior in every direction
+        std = np.sqrt(variance)
         try:
             even = 0.5 * (covariance + covariance.T)
             return std, Uncertainty.draw(self.model_at, point.q, even)

@@ -71,7 +71,8 @@ class Diagnosed(Strategy):
         every = measurement.select(known)
         budget = budget_of_modes(model, every, known, list_effects()) if known else None
         if budget is None:
-            return UpdateResult(meet(model), diagnostics={"examined": 0.0})
+            count = len(measurement) if self.meet_frequencies else 0
+            return UpdateResult(meet(model), parameter_count=count, diagnostics={"examined": 0.0})
         updated = meet(budget.extended)
         found = Uncertainty.draw(
             lambda x: meet(budget.model_at(x)),
