@@ -111,6 +111,18 @@ def test_complex_modes(tmp_path: Path, phase: float) -> None:
     np.testing.assert_allclose(read.out_of_phase, lost, rtol=1e-3)
 
 
+def test_modal_masses(tmp_path: Path) -> None:
+    eigenvalue = complex(-2.0, 100.0)
+    scaled = {"analysis_type": 3, "eig": eigenvalue, "modal_a": 600j}  # 2 i w_d m
+    both = [mode_55(1, SHAPES[0], modal_m=2.5), mode_55(2, SHAPES[1], **scaled)]
+    read = UniversalReader().read_modes(write(tmp_path / "a.uff", nodes_15(), *both))
+    np.testing.assert_allclose(read.modal_mass, [2.5, 3.0])
+    one = [mode_55(1, SHAPES[0], modal_m=1.0), mode_55(2, SHAPES[1], modal_m=1.0)]
+    for name, datasets in {"b": one, "c": [units(1000.0), *both], "d": modes(*SHAPES)}.items():
+        file = write(tmp_path / f"{name}.uff", nodes_15(), *datasets)
+        assert UniversalReader().read_modes(file).modal_mass is None
+
+
 def test_dataset_2414(tmp_path: Path) -> None:
     datasets = [mode_2414(i + 1, shape) for i, shape in enumerate(SHAPES.tolist())]
     read = UniversalReader().read_modes(write(tmp_path / "a.uff", nodes_15(), *datasets))

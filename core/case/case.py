@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from femubench.core.case.modal_scale import weigh_by_scale
 from femubench.core.display import Shown, count_noun, modes_line
 from femubench.core.fem.alteration import Alteration, alter_model
 from femubench.core.fem.frame import GroundSpring, Place, PointMass
@@ -197,9 +198,10 @@ class Case(Shown):
     def used_measurement(self, seed: int = 0) -> Measurement:
         """Return what a strategy may know: used modes and responses, with noise of a seed but 0.
 
-        Seed 0 is the data as recorded; every other seed is one draw at the stated deviations.
+        Where nobody weighed the structure its mass is what modal masses of these modes say. Seed 0
+        is the data as recorded; every other seed is one draw at the stated deviations.
         """
-        used = self.measurement.select(self.used)
+        used = weigh_by_scale(self.model, self.measurement.select(self.used))
         if self.frfs is not None and self.split is not None:
             used = replace(used, responses=self.split.given(self.frfs))
         if seed == 0:

@@ -9,7 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from femubench.core.case.schema import SMALLEST
-from femubench.core.case.tables import PLACES, RESERVED, Complex, CsvTable, read_table
+from femubench.core.case.tables import (
+    MODAL_MASS,
+    PLACES,
+    RESERVED,
+    Complex,
+    CsvTable,
+    read_table,
+)
 from femubench.core.errors import InputError
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.sensors import Sensors
@@ -32,7 +39,7 @@ def read_modes(
 
     Arguments:
         file: mode,frequency,frequency_std or fit_std,damping and a column a sensor, optionally
-            LABEL_std.
+            modal_mass and LABEL_std.
         sensors: whose labels the columns bear; a sensor without a column was not measured.
         shape_std: deviation of a shape, of the largest reading, where the table gives none.
 
@@ -41,7 +48,7 @@ def read_modes(
     """
     table = read_table(file)
     labels = sensors.labels
-    known = {*RESERVED, FIT_STD}
+    known = {*RESERVED, FIT_STD, MODAL_MASS}
     known.update(name for s in (*labels, *without) for name in (s, f"{s}_std"))
     stated = FIT_STD if FIT_STD in table.columns else "frequency_std"
     more = [column[:60] for column in table.columns if column not in known]
@@ -55,7 +62,7 @@ def read_modes(
         what = f"{len(table.rows)} modes at {len(labels)} sensors are too many numbers"
         raise InputError(what, file=file, expected=f"at most {_MOST_NUMBERS}")
     numbers: dict[int, None] = {}
-    columns: list[tuple[float, float, float]] = []
+    columns: list[tuple[float, ...]] = []
     for row in table.rows:
         number = row.whole("mode")
         if number in numbers or number < 1:
@@ -69,8 +76,10 @@ def read_modes(
         std = row.number(stated, "a number >= 0 in Hz, or nothing", _not_negative)
         std = FREQUENCY_STD * frequency if std is None else std
         ratio = row.number("damping", "a ratio >= 0 and < 1, or nothing", lambda v: 0 <= v < 1)
-        columns.append((frequency, std, np.nan if ratio is None else ratio))
-    frequencies, frequency_std, damping = np.array(columns).T
+        kg = row.number(MODAL_MASS, "a number > 0 in kg, or nothing", lambda v: v >= SMALLEST)
+        rest = (np.nan if cell is None else cell for cell in (ratio, kg))
+        columns.append((frequency, std, *rest))
+    frequencies, frequency_std, damping, modal_mass = np.array(columns).T
     shapes, shape_stds, lost = _shapes(table, labels)
     return Measurement(
         sensors=sensors,
@@ -81,6 +90,7 @@ def read_modes(
         shapes=shapes,
         shape_std=with_default_std(shapes, shape_stds, shape_std),
         out_of_phase=lost,
+        modal_mass=modal_mass if MODAL_MASS in table.columns else None,
     )
 
 

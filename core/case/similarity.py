@@ -131,7 +131,7 @@ def _measurement(measured: Measurement, by: Similarity) -> Measurement:
     sensors, f = measured.sensors, by.frequency
     per_rotation = np.abs(sensors.axes[:, 3:]).sum(axis=1) > 0.0
     readings = np.where(per_rotation, 1.0 / by.length, 1.0)[:, None]
-    weight = measured.total_mass
+    weight, modal = measured.total_mass, measured.modal_mass
     return replace(
         measured,
         sensors=Sensors(sensors.labels, by.length * sensors.xyz, sensors.directions),
@@ -140,6 +140,7 @@ def _measurement(measured: Measurement, by: Similarity) -> Measurement:
         shapes=readings * measured.shapes,
         shape_std=readings * measured.shape_std,
         total_mass=None if weight is None else (by.mass * weight[0], by.mass * weight[1]),
+        modal_mass=None if modal is None else by.mass * modal,
     )
 
 

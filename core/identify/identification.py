@@ -36,6 +36,8 @@ class Identification(Shown):
         spectrum: largest singular value of the spectra in dB by frequency in Hz, where no force
             was measured, (n_f, 2).
         said: how the responses came from records over time; empty where they did not.
+        modal_mass: of the shapes as they are scaled, in kg, (m,); nan where no driven point that
+            moves was read too; None where there is none at all.
     """
 
     sensors: Sensors
@@ -52,6 +54,7 @@ class Identification(Shown):
     synthesised: AnyArray | None = None
     spectrum: FloatArray | None = None
     said: str = ""
+    modal_mass: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.frequencies)
@@ -100,4 +103,5 @@ class Identification(Shown):
             shapes=np.asarray(self.shapes.real),
             shape_std=np.sqrt(own + np.maximum(beyond, 0.0)),
             out_of_phase=phase_loss(self.shapes),
+            modal_mass=self.modal_mass,
         )

@@ -30,6 +30,7 @@ _SAME = 0.01  # relative distance of a pole to the cluster that it comes from
 _FEWEST_LINES = 32
 _ROUNDS = 5
 _WIDTHS, _ALIKE = 3.0, 0.9  # half-widths and MAC within which two poles are one mode
+_SURE = 0.1  # relative deviation of a driven point below which it says a modal mass
 _NO_MODE = "no mode stands out of the noise"
 
 
@@ -210,6 +211,7 @@ def _identification(
         max((c.support for c in clusters if abs(c.pole - pole) < _SAME * abs(pole)), default=0.0)
         for pole in fit.poles[order]
     ]
+    residues = fit.shapes[:, None, order] * fit.participation[:, order]
     return Identification(
         sensors=data.responses,
         frequencies=hz,
@@ -222,8 +224,33 @@ def _identification(
         poles=replace(poles, values=poles.values + data.decay),
         band=(low, high),
         measured=data,
+        modal_mass=_modal_masses(data, residues, s, shapes, shape_std),
         synthesised=predict_responses(fit, lines) * lines.noise[:, None, None],
     )
+
+
+def _modal_masses(
+    data: FrequencyResponses, residues: AnyArray, s: AnyArray, shapes: AnyArray, std: FloatArray
+) -> FloatArray | None:
+    """Return modal masses where a driven point was read too, nan where it is still; or None.
+
+    Arguments:
+        residues: psi_o psi_i / (2 i w_d m) of the receptances, (n_out, n_ref, m).
+        s: poles in rad/s, (m,).
+        shapes, std: scaled, with their deviations, (n_out, m).
+
+    Source: Ewins (2000), Modal Testing, on the modal constants of a point receptance.
+    """
+    labels, forces = data.responses.labels, data.references.labels
+    pairs = [(labels.index(x), i) for i, x in enumerate(forces) if x in labels]
+    pairs = [pair for pair in pairs if np.isfinite(data.values[:, *pair]).all()]
+    if not pairs or data.quantity == "free decay":
+        return None
+    rows, columns = np.transpose(pairs)
+    size, inner = np.abs(shapes[rows]), np.square(shapes[rows].conj())
+    inverse = (inner * 2j * s.imag * residues[rows, columns]).real.sum(axis=0)
+    known = np.linalg.norm(size * std[rows], axis=0) < _SURE * np.square(size).sum(axis=0)
+    return np.where(known & (inverse > 0.0), (size**4).sum(axis=0) / np.abs(inverse), np.nan)
 
 
 def _windowed(fit: ModalModel, lines: Lines, data: FrequencyResponses) -> FloatArray:

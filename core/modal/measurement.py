@@ -37,6 +37,8 @@ class Measurement(Shown):
             where none are given.
         out_of_phase: share of the norm of every shape that was out of phase with the rest of it and
             is lost as it was turned real, (m,); None where none was complex.
+        modal_mass: phi' M phi of every shape as it is scaled here, in kg, (m,); nan where unknown;
+            None where the test gives none.
     """
 
     sensors: Sensors
@@ -51,6 +53,7 @@ class Measurement(Shown):
     assumed: bool = False
     responses: FrequencyResponses | None = None
     out_of_phase: FloatArray | None = None
+    modal_mass: FloatArray | None = None
 
     phase_loss = staticmethod(phase_loss)
 
@@ -63,12 +66,13 @@ class Measurement(Shown):
             ("", f"{count_noun(len(self), 'mode')} at {count_noun(len(self.sensors), 'sensor')}")
         ]
         lost = np.zeros(len(self)) if self.out_of_phase is None else self.out_of_phase
-        for row in zip(
-            self.numbers, self.frequencies, self.frequency_std, self.damping, lost, strict=True
-        ):
+        kg = np.full(len(self), np.nan) if self.modal_mass is None else self.modal_mass
+        own = self.numbers, self.frequencies, self.frequency_std, self.damping, lost, kg
+        for row in zip(*own, strict=True):
             text = f"{row[1]:.6g} Hz, std {row[2]:.2g} Hz"
             text += f", damping {row[3]:.3g}" if np.isfinite(row[3]) else ""
             text += f", {100.0 * row[4]:.2g} % out of phase" if row[4] >= OUT_OF_PHASE else ""
+            text += f", modal mass {row[5]:.3g} kg" if np.isfinite(row[5]) else ""
             found.append((f"mode {row[0]}", text))
         if self.total_mass is not None:
             found.insert(1, ("mass", "{:.6g} kg, std {:.2g} kg".format(*self.total_mass)))
@@ -137,7 +141,7 @@ class Measurement(Shown):
         if missing:
             raise KeyError(f"no measured mode {missing[0]}; there are {list(self.numbers)}")
         columns = [self.numbers.index(number) for number in wanted]
-        correlation, lost = self.frequency_correlation, self.out_of_phase
+        correlation, lost, kg = self.frequency_correlation, self.out_of_phase, self.modal_mass
         return replace(
             self,
             numbers=wanted,
@@ -148,6 +152,7 @@ class Measurement(Shown):
             shape_std=self.shape_std[:, columns],
             frequency_correlation=None if correlation is None else correlation[columns][:, columns],
             out_of_phase=None if lost is None else lost[columns],
+            modal_mass=None if kg is None else kg[columns],
         )
 
     def with_noise(self, rng: np.random.Generator) -> Measurement:

@@ -240,6 +240,7 @@ class _Test:
             "frequencies": frequencies,
             "frequency_std": relative * exact,
             "shapes": shapes,
+            "modal_mass": None,
         }
         if weight is not None:
             own["total_mass"] = (self.weighed, weight[1] / weight[0] * self.weighed)

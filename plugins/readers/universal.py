@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -24,6 +24,7 @@ _HEADER, _TRACES, _ELEMENTS = 151, 82, 2412
 _WANTED = (*_COORDINATES, _UNITS, *_SYSTEMS, *_SHAPES, _HEADER, _TRACES, _ELEMENTS)
 _NORMAL_MODE, _COMPLEX_MODES = 2, (3, 7)
 _MOTIONS = (0, 1, 8, 11, 12)  # unknown, general, displacement, velocity, acceleration
+_DISPLACEMENT = 8
 _MOST_NUMBERS = 20_000_000  # modes times places
 _GLOBAL = (0, 1)  # numbers that writers use for the global axes without defining them
 _DRAWN = (_HEADER, _TRACES, _ELEMENTS)  # of no use to modes, and left out where they are broken
@@ -45,6 +46,7 @@ class _Mode:
     frequency: float
     damping: float
     shape: Mapping[tuple[int, str], complex]
+    mass: float
 
 
 class UniversalReader(ProgramReader):
@@ -101,10 +103,7 @@ def _sensors_and_modes(path: Path, datasets: Sequence[Dataset]) -> Measurement:
         modes = [mode for d in _of(datasets, 55) for mode in _mode_55(path, d, factor)]
         modes = modes or [mode for d in _of(datasets, 2414) for mode in _mode_2414(path, d, factor)]
         if any(mode.number < 1 for mode in modes):
-            modes = [
-                _Mode(i + 1, mode.frequency, mode.damping, mode.shape)
-                for i, mode in enumerate(modes)
-            ]
+            modes = [replace(mode, number=i + 1) for i, mode in enumerate(modes)]
         for number, count in Counter(mode.number for mode in modes).items():
             if count > 1:
                 twice = f"mode {number} is listed twice"
@@ -212,15 +211,20 @@ def _mode_55(path: Path, dataset: Dataset, factor: float) -> Iterator[_Mode]:
     if analysis == _NORMAL_MODE:
         frequency = float(dataset["freq"])
         damping = _ratio(dataset["modal_damp_vis"], dataset["modal_damp_his"])
+        mass = float(dataset["modal_m"])
     else:
         frequency, damping = _from_eigenvalue(complex(dataset["eig"]))
+        mass = _modal_mass(complex(dataset["eig"]), complex(dataset["modal_a"]))
     columns = [dataset[f"r{i + 1}"] for i in range(6) if f"r{i + 1}" in dataset]
     lengths = {len(column) for column in (dataset["node_nums"], *columns)}
     if len(lengths) > 1:
         raise InputError("truncated shape", file=path, key="dataset 55", expected="all nodes")
     rows = np.array(columns, dtype=complex).T
     number = int(dataset["mode_n"])
-    yield _mode(path, "dataset 55", number, frequency, damping, dataset["node_nums"], rows, factor)
+    if dataset["spec_data_type"] != _DISPLACEMENT or factor != 1.0:  # in which unit is not clear
+        mass = 0.0
+    own = number, frequency, damping, mass, dataset["node_nums"], rows, factor
+    yield _mode(path, "dataset 55", *own)
 
 
 def _mode_2414(path: Path, dataset: Dataset, factor: float) -> Iterator[_Mode]:
@@ -244,7 +248,7 @@ def _mode_2414(path: Path, dataset: Dataset, factor: float) -> Iterator[_Mode]:
     rows = values[:, ::2] + 1j * values[:, 1::2] if width > count else values.astype(complex)
     number = int(dataset["record10_field6"])
     nodes = dataset["node_nums"]
-    yield _mode(path, "dataset 2414", number, frequency, damping, nodes, rows, factor)
+    yield _mode(path, "dataset 2414", number, frequency, damping, 0.0, nodes, rows, factor)
 
 
 def _mode(
@@ -253,6 +257,7 @@ def _mode(
     number: int,
     frequency: float,
     damping: float,
+    mass: float,
     nodes: Sequence[int],
     rows: NDArray[np.complex128],
     factor: float,
@@ -270,7 +275,12 @@ def _mode(
         for node, row in zip(nodes, rows, strict=True)
         for direction, value in zip(DIRECTIONS, row, strict=False)
     }
-    return _Mode(number, frequency, damping, shape)
+    return _Mode(number, frequency, damping, shape, mass)
+
+
+def _modal_mass(eigenvalue: complex, modal_a: complex) -> float:
+    """Return the modal mass of a complex mode, whose modal A is 2 i w_d m but for the phase."""
+    return abs(modal_a) / (2.0 * abs(eigenvalue.imag)) if eigenvalue.imag else 0.0
 
 
 def _ratio(viscous: float, hysteretic: float) -> float:
@@ -305,6 +315,9 @@ def _measurement(path: Path, nodes: Mapping[int, _Node], modes: Sequence[_Mode])
     # The complex scale of a mode is arbitrary: residues and velocities come out imaginary.
     shapes = real_modes(complex_shapes, align_phase=True)
     frequencies = np.array([mode.frequency for mode in modes])
+    mass = np.array([mode.mass for mode in modes])
+    # 0 with all modes, or 1, is what programs write that scale nothing.
+    known = bool(((mass > 0.0) & (mass != 1.0) & np.isfinite(mass)).any())
     return Measurement(
         sensors=sensors,
         numbers=tuple(mode.number for mode in modes),
@@ -314,6 +327,7 @@ def _measurement(path: Path, nodes: Mapping[int, _Node], modes: Sequence[_Mode])
         shapes=shapes,
         shape_std=np.full(shapes.shape, math.nan),
         out_of_phase=Measurement.phase_loss(complex_shapes),
+        modal_mass=np.where(mass > 0.0, mass, math.nan) if known else None,
     )
 
 
