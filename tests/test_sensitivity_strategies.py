@@ -12,6 +12,7 @@ from scipy import stats
 
 from femubench import (
     Diverged,
+    InputError,
     Measurement,
     Model,
     NotApplicable,
@@ -25,6 +26,8 @@ from femubench.core.conformance.problems import problem
 from femubench.core.fem.model_parameters import matrix_slopes
 from femubench.core.modal.eigen import count_evaluations
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
+from femubench.core.plugin.loader import load_plugins
+from femubench.core.plugin.options import options_of, with_options
 from femubench.core.update.residuals import Targets, predict
 from femubench.effect import Change
 from femubench.fem import (
@@ -148,6 +151,33 @@ def test_a_budget_of_solutions_ends_with_the_best_point_so_far(hframe_case: Any)
         assert found.diagnostics["converged"] == (most > len(whole.history))
     with pytest.raises(ValueError, match=r"max_solves is -1, not 0 \(no limit\) or more"):
         replace(Local().options, max_solves=-1)
+
+
+START = 4  # solutions for pairs, for a basis of shapes, at the start, and of one step
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("eigensensitivity", "sparse", "multi-start", "eigenvector-difference", "strain-energy"),
+        *("cma-es", "particle-swarm", "physical", "generic-ls", "nobari-rigid", "global"),
+        *("bayesian-sampling", "transitional-mcmc"),
+    ],
+)
+def test_every_strategy_keeps_to_a_budget_of_solutions(hframe_case: Any, name: str) -> None:
+    model, test = hframe_case
+    plugin = load_plugins().strategies[name]
+    (key,) = (key for key in options_of(plugin) if key.endswith("max_solves"))
+    made = []
+    for most in (1, 9, 45):
+        with count_evaluations() as counter:
+            result = with_options(plugin, {key: most}).update(model, test, RNG)
+        assert 0 < counter.count <= max(most, START)
+        assert solve_modes(result.model).elastic.natural_frequencies[0] > 0.0
+        made.append(counter.count)
+    assert made[0] < made[-1]  # more is made of more
+    with pytest.raises(InputError, match="max_solves is -1"):
+        with_options(plugin, {key: -1})
 
 
 def test_every_step_is_equation_4(hframe_case: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -35,9 +36,15 @@ _LOWEST = "lowest modes"
 
 @dataclass(eq=False)
 class Evaluations:
-    """How many eigenvalue solutions were made."""
+    """How many eigenvalue solutions were made, and how many may be; 0 for any number."""
 
     count: int = 0
+    most: int = 0
+
+    @property
+    def left(self) -> int:
+        """Return how many more may be made."""
+        return max(self.most - self.count, 0) if self.most else sys.maxsize
 
 
 _counting: list[Evaluations] = []

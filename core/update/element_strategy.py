@@ -15,7 +15,7 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.update.change_lists import OWN, check_changes, element_sets
 from femubench.core.update.element_families import ElementFamily, Family, GroupFamily, tie_unknowns
 from femubench.core.update.equation_error import update_by_equation_error
-from femubench.core.update.quasi import Expansion, Frequencies
+from femubench.core.update.quasi import ITERATIONS, Expansion, Frequencies
 from femubench.core.update.strategy import Strategy, UpdateResult
 
 
@@ -32,6 +32,7 @@ class ElementStrategy(Strategy):
             model's own, which leaves the measured shapes as the only data.
         changes: `own` for the unknowns of the family; else those of the elements of every one
             of the `members`, `sections`, `materials` or `sets` of the case are tied to each other.
+        max_solves: iterations at most, an eigenvalue solution each; 0 for all five.
 
     Attributes:
         OWN: the word for the unknowns of the family.
@@ -55,6 +56,7 @@ class ElementStrategy(Strategy):
     expansion: Expansion = "rotation"
     frequencies: Frequencies = "measured"
     changes: str = OWN
+    max_solves: int = 0
 
     def __post_init__(self) -> None:
         check_changes(self.changes, parts_alone=True)
@@ -62,6 +64,8 @@ class ElementStrategy(Strategy):
             raise InputError(f"the expansion is rotation or force, not {self.expansion!r}")
         if self.frequencies not in get_args(Frequencies):
             raise InputError(f"the frequencies are measured or nominal, not {self.frequencies!r}")
+        if self.max_solves < 0:
+            raise InputError(f"max_solves is {self.max_solves}", expected="0 (no limit) or more")
 
     @abstractmethod
     def family(self, structure: Structure) -> ElementFamily:
@@ -104,4 +108,5 @@ class ElementStrategy(Strategy):
             keep_rigid=self.keep_rigid,
             expansion=self.expansion,
             frequencies=self.frequencies,
+            iterations=min(self.max_solves or ITERATIONS, ITERATIONS),
         )

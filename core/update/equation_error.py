@@ -320,8 +320,9 @@ def update_by_equation_error(
     keep_rigid: bool = False,
     expansion: Expansion = "rotation",
     frequencies: Frequencies = "measured",
+    iterations: int = ITERATIONS,
 ) -> UpdateResult:
-    """Return the model after five iterations of expansion and solution.
+    """Return the model after five iterations, or fewer, of expansion and solution.
 
     Arguments:
         family: where updated element or group matrices are looked for; with cores they stay
@@ -351,7 +352,7 @@ def update_by_equation_error(
     basis = rigid_basis(model, family, rigid) if keep_rigid else None
     modes = WantedModes(model, measurement, expansion, frequencies)
     current, x, history = model, np.zeros(len(family)), []
-    for _ in range(ITERATIONS):  # mass and zero point stay nominal
+    for _ in range(iterations):  # mass and zero point stay nominal
         a, b, size = equations(model, family, modes.at(current), orthogonality=orthogonality)
         solution = solve_least_change(a, b, family, basis)
         change = np.linalg.norm(solution.x - x) / max(float(np.linalg.norm(solution.x)), 1e-300)

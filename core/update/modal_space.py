@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ from femubench.core.fem.model import Model
 from femubench.core.modal.correlation import find_seen_modes
 from femubench.core.modal.eigen import (
     DENSE_LIMIT,
+    Evaluations,
     Modes,
     count_evaluation,
     enough_modes,
@@ -81,6 +82,7 @@ class ModalSpace:
             leave shapes out.
         scaled: the model's shapes by their share along the measured ones, `length`, or to agree
             with them where these are `largest`.
+        solves: eigenvalue solutions made so far, that of the shapes included.
     """
 
     measurement: Measurement
@@ -92,6 +94,7 @@ class ModalSpace:
     readings: FloatArray
     shape_weight: float
     scaled: str = "length"
+    solves: Evaluations = field(default_factory=Evaluations)
 
     @cached_property
     def spread(self) -> FloatArray:
@@ -120,6 +123,7 @@ class ModalSpace:
             ModelError: when the mass is not positive definite there.
         """
         count_evaluation()
+        self.solves.count += 1
         change = np.tensordot(np.expm1(x[self.parametric.is_property]), self.parts, axes=1)
         stiffness, mass = self.stiffness + change, None
         if len(self.terms):
@@ -279,6 +283,8 @@ class ModalSpace:
         step *= min(1.0, _LONGEST / max(float(np.abs(step).max()), _LONGEST))
         before = fit.cost + penalty(x)
         for halving in range(_HALVINGS):
+            if not self.solves.left:
+                break
             trial = np.clip(x + step / 2**halving, low, high)
             found = self.fit(trial)
             if found.cost + penalty(trial) <= before:
@@ -295,6 +301,7 @@ class ModalSpace:
         scaled: str = "length",
         at: FloatArray | None = None,
         size: int | None = None,
+        max_solves: int = 0,
     ) -> ModalSpace:
         """Return the problem in all elastic modes of a model, or in a few shapes.
 
@@ -307,6 +314,8 @@ class ModalSpace:
             shape_weight, scaled: as of `ModalSpace`.
             at: coordinates where the shapes are taken, (p,); None for the nominal model.
             size: number of shapes at most; None for all, of a large model a hundred.
+            max_solves: eigenvalue solutions at most, after which fits end at the best point so far;
+                the shapes and the start take two in any case. 0 for no limit.
 
         Raises:
             StrategyFailure: when no mode of the model looks like any measured mode.
@@ -345,7 +354,8 @@ class ModalSpace:
             if x.any():
                 {"stiffness": nominal, "mass": mass}[term.matrix][:] -= factor * own
         given = nominal, mass, inner, projected, observer @ basis, shape_weight, scaled
-        space = cls(measurement, parametric, *given)
+        solves = Evaluations(1, max_solves)
+        space = cls(measurement, parametric, *given, solves)
         if space.fit(x, slopes=False).paired == 0:
             raise StrategyFailure("no mode of the model looks like any measured mode")
         return space
@@ -382,7 +392,7 @@ class ModalSpace:
             np.clip(start, middle - _INSIDE * half, middle + _INSIDE * half),
             slope,
             bounds=(low, high),
-            max_nfev=_EVALUATIONS,
+            max_nfev=min(_EVALUATIONS, max(self.solves.left, 1)),
             xtol=_TOLERANCE,
             ftol=_TOLERANCE,
         )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from femubench.core.change.parametric_model import ParametricModel
+from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
 from femubench.core.typing import FloatArray
 from femubench.core.update.change_lists import OWN, Changes, check_changes
@@ -25,15 +26,20 @@ class ParametricStrategy(Strategy):
             `joints`, `sections`, `materials`, `sets` of the case, or `groups` of matrices; an
             effect at its coarsest places, `effect@place` at one; several joined by ``+``; `own` for
             the members of a frame and the groups of matrices.
+        max_solves: eigenvalue solutions at most, after which the best point so far is the answer;
+            0 for no limit. Up to four for the start are made in any case.
     """
 
     needs: ClassVar[frozenset[str]] = frozenset({"parts"})
     promises: ClassVar[frozenset[str]] = frozenset({"rigid-body-modes", "no-negative-eigenvalue"})
 
     changes: str = OWN
+    max_solves: int = 0
 
     def __post_init__(self) -> None:
         check_changes(self.changes)
+        if self.max_solves < 0:
+            raise InputError(f"max_solves is {self.max_solves}", expected="0 (no limit) or more")
 
     def parameterise(self, model: Model) -> ParametricModel:
         """Return the model with what may change of it, each with a prior.

@@ -105,6 +105,7 @@ class Target:
             np.arange(min(partner.max() + 1 + _MORE, len(prediction.modes)))
         )
         rows, kept = [], []
+        self.iteration.solves.count += len(points)
         for q in points:
             try:
                 model = self.iteration.model_at(q)
@@ -220,7 +221,8 @@ def sample_posterior(
     after three rounds widens the likelihood. Where polynomials miss a datum by five times its
     standard deviation, as over the wide priors of supports, no chain is run: the answer is the
     normal approximation about the most probable parameters, at the median of the discrepancy. So
-    it is where they miss by more than a quarter, and the chain is too short. Of such an answer
+    it is where they miss by more than a quarter, and the chain is too short, or where `max_solves`
+    of the options leaves too few solutions for the polynomials. Of such an answer
     ``normal_approximation`` in the diagnostics is 1.
 
     Arguments:
@@ -268,12 +270,15 @@ def sample_posterior(
 
 def _fitted(
     kind: type[_Ensemble | _Transitional], target: Target, rng: np.random.Generator
-) -> tuple[Any, float, bool]:
+) -> tuple[Any, float | None, bool]:
     """Return a sampler after its first steps, the largest error of the polynomials, if too large.
 
-    No sampler where the polynomials are useless.
+    No sampler where the polynomials are useless, or no solutions are left for them.
     """
     count = int(np.ceil(_POINTS * coefficients_of(len(target.centre))))
+    solves = target.iteration.solves
+    if solves.left < 2 * count:
+        return None, None, True
     points, values = target.predict(kind.first(target, rng, count))
     for _ in range(_ROUNDS):
         fit = QuadraticFit.of(points, values)
@@ -285,7 +290,7 @@ def _fitted(
         more, exact = target.predict(drawn[:, :-1])
         off = np.sqrt(np.mean(np.square(fit(more) - exact), axis=0))
         rough = not (off <= _OFF * target.std(drawn[:, -1])).all()
-        if not rough:
+        if not rough or solves.left < count:
             break
         points, values = np.vstack([points, more]), np.vstack([values, exact])
     return sampler, float(off.max()), rough
@@ -451,11 +456,11 @@ def autocorrelation_time(chain: FloatArray) -> float:
     return float(np.max(times))
 
 
-def _normal_result(target: Target, off: float, steps: float = 0.0) -> UpdateResult:
+def _normal_result(target: Target, off: float | None, steps: float = 0.0) -> UpdateResult:
     """Return the most probable model and the normal approximation about it.
 
     Arguments:
-        off: largest error of the polynomials that were tried.
+        off: largest error of the polynomials that were tried; None where none was.
         steps: of a chain that did not settle.
     """
     iteration, point = target.iteration, target.point
@@ -470,7 +475,7 @@ def _normal_result(target: Target, off: float, steps: float = 0.0) -> UpdateResu
             "discrepancy_std": own,
             "steps": steps,
             "normal_approximation": 1.0,
-            "surrogate_error": off,
+            **({} if off is None else {"surrogate_error": off}),
             "paired_modes": float(len(target.measurement)),
         },
         uncertainty=Uncertainty.draw(iteration.model_at, point.q, covariance, discrepancy_std=own),

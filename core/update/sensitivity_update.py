@@ -119,7 +119,7 @@ class Iteration:
         solves: Evaluations | None = None,
     ) -> None:
         self.parametric, self.data, self.options = parametric, data, options
-        self.solves = Evaluations() if solves is None else solves
+        self.solves = solves or Evaluations(most=options.max_solves)
         self.history: list[Mapping[str, float]] = []
         self.beta = 0.0
         self.converged = False
@@ -127,7 +127,7 @@ class Iteration:
     @property
     def spent(self) -> bool:
         """Tell whether no eigenvalue solution is left."""
-        return 0 < self.options.max_solves <= self.solves.count
+        return not self.solves.left
 
     def model_at(self, q: FloatArray) -> Model:
         """Return the model at coordinates, (p,), taken within their limits."""
@@ -372,7 +372,8 @@ def sensitivity_update(
     data: Targets | ResponseTargets | AntiresonanceTargets
     data = Targets(measurement, options.residual, statistical, options.shapes, statistical)
     model = Model.of(source) if isinstance(source, Structure) else source
-    parametric, start, solves = ParametricModel(model, tuple(changes)), None, Evaluations()
+    parametric, start = ParametricModel(model, tuple(changes)), None
+    solves = Evaluations(most=options.max_solves)
     if options.responses or options.antiresonances:
         frequencies = Targets(measurement, "frequency", True)
         start = Iteration(parametric, frequencies, options, solves).run().q

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -35,6 +36,7 @@ class ConstitutiveError(ParametricStrategy):
             those before; 0 for all at once.
         responses: take the given frequency responses in place of the modes: a pair for every line
             and force, K v in equilibrium with the inertia and damping forces of u.
+        max_solves: errors at most, a solution of the model each; a step is finished. 0 for any.
 
     The authors' are the pair, the error and its weight r/(1 - r), zones by their share of it (0.8)
     in turn with corrections, and forced motions with damping; ours: the mass is right, and of
@@ -87,7 +89,8 @@ class ConstitutiveError(ParametricStrategy):
         cost, _, zones = of(parts, measurement, energy, x)
         history, chosen = [{"cost": cost, "zones": 0.0}], np.zeros(len(x), dtype=bool)
         bounds = np.column_stack([parts.lower, parts.upper])
-        while not chosen.all():
+        spare = (self.max_solves or sys.maxsize) - 2  # after the start, and at the end of a round
+        while not chosen.all() and spare > 0:
             left = np.where(chosen, 0.0, zones)
             added = ~chosen & (left >= self.localise * left.max())
             chosen = chosen | added
@@ -104,8 +107,9 @@ class ConstitutiveError(ParametricStrategy):
                 jac=True,
                 method="L-BFGS-B",
                 bounds=bounds[chosen],
-                options=options,
+                options={**options, "maxfun": spare},
             )
+            spare -= found.nfev + 1
             gained = 1.0 - found.fun / cost
             if gained > 0.0:
                 x[chosen] = found.x

@@ -58,7 +58,8 @@ class Eigensensitivity(ParametricStrategy):
             StrategyFailure: when no mode of the model looks like any measured mode.
         """
         parts = self.parameterise(model)
-        space = ModalSpace.of(parts, measurement, shape_weight=self.shape_weight)
+        share, most = self.shape_weight, self.max_solves
+        space = ModalSpace.of(parts, measurement, shape_weight=share, max_solves=most)
         log, fit, history, weight = space.fit_penalised(l_curve_corner, tikhonov, squares=True)
         return self.result(parts, log, history, weight=weight, paired_modes=float(fit.paired))
 

@@ -16,6 +16,10 @@ Cost = Callable[[FloatArray], float]
 Found = tuple[FloatArray, float, list[dict[str, float]]]
 
 
+class _SpentError(Exception):
+    """No eigenvalue solution is left."""
+
+
 @dataclass(frozen=True)
 class GlobalSearch(ParametricStrategy):
     """Base class of searches for the least misfit of frequencies and MAC: override `search`.
@@ -25,8 +29,8 @@ class GlobalSearch(ParametricStrategy):
     reduced basis of the nominal model.
 
     Arguments:
-        changes: as of `ParametricStrategy`.
-        evaluations: costs at most, an eigenvalue solution each.
+        changes, max_solves: as of `ParametricStrategy`.
+        evaluations: costs at most, an eigenvalue solution each; a generation is finished.
         largest: bound of a factor; the least is its inverse.
         shape_weight: of a MAC of 0 against a frequency that is 100 % off; 0 for frequencies alone.
         basis: shapes in the reduced basis.
@@ -47,10 +51,26 @@ class GlobalSearch(ParametricStrategy):
             StrategyFailure: when no mode of the model looks like any measured mode.
         """
         parts = self.parameterise(model)
-        space = ModalSpace.of(parts, measurement, shape_weight=self.shape_weight, size=self.basis)
-        bounds = space.bounds(float(np.log(self.largest)))
-        x, cost, history = self.search(lambda x: space.fit(x, slopes=False).cost, *bounds, rng)
-        return self.result(parts, x, history, cost=cost)
+        weight, most = self.shape_weight, self.max_solves
+        space = ModalSpace.of(
+            parts, measurement, shape_weight=weight, size=self.basis, max_solves=most
+        )
+        low, high = space.bounds(float(np.log(self.largest)))
+        best = [(np.inf, np.clip(np.zeros(len(parts)), low, high))]
+
+        def cost(x: FloatArray) -> float:
+            if not space.solves.left and np.isfinite(best[0][0]):
+                raise _SpentError
+            value = space.fit(x, slopes=False).cost
+            if value < best[0][0]:
+                best[0] = value, x.copy()
+            return value
+
+        try:
+            x, least, history = self.search(cost, low, high, rng)
+        except _SpentError:  # in the midst of a generation
+            (least, x), history = best[0], [{"cost": best[0][0]}]
+        return self.result(parts, x, history, cost=least)
 
     @abstractmethod
     def search(

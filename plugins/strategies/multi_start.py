@@ -11,6 +11,8 @@ import numpy as np
 from femubench import Measurement, Model, UpdateResult
 from femubench.update import ModalSpace, ParametricStrategy
 
+_START = 2  # eigenvalue solutions of a basis before its first fit
+
 
 @dataclass(frozen=True)
 class MultiStart(ParametricStrategy):
@@ -62,16 +64,19 @@ class MultiStart(ParametricStrategy):
         of = partial(
             ModalSpace.of, parts, measurement, shape_weight=weight, scaled=scaled, size=self.basis
         )
-        space = of()
+        space = of(max_solves=self.max_solves)
         low, high = space.bounds(float(np.log(self.largest)))
         cube = LatinHypercube(len(parts), rng=rng).random(self.starts)
         starts = [
             np.zeros(len(parts)),
             *(0.5 * (low + high) + 0.5 * (high - low) * (2.0 * cube - 1.0)),
         ]
-        found = [space.fit_bounded(start, self.largest) for start in starts]
-        best = min(found, key=lambda item: item[1])[0]
-        log, cost = of(at=best).fit_bounded(best, self.largest)
+        solves, found = space.solves, [space.fit_bounded(starts[0], self.largest)]
+        found += [space.fit_bounded(x, self.largest) for x in starts[1:] if solves.left]
+        log, cost = min(found, key=lambda item: item[1])
+        if (left := solves.left) > _START:
+            most = left if self.max_solves else 0
+            log, cost = of(at=log, max_solves=most).fit_bounded(log, self.largest)
         costs = np.array([item[1] for item in found])
         history = tuple({"cost": float(value)} for value in costs)
         near = float(np.mean(costs <= 1.1 * costs.min()))

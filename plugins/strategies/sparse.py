@@ -53,7 +53,7 @@ class Sparse(ParametricStrategy):
             StrategyFailure: when no mode of the model looks like any measured mode.
         """
         parts = self.parameterise(model)
-        space = ModalSpace.of(parts, measurement, shape_weight=0.0)
+        space = ModalSpace.of(parts, measurement, shape_weight=0.0, max_solves=self.max_solves)
         log, _, history, weight = space.fit_penalised(cross_validated_weight, lasso, squares=False)
         changed = float((np.abs(log) > _ZERO).sum())
         return self.result(parts, log, history, weight=weight, changed=changed)

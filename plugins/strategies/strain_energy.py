@@ -70,7 +70,8 @@ class StrainEnergy(ParametricStrategy):
         while len(chosen) > len(measurement) and count > 1:  # an effect may have several values
             count -= 1
             chosen = parts.of([int(j) for j in order[:count]])
-        space = ModalSpace.of(chosen, measurement, shape_weight=self.shape_weight)
+        share, most = self.shape_weight, self.max_solves and max(self.max_solves - 1, 1)
+        space = ModalSpace.of(chosen, measurement, shape_weight=share, max_solves=most)
         log, cost = space.fit_bounded(np.zeros(len(chosen)), _LARGEST)
         return self.result(chosen, log, cost=cost, named=float(len(chosen.changes)))
 
