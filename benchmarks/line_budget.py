@@ -35,7 +35,7 @@ BUDGETS = {
     "core/inference": 3_918,
     "core/library": 2_888,
     "core/look": 1_172,
-    "core/modal": 4_275,
+    "core/modal": 4_279,
     "core/plot": 2_841,
     "core/plugin": 1_863,
     "core/publish": 1_465,

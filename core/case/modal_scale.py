@@ -9,9 +9,8 @@ import numpy as np
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
 from femubench.core.modal.correlation import modal_scale_factor
-from femubench.core.modal.eigen import enough_modes, solve_modes
 from femubench.core.modal.measurement import Measurement
-from femubench.core.modal.pairing import pair_measured
+from femubench.core.modal.pairing import partners_of
 
 _CALIBRATION = 0.05  # of force over motion, which all modes have in common
 _SHAPE = 0.1  # least scatter of ln of the ratio from mode to mode: of what a model's shapes miss
@@ -28,17 +27,16 @@ def weigh_by_scale(model: Model, measurement: Measurement) -> Measurement:
     kg = measurement.modal_mass
     if measurement.total_mass is not None or kg is None:
         return measurement
-    shaped = np.isfinite(kg) & np.isfinite(measurement.shapes).any(axis=0)
     try:
-        modes = solve_modes(model, enough_modes(model, len(measurement)))
+        modes, partner = partners_of(model, measurement)
     except ModelError:
         return measurement
-    readings = np.asarray(model.observe(measurement.sensors) @ modes.shapes)
-    partner = pair_measured(measurement, modes, readings).index
-    there = np.flatnonzero(shaped & (partner >= 0))
+    shaped = np.isfinite(measurement.shapes).any(axis=0)
+    there = np.flatnonzero((partner >= 0) & shaped & np.isfinite(kg))
     if not len(there):
         return measurement
-    scale = modal_scale_factor(measurement.shapes[:, there], readings[:, partner[there]])
+    readings = model.observe(measurement.sensors) @ modes.shapes[:, partner[there]]
+    scale = modal_scale_factor(measurement.shapes[:, there], readings)
     ratios = np.log(kg[there] / np.square(scale))
     scatter = max(float(ratios.std()), _SHAPE) / np.sqrt(len(there))
     mass = model.total_mass * float(np.exp(ratios.mean()))

@@ -129,20 +129,20 @@ def _identification(
             np.median(spread[rows, orders], axis=0)
             for spread in (found.Fn_poles_std, found.Xi_poles_std, found.Phi_poles_std)
         )
-        columns.append((hz[k], ratio[k], shape / scale, *stds))
-    hz, ratio, shapes, hz_std, ratio_std, shape_std = (
-        list(part) for part in zip(*columns, strict=True)
+        columns.append((hz[k], ratio[k], shape / scale, *stds, cluster.support))
+    columns.sort(key=lambda column: column[0])
+    hz, ratio, shapes, hz_std, ratio_std, shape_std, support = map(
+        np.array, zip(*columns, strict=True)
     )
-    order = np.argsort(hz)
     return Identification(
         sensors=measured.sensors,
-        frequencies=np.array(hz)[order],
-        frequency_std=np.array(hz_std)[order],
-        damping=np.array(ratio)[order],
-        damping_std=np.array(ratio_std)[order],
-        shapes=np.array(shapes)[order].T,
-        shape_std=np.array(shape_std)[order].T,
-        support=np.array([cluster.support for cluster in clusters])[order],
+        frequencies=hz,
+        frequency_std=hz_std,
+        damping=ratio,
+        damping_std=ratio_std,
+        shapes=shapes.T,
+        shape_std=shape_std.T,
+        support=support,
         poles=poles,
         band=band,
         spectrum=_spectrum(measured, band),

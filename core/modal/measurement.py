@@ -14,6 +14,10 @@ from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.typing import FloatArray, IntArray
 
 _DAMPING = 0.005  # where none was measured
+_OF_MODES = (
+    *("frequencies", "frequency_std", "damping", "shapes", "shape_std", "out_of_phase"),
+    "modal_mass",
+)
 OUT_OF_PHASE = 0.2  # of a shape: from there on its loss is said
 
 
@@ -141,19 +145,11 @@ class Measurement(Shown):
         if missing:
             raise KeyError(f"no measured mode {missing[0]}; there are {list(self.numbers)}")
         columns = [self.numbers.index(number) for number in wanted]
-        correlation, lost, kg = self.frequency_correlation, self.out_of_phase, self.modal_mass
-        return replace(
-            self,
-            numbers=wanted,
-            frequencies=self.frequencies[columns],
-            frequency_std=self.frequency_std[columns],
-            damping=self.damping[columns],
-            shapes=self.shapes[:, columns],
-            shape_std=self.shape_std[:, columns],
-            frequency_correlation=None if correlation is None else correlation[columns][:, columns],
-            out_of_phase=None if lost is None else lost[columns],
-            modal_mass=None if kg is None else kg[columns],
-        )
+        own = {name: getattr(self, name) for name in _OF_MODES}
+        taken = {name: value[..., columns] for name, value in own.items() if value is not None}
+        if self.frequency_correlation is not None:
+            taken["frequency_correlation"] = self.frequency_correlation[np.ix_(columns, columns)]
+        return replace(self, numbers=wanted, **taken)
 
     def with_noise(self, rng: np.random.Generator) -> Measurement:
         """Return the same modes with one draw of Gaussian noise at their standard deviations."""

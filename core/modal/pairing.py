@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from femubench.core.fem.model import Model
 from femubench.core.modal.correlation import find_seen_modes, mac
-from femubench.core.modal.eigen import Modes
+from femubench.core.modal.eigen import Modes, enough_modes, solve_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray, IntArray
 
@@ -147,3 +148,10 @@ def pair_measured(measurement: Measurement, modes: Modes, readings: FloatArray) 
         np.asarray(readings)[:, elastic],
     )
     return replace(found, index=np.append(elastic, -1)[found.index])
+
+
+def partners_of(model: Model, measurement: Measurement) -> tuple[Modes, IntArray]:
+    """Return enough modes of a model and every measured mode's partner among them, -1 for none."""
+    modes = solve_modes(model, enough_modes(model, len(measurement)))
+    readings = model.observe(measurement.sensors) @ modes.shapes
+    return modes, pair_measured(measurement, modes, readings).index

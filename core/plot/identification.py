@@ -175,14 +175,14 @@ def synthesis(
     if found.measured is None or found.synthesised is None:
         raise InputError("nothing to draw", expected="an identification from frequency responses")
     measured, model = found.measured.values, found.synthesised
+    drawn = measured, model, measured - model
     if channel is None:
         power = np.square(np.abs(measured)).mean(axis=0)
         seen = np.isfinite(power) & (power > 0.0)
         scale = np.sqrt(power[seen])
         label = "mean of all channels, dB"
         levels = [
-            _decibels(np.sqrt(np.square(np.abs(v[:, seen] / scale)).mean(axis=1)))
-            for v in (measured, model, measured - model)
+            _decibels(np.sqrt(np.square(np.abs(v[:, seen] / scale)).mean(axis=1))) for v in drawn
         ]
     else:
         o, i = channel
@@ -190,8 +190,7 @@ def synthesis(
         if not (0 <= o < shape[0] and 0 <= i < shape[1]) or not np.isfinite(measured[0, o, i]):
             raise InputError(f"no channel {channel}", expected=f"one of {shape[0]} x {shape[1]}")
         label = f"{found.measured.quantity}, dB re 1 {_UNITS[found.measured.quantity]}"
-        left = measured[:, o, i] - model[:, o, i]
-        levels = [_decibels(v) for v in (measured[:, o, i], model[:, o, i], left)]
+        levels = [_decibels(v[:, o, i]) for v in drawn]
     ax = own_axes(ax, (7.0, 3.6))
     hz = found.measured.frequencies
     for (name, colour, width, dashes), values in zip(_CURVES, levels, strict=True):

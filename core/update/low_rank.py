@@ -10,8 +10,8 @@ import scipy.linalg as la
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.eigen import DENSE_LIMIT, Modes, keep_modes
 from femubench.core.modal.measurement import Measurement
+from femubench.core.modal.pairing import partners_of
 from femubench.core.update.promise import check_used_modes
-from femubench.core.update.quasi import partners_of
 
 _OUTSIDE = 1e-10  # of a change, what rounding leaves outside the space it acts in
 

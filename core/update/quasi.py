@@ -10,14 +10,14 @@ import scipy.sparse as sp
 
 from femubench.core.errors import NotApplicable, StrategyFailure
 from femubench.core.fem.model import Model
-from femubench.core.modal.eigen import DENSE_LIMIT, Modes, enough_modes, solve_modes
+from femubench.core.modal.eigen import DENSE_LIMIT, Modes
 from femubench.core.modal.expansion import (
     expand_by_dynamics,
     expand_by_rotation,
     find_measured_rows,
 )
 from femubench.core.modal.measurement import Measurement
-from femubench.core.modal.pairing import pair_measured
+from femubench.core.modal.pairing import partners_of
 from femubench.core.typing import FloatArray, IntArray
 
 ITERATIONS = 5  # Ahmadian, Gladwell & Ismail (1997), section 4
@@ -78,13 +78,6 @@ class QuasiModes:
         at_sensors = (model.observe(measurement.sensors) @ full)[rows]
         shapes, _ = expand_by_rotation(measurement.shapes[rows], at_sensors, full)
         return cls(shapes, measurement.eigenvalues, modes.shapes[:, modes.rigid], modes, partners)
-
-
-def partners_of(model: Model, measurement: Measurement) -> tuple[Modes, IntArray]:
-    """Return enough modes of a model and every measured mode's partner among them, -1 for none."""
-    modes = solve_modes(model, enough_modes(model, len(measurement)))
-    readings = model.observe(measurement.sensors) @ modes.shapes
-    return modes, pair_measured(measurement, modes, readings).index
 
 
 def pair_modes_of(model: Model, measurement: Measurement) -> tuple[Modes, IntArray]:

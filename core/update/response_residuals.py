@@ -18,7 +18,6 @@ from femubench.core.modal.antiresonances import (
     find_antiresonances,
     predict_antiresonances,
 )
-from femubench.core.modal.eigen import Modes
 from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.receptances import PredictedResponses
@@ -121,11 +120,6 @@ class ResponsePrediction:
     answer: PredictedResponses
 
     @property
-    def modes(self) -> Modes:
-        """Return its modes, as of `response_modes`."""
-        return self.answer.modes
-
-    @property
     def partner(self) -> IntArray:
         """Return which of its modes belongs to every measured mode; -1 where none does, (m,)."""
         return self.answer.partner
@@ -198,11 +192,6 @@ class AntiresonancePrediction:
     def model(self) -> Model:
         """Return the model."""
         return self.modal.model
-
-    @property
-    def modes(self) -> Modes:
-        """Return its modes, as of `response_modes`."""
-        return self.modal.modes
 
     @property
     def partner(self) -> IntArray:

@@ -214,7 +214,8 @@ def _mode_55(path: Path, dataset: Dataset, factor: float) -> Iterator[_Mode]:
         mass = float(dataset["modal_m"])
     else:
         frequency, damping = _from_eigenvalue(complex(dataset["eig"]))
-        mass = _modal_mass(complex(dataset["eig"]), complex(dataset["modal_a"]))
+        turning = abs(complex(dataset["eig"]).imag)  # modal A is 2 i w_d m but for its phase
+        mass = abs(complex(dataset["modal_a"])) / (2.0 * turning or math.inf)
     columns = [dataset[f"r{i + 1}"] for i in range(6) if f"r{i + 1}" in dataset]
     lengths = {len(column) for column in (dataset["node_nums"], *columns)}
     if len(lengths) > 1:
@@ -276,11 +277,6 @@ def _mode(
         for direction, value in zip(DIRECTIONS, row, strict=False)
     }
     return _Mode(number, frequency, damping, shape, mass)
-
-
-def _modal_mass(eigenvalue: complex, modal_a: complex) -> float:
-    """Return the modal mass of a complex mode, whose modal A is 2 i w_d m but for the phase."""
-    return abs(modal_a) / (2.0 * abs(eigenvalue.imag)) if eigenvalue.imag else 0.0
 
 
 def _ratio(viscous: float, hysteretic: float) -> float:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass
 from typing import ClassVar
 
 from femubench.plugins.strategies.response_function import ResponseFunction
 from femubench.update import UpdateOptions
+
+_OPTIONS = UpdateOptions(residual="frequency", weighting="statistical", antiresonances=True)
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,4 @@ class AntiresonanceFit(ResponseFunction):
         "updating, Mech. Syst. Signal Process. 21, 74-97"
     )
 
-    options: UpdateOptions = field(
-        default_factory=partial(
-            UpdateOptions, residual="frequency", weighting="statistical", antiresonances=True
-        )
-    )
+    options: UpdateOptions = _OPTIONS

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from femubench.plugins.strategies.bayesian import Bayesian
+from femubench.plugins.strategies.response_function import ResponseFunction
 from femubench.update import UpdateOptions
+
+_OPTIONS = replace(ResponseFunction.options, unknown_noise=True, damping=0.0)
 
 
 @dataclass(frozen=True)
@@ -46,13 +48,4 @@ class BayesianResponses(Bayesian):
     needs: ClassVar[frozenset[str]] = Bayesian.needs | {"responses"}
     settings: ClassVar[tuple[str, ...]] = ("joint_std=0.25", "joint_std=1.0")
 
-    options: UpdateOptions = field(
-        default_factory=partial(
-            UpdateOptions,
-            residual="frequency",
-            weighting="statistical",
-            responses=True,
-            unknown_noise=True,
-            damping=0.0,
-        )
-    )
+    options: UpdateOptions = _OPTIONS

@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from dataclasses import dataclass
-from importlib.abc import MetaPathFinder
-from threading import get_ident
 from typing import Any, ClassVar
 from warnings import catch_warnings, simplefilter
 
@@ -16,32 +14,21 @@ from femubench.fem import FloatArray
 from femubench.plugins.strategies.global_search import Cost, Found, GlobalSearch
 
 
-class _Hidden(MetaPathFinder):
-    """Makes a package as if it were not installed, for imports by one thread."""
-
-    def __init__(self, package: str) -> None:
-        self.package, self.thread = package, get_ident()
-
-    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
-        """Find nothing, and let nobody else find the package."""
-        if get_ident() == self.thread and name.partition(".")[0] == self.package:
-            raise ModuleNotFoundError(f"{name} is left out here", name=name)
-
-
 def _cma() -> Any:  # noqa: ANN401 - a module without types
     """Import `cma`, in a worker without its plots: matplotlib takes longer than most updates."""
     if "FEMUBENCH_WORKERS" not in os.environ:  # the caller may want to plot later
         import cma
 
         return cma
-    hidden = _Hidden("matplotlib")
-    sys.meta_path.insert(0, hidden)
+    if missing := "matplotlib" not in sys.modules:
+        sys.modules["matplotlib"] = None  # type: ignore[assignment] # not to be found
     try:
         with catch_warnings():
             simplefilter("ignore")  # "Could not import matplotlib.pyplot"
             import cma
     finally:
-        sys.meta_path.remove(hidden)
+        if missing:
+            del sys.modules["matplotlib"]
     return cma
 
 

@@ -15,9 +15,7 @@ from femubench.update import ModalSpace, ParametricStrategy
 Cost = Callable[[FloatArray], float]
 Found = tuple[FloatArray, float, list[dict[str, float]]]
 
-
-class _SpentError(Exception):
-    """No eigenvalue solution is left."""
+_START = 3  # solutions: the shapes, the nominal model, one more
 
 
 @dataclass(frozen=True)
@@ -51,25 +49,15 @@ class GlobalSearch(ParametricStrategy):
             StrategyFailure: when no mode of the model looks like any measured mode.
         """
         parts = self.parameterise(model)
-        weight, most = self.shape_weight, self.max_solves
+        weight, most = self.shape_weight, self.max_solves and max(self.max_solves, _START)
         space = ModalSpace.of(
             parts, measurement, shape_weight=weight, size=self.basis, max_solves=most
         )
-        low, high = space.bounds(float(np.log(self.largest)))
-        best = [(np.inf, np.clip(np.zeros(len(parts)), low, high))]
 
         def cost(x: FloatArray) -> float:
-            if not space.solves.left and np.isfinite(best[0][0]):
-                raise _SpentError
-            value = space.fit(x, slopes=False).cost
-            if value < best[0][0]:
-                best[0] = value, x.copy()
-            return value
+            return space.fit(x, slopes=False).cost if space.solves.left else np.inf
 
-        try:
-            x, least, history = self.search(cost, low, high, rng)
-        except _SpentError:  # in the midst of a generation
-            (least, x), history = best[0], [{"cost": best[0][0]}]
+        x, least, history = self.search(cost, *space.bounds(float(np.log(self.largest))), rng)
         return self.result(parts, x, history, cost=least)
 
     @abstractmethod

@@ -92,8 +92,7 @@ def response_error(
 
 def _weighted(measurement: Measurement) -> tuple[FloatArray, FloatArray]:
     """Return 1/sigma of the receptances, 0 where there is none, and these times it."""
-    if measurement.responses is None:
-        raise NotApplicable("no frequency responses are given: frfs and responses in the case")
+    assert measurement.responses is not None
     weight = 1.0 / measurement.responses.receptance_std
     known = np.where(weight > 0.0, measurement.responses.receptances, 0.0)
     return weight, weight * known

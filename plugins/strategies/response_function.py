@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass
 from typing import ClassVar
 
 from femubench import Measurement, Model
 from femubench.effect import Change
 from femubench.update import Changes, SensitivityStrategy, UpdateOptions
+
+_OPTIONS = UpdateOptions(residual="frequency", weighting="statistical", responses=True)
 
 
 @dataclass(frozen=True)
@@ -49,11 +50,7 @@ class ResponseFunction(SensitivityStrategy):
     promises: ClassVar[frozenset[str]] = frozenset({"rigid-body-modes", "no-negative-eigenvalue"})
 
     stiffness_std: float = 0.3
-    options: UpdateOptions = field(
-        default_factory=partial(
-            UpdateOptions, residual="frequency", weighting="statistical", responses=True
-        )
-    )
+    options: UpdateOptions = _OPTIONS
 
     def own_changes(self, model: Model, measurement: Measurement) -> tuple[Model, list[Change]]:
         """Return a factor on every member, or on every group of the stiffness."""
