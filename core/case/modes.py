@@ -9,14 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from femubench.core.case.schema import SMALLEST
-from femubench.core.case.tables import (
-    MODAL_MASS,
-    PLACES,
-    RESERVED,
-    Complex,
-    CsvTable,
-    read_table,
-)
+from femubench.core.case.tables import PLACES, RESERVED, Complex, CsvTable, read_table
 from femubench.core.errors import InputError
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.sensors import Sensors
@@ -48,7 +41,7 @@ def read_modes(
     """
     table = read_table(file)
     labels = sensors.labels
-    known = {*RESERVED, FIT_STD, MODAL_MASS}
+    known = {*RESERVED, FIT_STD}
     known.update(name for s in (*labels, *without) for name in (s, f"{s}_std"))
     stated = FIT_STD if FIT_STD in table.columns else "frequency_std"
     more = [column[:60] for column in table.columns if column not in known]
@@ -76,7 +69,7 @@ def read_modes(
         std = row.number(stated, "a number >= 0 in Hz, or nothing", _not_negative)
         std = FREQUENCY_STD * frequency if std is None else std
         ratio = row.number("damping", "a ratio >= 0 and < 1, or nothing", lambda v: 0 <= v < 1)
-        kg = row.number(MODAL_MASS, "a number > 0 in kg, or nothing", lambda v: v >= SMALLEST)
+        kg = row.number(RESERVED[4], "a number > 0 in kg, or nothing", lambda v: v >= SMALLEST)
         rest = (np.nan if cell is None else cell for cell in (ratio, kg))
         columns.append((frequency, std, *rest))
     frequencies, frequency_std, damping, modal_mass = np.array(columns).T
@@ -90,7 +83,7 @@ def read_modes(
         shapes=shapes,
         shape_std=with_default_std(shapes, shape_stds, shape_std),
         out_of_phase=lost,
-        modal_mass=modal_mass if MODAL_MASS in table.columns else None,
+        modal_mass=modal_mass if RESERVED[4] in table.columns else None,
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from femubench.core.case.faults import Misfit, WrongDirection
 from femubench.core.case.frames import Site
 from femubench.core.case.matching import Alignment, Placed, Placement, describe_matches
-from femubench.core.case.tables import MODAL_MASS, RESERVED, CsvRow, parse_place, read_table
+from femubench.core.case.tables import RESERVED, CsvRow, parse_place, read_table
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Vector
 from femubench.core.fem.sensors import Sensors
@@ -38,7 +38,7 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
     rows = [row for row in table.rows if row.cells["label"] not in alignment.without]
     for row in rows:
         label = row.text("label")
-        if label in labels or label in (*RESERVED, MODAL_MASS):
+        if label in labels or label in RESERVED:
             what = f"{label!r} is listed twice" if label in labels else f"{label!r} is reserved"
             raise row.error("label", what, "a label of its own")
         labels[label] = None

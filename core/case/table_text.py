@@ -17,7 +17,7 @@ from femubench.core.case.frame_keys import Keys
 from femubench.core.case.frame_tables import KEYS, columns_of
 from femubench.core.case.modes import reach, with_default_std
 from femubench.core.case.schema import LARGEST, SMALLEST
-from femubench.core.case.tables import MODAL_MASS, RESERVED
+from femubench.core.case.tables import RESERVED
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.measurement import Measurement
 
@@ -84,7 +84,7 @@ def modes_csv(measurement: Measurement, share: float, stated: str = RESERVED[2])
     own = [s for s in range(len(m.sensors)) if np.isfinite(std[s]).any()]
     labels = m.sensors.labels
     known = [] if m.modal_mass is None else [m.modal_mass]
-    header = [*RESERVED[:2], stated, *RESERVED[3:], *(MODAL_MASS for _ in known), *labels]
+    header = [*RESERVED[:2], stated, *RESERVED[3 : 4 + len(known)], *labels]
     header += [f"{labels[s]}_std" for s in own]
     scalars = zip(m.numbers, m.frequencies, m.frequency_std, m.damping, *known, strict=True)
     rows = [

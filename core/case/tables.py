@@ -28,8 +28,7 @@ _COMPLEX = re.compile(rf"\(?(?:({_REAL})(?=[+-]))?({_REAL})[ijIJ]\)?", re.ASCII)
 _DECIMAL = re.compile(r"(?<=\d),(?=\d)", re.ASCII)
 _WHOLE = re.compile(r"\+?\d{1,9}", re.ASCII)
 SUFFIXES = (".csv", ".txt")
-RESERVED = ("mode", "frequency", "frequency_std", "damping")
-MODAL_MASS = "modal_mass"  # column of modes.csv, where a test gives it
+RESERVED = ("mode", "frequency", "frequency_std", "damping", "modal_mass")
 PLACES = (
     "sensors (`bench init --sensors FILE`): a table label,x,y,z,direction, or label,at,direction; "
     "or the whole folder of `bench identify`: --modes FOLDER"

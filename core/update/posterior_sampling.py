@@ -29,7 +29,7 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.neighbour_modes import follow_frequencies
 from femubench.core.typing import BoolArray, FloatArray
 from femubench.core.update.quadratic_fit import QuadraticFit, coefficients_of
-from femubench.core.update.residuals import Targets
+from femubench.core.update.residuals import Prediction, Targets
 from femubench.core.update.sensitivity_update import (
     Iterate,
     Iteration,
@@ -100,6 +100,7 @@ class Target:
     def predict(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return those points that give a model, (n, p), and the logarithms of its data, (n, k)."""
         prediction = self.point.prediction
+        assert isinstance(prediction, Prediction)
         partner = prediction.partner[prediction.partner >= 0]
         modes = prediction.modes.take(
             np.arange(min(partner.max() + 1 + _MORE, len(prediction.modes)))
@@ -270,7 +271,7 @@ def sample_posterior(
 
 def _fitted(
     kind: type[_Ensemble | _Transitional], target: Target, rng: np.random.Generator
-) -> tuple[Any, float | None, bool]:
+) -> tuple[Any, Any, bool]:
     """Return a sampler after its first steps, the largest error of the polynomials, if too large.
 
     No sampler where the polynomials are useless, or no solutions are left for them.

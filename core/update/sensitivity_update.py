@@ -124,11 +124,6 @@ class Iteration:
         self.beta = 0.0
         self.converged = False
 
-    @property
-    def spent(self) -> bool:
-        """Tell whether no eigenvalue solution is left."""
-        return not self.solves.left
-
     def model_at(self, q: FloatArray) -> Model:
         """Return the model at coordinates, (p,), taken within their limits."""
         return self.parametric.at(np.clip(q, self.parametric.lower, self.parametric.upper))
@@ -172,7 +167,7 @@ class Iteration:
         precision = self.parametric.precision
         for halving in range(_HALVINGS + 1):
             q = np.clip(point.q + step / 2**halving, self.parametric.lower, self.parametric.upper)
-            if self.spent or np.abs(q - point.q).max() < _SMALLEST_STEP:
+            if not self.solves.left or np.abs(q - point.q).max() < _SMALLEST_STEP:
                 return None
             try:
                 trial = self.at(q, point.prediction)
@@ -196,7 +191,7 @@ class Iteration:
         self.record(0, point, 0.0)
         point, rng = self.descend(point), np.random.default_rng(0)
         for _ in range(self.options.restarts):
-            if self.spent:
+            if not self.solves.left:
                 break
             point = self.improve(point, rng.standard_normal(len(parametric)))
         self.check(point)
@@ -227,7 +222,7 @@ class Iteration:
             following = self.advance(point, step)
             if following is None:
                 little = problem.promise(step) < _NO_GAIN * problem.cost
-                self.converged = little and not self.spent
+                self.converged = little and self.solves.left > 0
                 break
             moved = float(np.abs(following.q - point.q).max())
             slow = slow + 1 if self.gain(point, following) < self.options.cost_tolerance else 0
@@ -386,7 +381,7 @@ def sensitivity_update(
         rescaled = prediction.data.rescaled(prediction.answer.receptances)
         iteration = Iteration(parametric, rescaled, options, solves)
         point = iteration.run(before)
-        if iteration.spent or np.abs(point.q - before).max() < _SETTLED:
+        if not solves.left or np.abs(point.q - before).max() < _SETTLED:
             break
     std, uncertainty = iteration.estimate_deviations(point)
     return UpdateResult(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -15,6 +17,8 @@ from femubench import InputError, Measurement, Model, NotApplicable, UpdateResul
 from femubench.fem import FloatArray
 from femubench.plugins.strategies.response_error import forced_energy, response_error
 from femubench.update import ParametricModel, ParametricStrategy, expand_measured_shapes
+
+Error = Callable[..., tuple[float, FloatArray, FloatArray]]
 
 _GAIN = 0.05  # of the error: a zone that takes less of it away is the last
 _A_FEW = {"maxiter": 10.0}  # steps of a round, which the next one goes on from
@@ -78,9 +82,11 @@ class ConstitutiveError(ParametricStrategy):
         """
         parts = self.parameterise(model)
         x = np.clip(np.zeros(len(parts)), parts.lower, parts.upper)
-        of, options = self.error, _A_FEW
+        of: Error = self.error
+        options = _A_FEW
         if self.responses:
-            of, options = self.error_of_responses, _TO_THE_END
+            of = partial(response_error, weight=self.confidence / (1.0 - self.confidence))
+            options = _TO_THE_END
             energy = forced_energy(parts, measurement, x)
         else:
             whole = expand_measured_shapes(parts.start, measurement)
@@ -118,16 +124,6 @@ class ConstitutiveError(ParametricStrategy):
             if gained < _GAIN:
                 break
         return self.result(parts, x, history, cost=cost, zones=float(chosen.sum()))
-
-    def error_of_responses(
-        self, parts: ParametricModel, measurement: Measurement, energy: FloatArray, x: FloatArray
-    ) -> tuple[float, FloatArray, FloatArray]:
-        """Return what `error` does, of the frequency responses; energy is that of `forced_energy`.
-
-        Arguments: as of `error`.
-        """
-        weight = self.confidence / (1.0 - self.confidence)
-        return response_error(parts, measurement, energy, x, weight)
 
     def error(
         self, parts: ParametricModel, measurement: Measurement, energy: FloatArray, x: FloatArray

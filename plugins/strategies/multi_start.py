@@ -74,9 +74,8 @@ class MultiStart(ParametricStrategy):
         solves, found = space.solves, [space.fit_bounded(starts[0], self.largest)]
         found += [space.fit_bounded(x, self.largest) for x in starts[1:] if solves.left]
         log, cost = min(found, key=lambda item: item[1])
-        if (left := solves.left) > _START:
-            most = left if self.max_solves else 0
-            log, cost = of(at=log, max_solves=most).fit_bounded(log, self.largest)
+        if solves.left > _START:
+            log, cost = of(at=log, max_solves=solves.left).fit_bounded(log, self.largest)
         costs = np.array([item[1] for item in found])
         history = tuple({"cost": float(value)} for value in costs)
         near = float(np.mean(costs <= 1.1 * costs.min()))
