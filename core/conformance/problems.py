@@ -177,7 +177,7 @@ def _as_groups(problem: UpdatingProblem) -> UpdatingProblem:
     one = structure.with_values([own], [2.0]).matrices()[1] - nominal
     grouped = _as_matrices(problem)
     groups = {"one": one, "others": nominal - one}
-    mass = {name: 0.5 * grouped.model.mass for name in groups}
+    mass = dict.fromkeys(groups, 0.5 * grouped.model.mass)
     return replace(grouped, model=replace(grouped.model, groups=groups, mass_groups=mass))
 
 
