@@ -15,12 +15,12 @@ from femubench.core.fem.group_factors import GROUP
 from femubench.core.fem.mesh import place_xyz
 
 JOINT = "joint-"  # how groups of joints begin
-STIFFNESS, MASS = "member-stiffness", "group-mass"
+STIFFNESS, MASS, BOTH = "member-stiffness", "group-mass", "group-material"
 # Effects of a member -> what scales in its group.
 OF_MEMBER = {
     "local-stiffness-loss": (STIFFNESS,),
-    "member-stiffness": (STIFFNESS, MASS),
-    "wall-thickness": (STIFFNESS, MASS),
+    "member-stiffness": (BOTH, STIFFNESS, MASS),
+    "wall-thickness": (BOTH, STIFFNESS, MASS),
     "member-mass": (MASS,),
 }
 AT_JOINT = ("joint-rotation", "joint-flexibility", "support-flexibility")

@@ -38,7 +38,7 @@ from femubench.fem import (
 )
 from femubench.modal import GroupPriors, eigenvalue_sensitivities
 from femubench.plugins.effects.interface_spring import InterfaceSpring
-from femubench.plugins.effects.material import GroupMass, MemberStiffness
+from femubench.plugins.effects.material import GroupMass, GroupMaterial, MemberStiffness
 from femubench.plugins.strategies.bayesian import Bayesian
 from femubench.plugins.strategies.eigensensitivity import Eigensensitivity
 from femubench.plugins.strategies.factors import Global, Local
@@ -210,6 +210,24 @@ def test_masses_of_groups_change_too() -> None:
     extended = GroupMass().extend(MODEL, "group:half", [0.2])
     assert abs(extended.mass - heavier.mass).max() == 0.0
     assert GroupMass().places(MODEL) == ("group:half",)
+
+
+def test_another_material_scales_the_mass_and_the_stiffness_of_a_part() -> None:
+    """Steel for aluminium: both are three times as large; a joint is of no material."""
+    halves = {"left": MODEL.mass_groups["half"], "foot": MODEL.mass_groups["half"]}
+    model = replace(MODEL, mass_groups=halves)
+    effect = GroupMaterial()
+    assert effect.places(model) == ["group:left"]
+    assert effect.places(replace(model, group_kinds={"left": "joint"})) == []
+    steel = effect.extend(model, "group:left", [1.9, 0.05])
+    assert abs(steel.mass - model.mass - 1.9 * halves["left"]).max() < 1e-12
+    gain = 2.9 * 1.05 - 1.0
+    np.testing.assert_allclose(
+        (steel.stiffness - model.stiffness).todense(), gain * model.groups["left"].todense(),
+        atol=1e-6 * abs(model.stiffness).max(),
+    )  # fmt: skip
+    factors = effect.change(model, "group:left").coefficients(np.array([[1.9, 0.05]]))
+    np.testing.assert_allclose(factors, [[1.9, gain]])
 
 
 def test_slopes_are_those_of_differences() -> None:

@@ -188,10 +188,12 @@ def test_a_truth_of_beams_counts_in_the_groups_of_a_solid_drawing() -> None:
     suite = ROOT / "scenarios" / "suite"
     foot = TrueCause("a soft foot", "support-flexibility", "support:J0")
     water = TrueCause("water", "member-mass", "bar-2")
+    steel = TrueCause("another metal", "member-stiffness", "bar-2")
     clamp = TrueCause("a clamp", "added-mass", "bar-4@0.43", ("added-mass@bar-4@0.5",))
     for cause, right, wrong in (
         (foot, "member-stiffness@group:joint-J0", "member-stiffness@group:bar-1"),
         (water, "group-mass@group:bar-2", "member-stiffness@group:bar-2"),
+        (steel, "group-material@group:bar-2", "group-material@group:bar-1"),
         (clamp, "added-mass@bar-4@0.5", "added-mass@J4"),
     ):
         own = replace(truth("defect", cause), structure="tapered-cantilever")

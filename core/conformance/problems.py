@@ -171,13 +171,13 @@ def _as_matrices(problem: UpdatingProblem) -> UpdatingProblem:
 
 
 def _as_groups(problem: UpdatingProblem) -> UpdatingProblem:
-    """Return a problem with matrices of which one member and the others are groups."""
+    """Return a problem with matrices of which one member and the others are groups, with masses."""
     structure, nominal = problem.model.frame_structure, problem.model.stiffness
     own = Property("E", "E", tuple(m for m in structure.label_index if m.startswith("AB/")))
     one = structure.with_values([own], [2.0]).matrices()[1] - nominal
     grouped = _as_matrices(problem)
     groups = {"one": one, "others": nominal - one}
-    mass = {"half": 0.5 * grouped.model.mass}
+    mass = dict.fromkeys(groups, 0.5 * grouped.model.mass)
     return replace(grouped, model=replace(grouped.model, groups=groups, mass_groups=mass))
 
 

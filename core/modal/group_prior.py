@@ -88,7 +88,8 @@ class GroupPriors:
         """
         if name in self.model.group_priors:
             return float(np.log(self.model.group_priors[name]) / QUARTILE)
-        return self._kind(name).std if matrix == "stiffness" else self._kind(name).mass_std
+        kind = KINDS[self.kind(name)]
+        return kind.std if matrix == "stiffness" else kind.mass_std
 
     def largest_factor(self, name: str) -> float:
         """Return the largest factor on a group that is believed; infinite for most kinds.
@@ -100,11 +101,16 @@ class GroupPriors:
             >>> modal.GroupPriors(model).largest_factor("deck")
             inf
         """
-        return self._kind(name).most
+        return KINDS[self.kind(name)].most
 
-    def _kind(self, name: str) -> GroupKind:
-        held = "support" if name in self.supports else "part"
-        return KINDS[self.model.group_kinds.get(name, held)]
+    def kind(self, name: str) -> str:
+        """Return the kind of a group, a key of `KINDS`: what the case states, else what is found.
+
+        Examples:
+            >>> modal.GroupPriors(model).kind("deck")
+            'part'
+        """
+        return self.model.group_kinds.get(name, "support" if name in self.supports else "part")
 
 
 @cache_by_model

@@ -24,6 +24,7 @@ CLASSES = {
     "member-stiffness": "material:MemberStiffness",
     "member-mass": "material:MemberMass",
     "group-mass": "material:GroupMass",
+    "group-material": "material:GroupMaterial",
     "wall-thickness": "wall_thickness:WallThickness",
     "local-stiffness-loss": "local_stiffness_loss:LocalStiffnessLoss",
     "axial-preload": "axial_preload:AxialPreload",
