@@ -16,7 +16,7 @@ from tests.simulated import modes_at, sensors_along
 
 # What solves equations for the entries or the elements of the matrices has limits of its own.
 OTHERS = ("kabe", "nobari", "generic", "physical")
-CELLS, ELEMENTS = 1, 80
+CELLS, ELEMENTS = 1, 100
 QUICK = ("baruch", "berman")
 
 
