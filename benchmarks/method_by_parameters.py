@@ -61,8 +61,8 @@ def run(store: str) -> pd.DataFrame:
     alike = [n for n in METHODS if isinstance(femubench.strategies[n].base, ParametricStrategy)]
     pairs = [(method, name) for name in SETS for method in METHODS]
     words = [f"{m}:changes={name}" for m, name in pairs if name != "own" or m not in alike]
-    options = femubench.RunOptions(nominal="textbook", resume=True)
-    found = femubench.rank(structures(), words, options, jobs=1, store=store)
+    where = {"jobs": 1, "store": store}
+    found = femubench.rank(structures(), words, nominal="textbook", resume=True, **where)
     rows = [
         {
             "structure": result.case,

@@ -15,7 +15,7 @@ The example of every function starts from these lines:
 >>> frame, properties = structure.frame, structure.properties
 >>> readings = model.observe(measurement.sensors)
 >>> modes = femubench.solve_modes(model)
->>> stiffness = fem.Property("E", "E", update.all_elements(structure))
+>>> stiffness = fem.Property("E", "E", structure.elements)
 >>> joints = update.Joints(structure).groups()
 >>> joint = update.Changes(structure).joint(joints[0])
 >>> nominal, scaled = femubench.strategies["unchanged"], femubench.strategies["global"]
@@ -48,12 +48,10 @@ from femubench.core.version import __version__ as __version__
 _NAMES = {
     "femubench.core.case.case": "Case",
     "femubench.core.diagnosis.result": "Diagnosis",
-    "femubench.core.errors": (
-        "Diverged FemubenchError InputError NotApplicable PluginError StrategyFailure"
-    ),
+    "femubench.core.errors": ("Diverged FemubenchError InputError NotApplicable StrategyFailure"),
     "femubench.core.identify.identification": "Identification",
     "femubench.core.library.cases": "cases effects read_case strategies",
-    "femubench.core.library.challenge": "Challenge challenge score_challenge",
+    "femubench.core.library.challenge": "challenge score_challenge",
     "femubench.core.library.compare": "compare",
     "femubench.core.library.diagnose": "diagnose",
     "femubench.core.library.identify": "identify",
@@ -69,8 +67,7 @@ _NAMES = {
     "femubench.core.modal.eigen": "Modes solve_modes",
     "femubench.core.fem.model": "Model",
     "femubench.core.plugin.markers": "hookimpl",
-    "femubench.core.roles": "Reader Scenario",
-    "femubench.core.schema.run_options": "RunOptions Where",
+    "femubench.core.roles": "Scenario",
     "femubench.core.update.strategy": "ParameterEstimate Strategy UpdateResult",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
@@ -84,7 +81,6 @@ if TYPE_CHECKING:
         FemubenchError as FemubenchError,
         InputError as InputError,
         NotApplicable as NotApplicable,
-        PluginError as PluginError,
         StrategyFailure as StrategyFailure,
     )
     from femubench.core.fem.model import Model as Model
@@ -97,7 +93,6 @@ if TYPE_CHECKING:
         strategies as strategies,
     )
     from femubench.core.library.challenge import (
-        Challenge as Challenge,
         challenge as challenge,
         score_challenge as score_challenge,
     )
@@ -118,8 +113,7 @@ if TYPE_CHECKING:
     from femubench.core.modal.eigen import Modes as Modes, solve_modes as solve_modes
     from femubench.core.modal.measurement import Measurement as Measurement
     from femubench.core.plugin.markers import hookimpl as hookimpl
-    from femubench.core.roles import Reader as Reader, Scenario as Scenario
-    from femubench.core.schema.run_options import RunOptions as RunOptions, Where as Where
+    from femubench.core.roles import Scenario as Scenario
     from femubench.core.update.strategy import (
         ParameterEstimate as ParameterEstimate,
         Strategy as Strategy,

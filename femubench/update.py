@@ -1,15 +1,10 @@
 """Steps that updating strategies share: unknowns, element families, joints, expansion, promises."""
 
-from femubench.core.change.change import (
-    scale_property as scale_property,
-    set_property as set_property,
-)
 from femubench.core.change.parametric_model import ParametricModel as ParametricModel
 from femubench.core.errors import SelfCheckFailed as SelfCheckFailed
 from femubench.core.fem.joints import (
     JointGroup as JointGroup,
     Joints as Joints,
-    all_elements as all_elements,
 )
 from femubench.core.update.change_lists import Changes as Changes
 from femubench.core.update.dynamic import expand_measured_shapes as expand_measured_shapes

@@ -11,15 +11,14 @@ import femubench
 from femubench import InputError, Model, NotApplicable
 from femubench.core.change.change import parameter_of
 from femubench.core.update.change_lists import check_changes
+from femubench.effect import Change
 from femubench.fem import Place, Support
 from femubench.modal import eigenvalue_sensitivities
 from femubench.update import (
     Changes,
     ModalSpace,
     ParametricModel,
-    scale_property,
     sensitivity_update,
-    set_property,
 )
 
 FRAME = femubench.cases["frame"]
@@ -130,15 +129,15 @@ def test_every_strategy_of_the_family_fits_effects_and_sections_together(name: s
 
 
 def test_a_value_that_is_set_moves_in_its_unit_and_keeps_its_sign() -> None:
-    soft = set_property("k", "spring", ("a@B:ry",), 1e4, 1.0, 1e7, unit="N m/rad")
-    signed = set_property("a", "rigid", ("a@B",), -0.02, -0.1, 0.1, unit="m", signed=True)
+    soft = Change.set_property("k", "spring", ("a@B:ry",), 1e4, 1.0, 1e7, unit="N m/rad")
+    signed = Change.set_property("a", "rigid", ("a@B",), -0.02, -0.1, 0.1, unit="m", signed=True)
     assert soft.values(np.array([[np.log(2.0)]]))[0, 0] == pytest.approx(2e4)
     assert signed.values(np.array([[2.0]]))[0, 0] == pytest.approx(0.02)
     assert signed.bounds[0] == pytest.approx([-4.0])
-    both = ParametricModel(FRAME.model, (soft, signed, scale_property("E", "E", ())))
+    both = ParametricModel(FRAME.model, (soft, signed, Change.scale_property("E", "E", ())))
     steps = both.steps(np.array([np.log(2.0), 2.0, 0.3]))
     assert steps == pytest.approx([2e4, 0.02, 1.0])  # a factor counts about its present value
-    factor = scale_property("E", "E", ("rung-middle/1",), prior_std=0.1)
+    factor = Change.scale_property("E", "E", ("rung-middle/1",), prior_std=0.1)
     result = sensitivity_update(FRAME.model, [factor], FRAME.used_measurement())
     assert result.parameters[0].places == ("rung-middle/1",)
 
@@ -182,7 +181,7 @@ def test_masses_of_matrices_and_of_held_frames_have_the_terms_in_them() -> None:
         frame.model.total_mass + kilograms, rel=1e-12
     )
     half = replace(FRAME.model, structure=None, mass_groups={"half": 0.5 * FRAME.model.mass})
-    factor = scale_property("mass", "density", ("group:half",))
+    factor = Change.scale_property("mass", "density", ("group:half",))
     both = ParametricModel(half, (factor, *Changes(half).listed("youngs-modulus")))
     x = np.zeros(len(both))
     x[0] = np.log(1.2)

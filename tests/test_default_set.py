@@ -12,7 +12,8 @@ from printed_boards import assert_same_errors, stored
 
 import femubench
 import femubench.scenarios
-from femubench import InputError, PluginError, Scenario, hookimpl
+from femubench import InputError, Scenario, hookimpl
+from femubench.core.errors import PluginError
 from femubench.core.library.cases import case_folders, read_cases
 from femubench.core.library.rank import plan_run
 from femubench.core.plugin.loader import Plugins, load_plugins

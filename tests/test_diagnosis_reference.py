@@ -79,6 +79,8 @@ def test_the_difference_is_named_where_the_drawing_is_wrong(damaged: tuple[Frame
     (parameter,) = best.parameters
     # What its neighbours lack of the drawing's stiffness changes what the loss does, by a tenth.
     assert parameter.value == pytest.approx(0.5, abs=0.1)
+    # Of the size 12 % may be its own error, not the 30 % of a spring in place of a weld.
+    assert 0.12 < parameter.std / parameter.value < 0.2
 
 
 @pytest.mark.slow(5)

@@ -17,7 +17,7 @@ from femubench.core.typing import AnyArray, FloatArray, SparseArray
 from femubench.effect import Change, ModelPlaces, Parameter
 from femubench.fem import Frame, ModelError, Place, Support
 from femubench.modal import receptance
-from femubench.update import ParametricModel, all_elements, scale_property
+from femubench.update import ParametricModel
 
 FrameBuilder = Callable[..., Frame]
 POINTS = Sensors(
@@ -98,10 +98,10 @@ def changing(ladder: FrameBuilder) -> ParametricModel:
     support = (Support(Place(joint="A"), ("z", "rx", "ry")),)
     model = Model.of(replace(ladder("timoshenko", polar=False), supports=support))
     structure = model.frame_structure
-    every = all_elements(structure)
+    every = structure.elements
     mass = Change.proportional(ModelPlaces(model).mass_term([Place(joint="F")]))
     mass = replace(mass, name="m", parameters=(MASS,))
-    factors = [scale_property(q, q, every[:9]) for q in ("E", "density", "shear", "GJ")]
+    factors = [Change.scale_property(q, q, every[:9]) for q in ("E", "density", "shear", "GJ")]
     return ParametricModel(model, (*factors, mass))
 
 

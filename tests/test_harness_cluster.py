@@ -18,11 +18,12 @@ import psutil
 import pytest
 from running import run_jobs
 
-from femubench import FemubenchError, InputError, Where
+from femubench import FemubenchError, InputError
 from femubench.core import errors
 from femubench.core.run import cluster
 from femubench.core.run.cluster import DaskWorkers, slurm_cluster
 from femubench.core.run.executor import LocalProcesses, open_executor
+from femubench.core.schema.run_options import Where
 from femubench.results import JobResult, Store
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))

@@ -13,13 +13,14 @@ import numpy as np
 import pytest
 from running import run_jobs
 
-from femubench import InputError, Measurement, Model, RunOptions
+from femubench import InputError, Measurement, Model
 from femubench.core.child import workers
 from femubench.core.pace import Advance
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.judging import judge_outcome
 from femubench.core.run.runner import Plan, Receivers
+from femubench.core.schema.run_options import RunOptions
 from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.scoring import reference_of
 from femubench.results import JobResult, Store

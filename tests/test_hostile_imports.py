@@ -17,12 +17,13 @@ import psutil
 import pytest
 from distributions import install_module
 
-from femubench import InputError, PluginError, strategies
+from femubench import InputError, strategies
 from femubench.core.case.reader import read_case
 from femubench.core.child import workers
 from femubench.core.child.guarded_child import Ending
 from femubench.core.child.limits import Limits
 from femubench.core.child.namespaces import Walls
+from femubench.core.errors import PluginError
 from femubench.core.plugin import apart, loader
 from femubench.core.plugin.foreign import ForeignStrategy, doc_of
 from femubench.core.plugin.loader import Plugins, load_plugins

@@ -19,7 +19,7 @@ from numpy.testing import assert_allclose
 import femubench
 import femubench.papers
 from femubench.core.display import LINES, WIDTH
-from femubench.core.schema.run_options import split_keywords
+from femubench.core.schema.run_options import RunOptions, Where, split_keywords
 from femubench.core.score.repeatability import result_differences
 from tests.command import call_bench, run_python
 from tests.frf_problems import frf_set, write_universal
@@ -345,14 +345,12 @@ class TestLooks:
 
 
 class TestOptionsOfARun:
-    def test_a_keyword_overrules_what_is_given_for_several_calls(self) -> None:
-        options = femubench.RunOptions(seeds=2, timeout=60.0, timeouts={"local": 5.0})
+    def test_keywords_are_options_of_a_run_or_where_it_is_computed(self) -> None:
         keywords = {"seeds": [3, 4], "timeout": None, "twins": (2, 7), "jobs": 3}
-        given, where = split_keywords(keywords, options, femubench.Where(1, sandbox="off"))
-        assert where == femubench.Where(3, sandbox="off")
-        own = {"seeds": (3, 4), "timeout": 60.0, "timeouts": {"local": 5.0}}
-        assert given == {**own, "twins": 2, "twin_seed": 7}
-        assert femubench.RunOptions(**given).all_seeds == (3, 4)
+        given, where = split_keywords(keywords)
+        assert where == Where(3)
+        assert given == {"seeds": (3, 4), "twins": 2, "twin_seed": 7}
+        assert RunOptions(**given).all_seeds == (3, 4)
 
     def test_no_other_keyword(self) -> None:
         with pytest.raises(TypeError, match="unexpected keyword argument 'sedes'"):

@@ -18,7 +18,6 @@ from distributions import install_metadata
 from femubench import (
     Measurement,
     Model,
-    PluginError,
     Scenario,
     Strategy,
     UpdateResult,
@@ -27,6 +26,7 @@ from femubench import (
 )
 from femubench.core import roles
 from femubench.core.case.reader import read_case
+from femubench.core.errors import PluginError
 from femubench.core.plugin import hookspecs
 from femubench.core.plugin.importing import HOOKS
 from femubench.core.plugin.loader import Plugins, load_plugins

@@ -14,12 +14,13 @@ from distributions import install_module
 from response_problems import DAMPING, simulate, simulated_case
 
 import femubench
-from femubench import NotApplicable, RunOptions
+from femubench import NotApplicable
 from femubench.core.case.writing import write_case
 from femubench.core.library.rank import plan_run
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.run.jobs import Job, execute
 from femubench.core.schema.records import run_from_json, run_to_json
+from femubench.core.schema.run_options import RunOptions
 from femubench.core.score.responses import score_responses
 from femubench.core.update.response_residuals import ResponseTargets
 from femubench.core.update.sensitivity_update import Iteration

@@ -50,8 +50,6 @@ from femubench.update import (
     Changes,
     Joints,
     UpdateOptions,
-    all_elements,
-    scale_property,
     sensitivity_update,
 )
 from tests.simulated import modes_at
@@ -287,12 +285,12 @@ def test_frequencies_alone_will_do(hframe_case: Any) -> None:
 
 def test_an_optimum_out_of_range_is_a_divergence(hframe_case: Any) -> None:
     model, data = hframe_case
-    every = all_elements(model.frame_structure)
+    every = model.frame_structure.elements
     limits = {"lower": 0.95, "upper": 1.05}
-    narrow = scale_property("EI all members", "EI", every, fatal=True, **limits)
+    narrow = Change.scale_property("EI all members", "EI", every, fatal=True, **limits)
     with pytest.raises(Diverged, match=r"EI all members left its range 0\.95\.\.1\.05"):
         sensitivity_update(model.frame_structure, [narrow], data)
-    soft = scale_property("EI all members", "EI", every, **limits)
+    soft = Change.scale_property("EI all members", "EI", every, **limits)
     result = sensitivity_update(model.frame_structure, [soft], data)
     assert result.parameters[0].after == pytest.approx(0.95)
 
@@ -306,7 +304,7 @@ def test_no_more_parameters_than_frequencies(hframe_case: Any) -> None:
     assert [p.name for p in one.parameters] == ["EI at all"]
 
     def some(name: str) -> Change:
-        return scale_property(name, "EI", ())
+        return Change.scale_property(name, "EI", ())
 
     levels = [[some("a"), some("b")], [], [some("c"), some("d")], [some("e")]]
     counts = {n: [change.name for change in Changes.determined(levels, n)] for n in (1, 2, 3, 4, 9)}

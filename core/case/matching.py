@@ -253,6 +253,11 @@ class Placement:
             sizes = f"{size_of(self.every):.3g} as they stand, the structure {self.size:.3g} m"
             question = "is it the right model, or is one of the units wrong?"
             found = f"no unit, axes or origin fit: the sensors span {sizes}: {question}"
+            if len(self.every) == 1:
+                options = "`bench init --unit`, `--frame`, `--origin` or a larger `--tolerance`"
+                found = (
+                    f"one place alone shows neither unit, axes nor origin: say it with {options}"
+                )
             return Misfit(what, f"{expected}; {found}")
         alike = [fit for fit in fits if fit.kind == fits[0].kind]
         near = _AS_WELL * min(fit.gap for fit in alike) + ON_MEMBER

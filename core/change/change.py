@@ -108,6 +108,82 @@ class Change:
         count = len(terms)
         return cls(terms, lambda values: np.repeat(values[:, :1] - neutral, count, axis=1))
 
+    @classmethod
+    def scale_property(
+        cls,
+        name: str,
+        quantity: str,
+        places: Sequence[str],
+        *,
+        prior_std: float | None = None,
+        lower: float = 0.05,
+        upper: float = 20.0,
+        fatal: bool = False,
+    ) -> Change:
+        """Return a factor on a property of elements or groups.
+
+        Arguments:
+            name: for tables.
+            quantity: what is multiplied, a key of `fem.parameters.QUANTITIES`.
+            places: ``member/k`` for elements, ``group:NAME`` or ``all`` of matrices.
+            prior_std: standard deviation of the logarithm; None where nothing is known.
+            lower, upper: limits of the factor.
+            fatal: whether an optimum at a limit is a divergence rather than a result.
+
+        Examples:
+            >>> effect.Change.scale_property("E", "E", ("rung-right/1",)).parameters[0].neutral
+            1.0
+        """
+        return cls.set_property(
+            *(name, quantity, places, 1.0, lower, upper), prior_std=prior_std, fatal=fatal, unit=""
+        )
+
+    @classmethod
+    def set_property(
+        cls,
+        name: str,
+        quantity: str,
+        places: Sequence[str],
+        start: float,
+        lower: float,
+        upper: float,
+        *,
+        unit: str,
+        signed: bool = False,
+        prior_std: float | None = None,
+        fatal: bool = False,
+    ) -> Change:
+        """Return a property of member ends that is set: a spring's stiffness or a rigid length.
+
+        Arguments:
+            name, quantity, prior_std, fatal: as in `scale_property`.
+            places: ``member@joint`` for rigid lengths, ``member@joint:direction`` for springs.
+            start: the value that the model has.
+            lower, upper: limits of the value.
+            unit: of the value.
+            signed: whether it may change its sign; it then moves by multiples of |start|, else by
+                factors, so that it stays positive.
+
+        Examples:
+            >>> given = ("a@B:ry",), 1e4, 1.0, 1e7
+            >>> soft = effect.Change.set_property("k", "spring", *given, unit="N m/rad")
+            >>> float(soft.parameters[0].value(np.log(2.0)))
+            20000.0
+        """
+        own = Parameter(
+            name,
+            unit,
+            abs(start) if signed else 1.0,
+            start,
+            lower,
+            upper,
+            "linear" if signed else "log",
+            std=np.inf if prior_std is None else prior_std,
+            reach=np.inf,
+            fatal=fatal,
+        )
+        return cls(name=name, places=tuple(places), parameters=(own,), quantity=quantity)
+
 
 def parameter_of(parameter: EffectParameter) -> Parameter:
     """Return a parameter that any class may play as one of ours."""
@@ -116,76 +192,3 @@ def parameter_of(parameter: EffectParameter) -> Parameter:
     p = parameter
     given = p.name, p.unit, p.scale, p.neutral, p.lower, p.upper, p.scaling, p.one_sided
     return Parameter(*given, p.textbook, p.wording)
-
-
-def scale_property(
-    name: str,
-    quantity: str,
-    places: Sequence[str],
-    *,
-    prior_std: float | None = None,
-    lower: float = 0.05,
-    upper: float = 20.0,
-    fatal: bool = False,
-) -> Change:
-    """Return a factor on a property of elements or groups.
-
-    Arguments:
-        name: for tables.
-        quantity: what is multiplied, a key of `fem.parameters.QUANTITIES`.
-        places: ``member/k`` for elements, ``group:NAME`` or ``all`` of matrices.
-        prior_std: standard deviation of the logarithm; None where nothing is known.
-        lower, upper: limits of the factor.
-        fatal: whether an optimum at a limit is a divergence rather than a result.
-
-    Examples:
-        >>> update.scale_property("E", "E", ("rung-right/1",)).parameters[0].neutral
-        1.0
-    """
-    return set_property(
-        *(name, quantity, places, 1.0, lower, upper), prior_std=prior_std, fatal=fatal, unit=""
-    )
-
-
-def set_property(
-    name: str,
-    quantity: str,
-    places: Sequence[str],
-    start: float,
-    lower: float,
-    upper: float,
-    *,
-    unit: str,
-    signed: bool = False,
-    prior_std: float | None = None,
-    fatal: bool = False,
-) -> Change:
-    """Return a property of member ends that is set: a spring's stiffness or a rigid length.
-
-    Arguments:
-        name, quantity, prior_std, fatal: as in `scale_property`.
-        places: ``member@joint`` for rigid lengths, ``member@joint:direction`` for springs.
-        start: the value that the model has.
-        lower, upper: limits of the value.
-        unit: of the value.
-        signed: whether it may change its sign; it then moves by multiples of |start|, else by
-            factors, so that it stays positive.
-
-    Examples:
-        >>> soft = update.set_property("k", "spring", ("a@B:ry",), 1e4, 1.0, 1e7, unit="N m/rad")
-        >>> float(soft.parameters[0].value(np.log(2.0)))
-        20000.0
-    """
-    own = Parameter(
-        name,
-        unit,
-        abs(start) if signed else 1.0,
-        start,
-        lower,
-        upper,
-        "linear" if signed else "log",
-        std=np.inf if prior_std is None else prior_std,
-        reach=np.inf,
-        fatal=fatal,
-    )
-    return Change(name=name, places=tuple(places), parameters=(own,), quantity=quantity)

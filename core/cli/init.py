@@ -9,6 +9,7 @@ import click
 
 from femubench.core.cli import options
 from femubench.core.cli.registry import plugins_for, wrap_text
+from femubench.core.display import count_noun
 from femubench.core.errors import ModelError
 
 if TYPE_CHECKING:
@@ -109,8 +110,9 @@ def _show_match(case: Case) -> None:
         click.echo(wrap_text(f"Note: {note}", hanging=2))
     if case.matches:
         far = max(case.matches, key=lambda match: match.distance)
-        text = f"{len(case.matches)} sensors matched; furthest from its place is {far.sensor}, "
-        click.echo(wrap_text(f"{text}{far.distance:.3g} m from {far.place}.", hanging=2))
+        text = f"{count_noun(len(case.matches), 'sensor')} matched; furthest from its place is "
+        text += f"{far.sensor}, {far.distance:.3g} m from {far.place}."
+        click.echo(wrap_text(text, hanging=2))
     try:
         pairs = predict_block(case.model, case.measurement, None)
     except ModelError as error:

@@ -137,10 +137,6 @@ def is_given(ctx: click.Context, name: str) -> bool:
     return ctx.get_parameter_source(name) is not ParameterSource.DEFAULT
 
 
-_csv_file = click.option(
-    "--csv", "csv_file", type=OUTPUT, metavar="FILE", help="Write one line per job as CSV."
-)
-
 _report_file = click.option(
     "--report", "report_file", type=OUTPUT, metavar="FILE",
     help="Write the report there; its suffix decides the format. Default: RUN.html and "
@@ -156,7 +152,7 @@ def of_jobs(json: str) -> Option:
     """
     where = of_fields(Where, "jobs", "scheduler", "cluster", "sandbox")
     limits = of_fields(RunOptions, "timeouts", "memory")
-    files = (json_file(json), _csv_file, store("Keep results there."), _report_file, quiet)
+    files = (json_file(json), store("Keep results there."), _report_file, quiet)
 
     def with_all(command: Callable[..., Any]) -> Callable[..., Any]:
         for option in reversed((where, limits, *files)):

@@ -44,7 +44,7 @@ class RunOutput:
         from femubench.core.library.report import reporter, reporter_for
 
         files: dict[Path, Reporter] = {}
-        for key, name in (("json_file", "json"), ("csv_file", "csv"), ("report_file", None)):
+        for key, name in (("json_file", "json"), ("report_file", None)):
             path = ctx.params[key]
             if path is None:
                 continue

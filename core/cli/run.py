@@ -16,7 +16,7 @@ from femubench.core.cli import options
 from femubench.core.cli.outputs import RunOutput
 from femubench.core.cli.registry import plugins_for, wrap_text
 from femubench.core.display import count_noun
-from femubench.core.errors import InputError, PluginError
+from femubench.core.errors import InputError
 from femubench.core.library.cases import LEFT_OUT, case_folders
 from femubench.core.plugin.validation import choose_names
 from femubench.core.schema.quantities import say_duration
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # Words that would make a run another one.
 _FIXED = (
-    *("cases", "strategies", "seeds", "seed", "nominal", "drawing", "twins"),
+    *("cases", "strategies", "seeds", "nominal", "drawing", "twins"),
     *("timeouts", "memory", "resume", "overwrite"),
 )
 
@@ -42,14 +42,11 @@ _FIXED = (
     "-s", "--strategy", "strategies", multiple=True, metavar="STRATEGY",
     help="Run this strategy, or STRATEGY:OPTION=VALUE,...; may be repeated. Default: all.",
 )  # fmt: skip
-@options.of_fields(
-    RunOptions, "seeds", "seed", "nominal", "drawing", "twins", "resume", "overwrite"
-)
+@options.of_fields(RunOptions, "seeds", "nominal", "drawing", "twins", "resume", "overwrite")
 @click.option(
     "--locked", metavar="RUN",
     help="Repeat a stored run and report differences; exit 1 if a result differs.",
 )  # fmt: skip
-@click.option("--strict-plugins", is_flag=True, help="Stop with exit code 2 if a plugin is broken.")
 @options.of_jobs("Write the results as JSON.")
 @click.pass_context
 def run(
@@ -91,8 +88,6 @@ def run(
 def _checked(ctx: click.Context, cases: Iterable[str], strategies: Iterable[str]) -> Plugins:
     """Return the plugins; words are known to be right before what runs them is loaded."""
     plugins = plugins_for(ctx)
-    if ctx.params["strict_plugins"] and plugins.broken:
-        raise PluginError(f"{count_noun(len(plugins.broken), 'fault')} in plugins, see above")
     choose_names("strategy", (word.partition(":")[0] for word in strategies), plugins.strategies)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
@@ -114,7 +109,7 @@ def _going_on(ctx: click.Context) -> tuple[Sequence[str], Sequence[str]]:
     alone = not ctx.params["cases"] and not ctx.params["strategies"]
     return ("--resume",), (
         "--overwrite",
-        *(("--seeds", "--seed", "--nominal", "--drawing", "--twins") if alone else ()),
+        *(("--seeds", "--nominal", "--drawing", "--twins") if alone else ()),
     )
 
 

@@ -63,7 +63,7 @@ def residual_rows(before: State, after: State) -> tuple[ResidualRow, ...]:
 
 
 def _causes_in(
-    explanation: Explanation, earned: frozenset[str], spread: FloatArray, own: float
+    explanation: Explanation, earned: frozenset[str], spread: FloatArray, own: tuple[float, ...]
 ) -> list[Cause]:
     """Return the causes of an explanation, taken as sure, with values and deviations.
 
@@ -71,7 +71,7 @@ def _causes_in(
         explanation: fitted.
         earned: textbook effects that are part of the name.
         spread: standard deviations of the coordinates, (k,).
-        own: share of what a cause changes by which it is itself in error.
+        own: share of a size by which it is in error, and of a spring's where the drawing is rigid.
     """
     causes = []
     book = {part.hypothesis.name: part.hypothesis for part in explanation.base.parts}
@@ -88,8 +88,9 @@ def _causes_in(
         fitted = []
         for i, parameter in enumerate(h.parameters, start=start):
             value = float(parameter.value(np.array(x[i])))
-            moved = value - parameter.neutral if np.isfinite(parameter.neutral) else value
-            std = float(np.hypot(spread[i] * _slope(parameter, float(x[i])), own * moved))
+            rigid = not np.isfinite(parameter.neutral)
+            moved = own[rigid] * (value if rigid else value - parameter.neutral)
+            std = float(np.hypot(spread[i] * _slope(parameter, float(x[i])), moved))
             if h.name in book and parameter.neutral == 0.0:
                 # A relative change on top of the textbook's: what matters is the product.
                 textbook = 1.0 + float(book[h.name].parameters[i - start].textbook or 0.0)
@@ -152,8 +153,9 @@ def list_causes(
     """
     posterior = examination.posterior
     spread = find_spread(posterior, explanation)
-    own = examination.own_error(explanation.fit.state)
-    passengers = find_passengers(explanation.fit.state, spread)
+    state = explanation.fit.state
+    own = tuple(examination.own_error(state, rigid=rigid) for rigid in (False, True))
+    passengers = find_passengers(state, spread)
     causes = _causes_in(explanation, posterior.earned, spread, own)
     first = len(causes) - len(explanation.parts)
     tied = _tied(posterior, explanation)

@@ -108,16 +108,6 @@ def joint_groups(frame: Frame, *, merged: bool = False) -> tuple[JointGroup, ...
     return tuple(JointGroup(kind, role, tuple(ends)) for (kind, role), ends in found.items())
 
 
-def all_elements(structure: Structure) -> tuple[str, ...]:
-    """Return the label of every element that is no arm of a joint.
-
-    Examples:
-        >>> update.all_elements(structure)[:3]
-        ('rung-right/1', 'rung-right/2', 'rung-right/3')
-    """
-    return tuple(dict.fromkeys(label for label in structure.labels if label))
-
-
 def place_words(structure: Structure | None, places: Sequence[str]) -> str:
     """Return places as one text, ``; `` between them: whole members and the whole frame as such.
 
@@ -127,7 +117,7 @@ def place_words(structure: Structure | None, places: Sequence[str]) -> str:
     """
     wanted = dict.fromkeys(places)
     if structure is not None and len(wanted) > 1:
-        every = all_elements(structure)
+        every = structure.elements
         if wanted.keys() >= set(every):
             return "all"
         members: dict[str, list[str]] = {}

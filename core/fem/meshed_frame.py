@@ -124,6 +124,11 @@ class MeshedFrame:
         pairs = zip(self.mesh.member, self.mesh.number, arms, strict=True)
         return tuple("" if arm else f"{names[m]}/{k}" for m, k, arm in pairs)
 
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """Return the label of every element that is no arm of a joint."""
+        return tuple(dict.fromkeys(label for label in self.labels if label))
+
     @cached_property
     def spring_labels(self) -> tuple[str, ...]:
         """Return ``member@joint:direction`` of every joint spring."""

@@ -52,7 +52,8 @@ def identify_signals(
         what = f"{len(measured.values)} samples" if short else "a sensor that never moves"
         raise InputError(what, expected=f"{_FEWEST} samples or more, all sensors alive")
     if measured.values.shape[1] < 2:
-        expected = "two or more in one file, since shapes tell modes from noise, or a force"
+        expected = "two or more in one file, since shapes tell modes from noise, or a force: "
+        expected += "`bench identify --variables force=NAME`, `--excitation decay` if it dies out"
         raise InputError("one sensor alone over time", expected=expected)
     found = _subspaces(measured, most_order)
     rows, orders = np.nonzero(np.isfinite(found.Fn_poles) & (found.Fn_poles > 0.0))

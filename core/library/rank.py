@@ -35,7 +35,6 @@ from femubench.core.schema.run_options import (
     MOST_TWINS,
     RunKeywords,
     RunOptions,
-    Where,
     check_keywords,
     split_keywords,
 )
@@ -198,8 +197,6 @@ class Run(results.RunData):
 def rank(
     cases: CaseLike | Iterable[CaseLike] = (),
     strategies: StrategyLike | Iterable[StrategyLike] = (),
-    options: RunOptions | None = None,
-    where: Where | None = None,
     *,
     store: Store | str | PathLike[str] | None = None,
     progress: Progress | None = None,
@@ -211,10 +208,9 @@ def rank(
         cases: names, folders or `Case`s; the default set where there is none.
         strategies: names (``"NAME:OPTION=VALUE"`` with options), ``strategies[NAME](...)``,
             classes or instances, also of a notebook; all that are installed where there is none.
-        options, where: what is computed, and where; a keyword overrules them.
         store: folder that keeps the results.
         progress: called with (result, jobs done, jobs in all).
-        keywords: what `RunOptions` and `Where` have: ``seeds``, ``seed``, ``nominal``,
+        keywords: what is computed, and where: ``seeds``, ``seed``, ``nominal``,
             ``drawing``, ``twins`` (a number, or that and a seed), ``resume``, ``overwrite``,
             ``timeout``, ``timeouts``, ``memory``; ``jobs``, ``scheduler``, ``cluster``,
             ``sandbox``.
@@ -225,12 +221,11 @@ def rank(
     Examples:
         >>> femubench.rank(case, [nominal, scaled]).leaderboard["gain"].round(2).tolist()
         [0.0, -0.14]
-        >>> quick = femubench.RunOptions(nominal="drawn", timeout=60.0)
-        >>> len(femubench.rank(case, nominal, quick, jobs=1).results)
+        >>> len(femubench.rank(case, nominal, nominal="drawn", timeout=60.0, jobs=1).results)
         1
     """
     check_keywords(keywords, RunKeywords)
-    given, place = split_keywords(keywords, options, where)
+    given, place = split_keywords(keywords)
     kept = None if store is None else store_in(store)
     plan = plan_run(cases, strategies, usable_plugins(), given, kept)
     with open_executor(place) as executor:

@@ -25,7 +25,7 @@ from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
 from femubench.core.schema.records import MOST_RESULTS
 from femubench.core.schema.results import DONE, NOMINALS
-from femubench.core.schema.run_options import StudyKeywords, Where, check_keywords, split_keywords
+from femubench.core.schema.run_options import StudyKeywords, check_keywords, split_keywords
 from femubench.core.score.scoring import reference_of
 from femubench.core.study.axes import CaseConditions, OptionSet, StudyAxes
 from femubench.core.study.conditions import vary_case
@@ -82,7 +82,6 @@ class StudyPlan(Plan):
 
 def study(
     file: str | PathLike[str],
-    where: Where | None = None,
     *,
     store: Store | str | PathLike[str] | None = None,
     progress: Progress | None = None,
@@ -94,7 +93,6 @@ def study(
 
     Arguments:
         file: a study file; see docs/studies.md.
-        where: its jobs run; a keyword overrules it.
         store: folder that keeps the results; a study goes on where it stopped. None for none.
         progress: called with (result, jobs done, jobs in all).
         keywords: ``jobs``, ``scheduler``, ``cluster``, ``sandbox``, ``timeout``, ``timeouts``,
@@ -113,7 +111,7 @@ def study(
         [1, 1]
     """
     check_keywords(keywords, StudyKeywords)
-    given, place = split_keywords(keywords, where=where)
+    given, place = split_keywords(keywords)
     plan = study_plan(read_study(file), usable_plugins()).limited(given)
     with open_executor(place) as executor:
         kept = None if store is None else store_in(store)

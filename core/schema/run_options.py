@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, TypedDict
 
 from annotated_types import Ge, Gt, Le, Lt
@@ -74,8 +74,9 @@ class RunOptions:
     """What a run computes, within which limits, and which stored results it takes.
 
     Arguments:
-        seeds: Run N draws of measurement noise, seeds S+1 .. S+N, instead of the data as recorded.
-        seed: The first seed.
+        seeds: Run N draws of measurement noise instead of the data as recorded. Other seeds than
+            1 .. N stand in the file of bench study.
+        seed: What seeds count from.
         nominal: The model that all strategies start from: as drawn, or with what handbooks give
             for torsion, shear and rotary inertia, from which the ranks are.
         drawing: Start from the model of this drawing, which DRAWING.toml in the folder of a case
@@ -95,7 +96,7 @@ class RunOptions:
     """
 
     seeds: Annotated[Count | tuple[Seed, ...] | None, Flag(metavar="N")] = None
-    seed: Annotated[Seed, Flag(metavar="S", show_default=True)] = 0
+    seed: Seed = 0
     nominal: Annotated[StartModels, Flag(show_default=True)] = "both"
     drawing: Annotated[str, Flag(metavar="DRAWING")] = ""
     twins: Annotated[int, Ge(0), Le(MOST_TWINS), Flag("", "N[:SEED]", parse_twins)] = 0
@@ -147,18 +148,13 @@ def check_keywords(given: Mapping[str, Any], kind: Any) -> None:  # noqa: ANN401
         raise TypeError(f"unexpected keyword argument {name!r}")
 
 
-def split_keywords(
-    given: Mapping[str, Any], options: RunOptions | None = None, where: Where | None = None
-) -> tuple[dict[str, Any], Where]:
+def split_keywords(given: Mapping[str, Any]) -> tuple[dict[str, Any], Where]:
     """Return the options of a run that were given, by field, and where it is computed.
 
     Arguments:
         given: as in `RunKeywords`; None stands for what is usual.
-        options, where: what holds for the others; of options, where it is not what is usual.
     """
-    usual = RunOptions()
-    own = {f.name: getattr(options or usual, f.name) for f in fields(RunOptions)}
-    own = {name: value for name, value in own.items() if value != getattr(usual, name)}
+    own: dict[str, Any] = {}
     there = {}
     for name, value in given.items():
         if value is None:
@@ -175,4 +171,4 @@ def split_keywords(
             own[name] = (
                 value if isinstance(value, str) or not isinstance(value, Sequence) else tuple(value)
             )
-    return own, replace(where or Where(), **there)
+    return own, Where(**there)

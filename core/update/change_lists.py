@@ -8,13 +8,13 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from femubench.core.change.change import Change, scale_property
+from femubench.core.change.change import Change
 from femubench.core.change.parametric_model import ParametricModel
 from femubench.core.change.tabulated import change_of
 from femubench.core.errors import InputError, NotApplicable, UnknownNameError
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.group_factors import GROUP, Groups
-from femubench.core.fem.joints import JointGroup, all_elements, elements_at, joint_groups
+from femubench.core.fem.joints import JointGroup, elements_at, joint_groups
 from femubench.core.fem.model import Model
 from femubench.core.fem.slopes import Matrix
 from femubench.core.fem.structure import Structure
@@ -74,7 +74,7 @@ def element_sets(structure: Structure, word: str) -> Mapping[str, tuple[str, ...
     Raises:
         NotApplicable: when the frame has no such parts.
     """
-    frame, labels = structure.frame, all_elements(structure)
+    frame, labels = structure.frame, structure.elements
     if word == "elements":
         return {label: (label,) for label in labels}
     if word == "joints":
@@ -184,7 +184,7 @@ class Changes:
         structure = self.structure
         if structure is not None and word != "groups":
             return [
-                scale_property(f"E {name}", "E", elements, prior_std=prior_std)
+                Change.scale_property(f"E {name}", "E", elements, prior_std=prior_std)
                 for name, elements in element_sets(structure, word).items()
             ]
         if word != "groups" or not self.model.groups:
@@ -218,7 +218,7 @@ class Changes:
             upper = min(
                 limit, GroupPriors(model).largest_factor(name) if matrix == "stiffness" else limit
             )
-            found.append(scale_property(*at, prior_std=std, lower=1.0 / limit, upper=upper))
+            found.append(Change.scale_property(*at, prior_std=std, lower=1.0 / limit, upper=upper))
         return found
 
     def groups_within(self, count: int) -> list[Change]:
@@ -265,10 +265,12 @@ class Changes:
         structure = self.structure
         fatal = prior_std is None
         if structure is None:
-            return scale_property("stiffness all", "E", ("all",), prior_std=prior_std, fatal=fatal)
-        quantity, every = stiffness_quantity(structure), all_elements(structure)
+            return Change.scale_property(
+                "stiffness all", "E", ("all",), prior_std=prior_std, fatal=fatal
+            )
+        quantity, every = stiffness_quantity(structure), structure.elements
         name = f"{quantity} all members"
-        return scale_property(name, quantity, every, prior_std=prior_std, fatal=fatal)
+        return Change.scale_property(name, quantity, every, prior_std=prior_std, fatal=fatal)
 
     def joint(self, group: JointGroup, *, prior_std: float | None = None) -> Change:
         """Return one factor on the stiffness of the elements that touch joints.
@@ -284,7 +286,7 @@ class Changes:
         structure = self.structure or self.model.frame_structure
         quantity, elements = stiffness_quantity(structure), elements_at(structure, group)
         at = f"{quantity} at {group.name}", quantity, elements
-        return scale_property(*at, prior_std=prior_std, lower=0.01, upper=100.0)
+        return Change.scale_property(*at, prior_std=prior_std, lower=0.01, upper=100.0)
 
     @staticmethod
     def determined(levels: Sequence[Sequence[Change]], count: int) -> list[Change]:

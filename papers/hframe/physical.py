@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femubench import Case, Measurement, Model, solve_modes
+from femubench.effect import Change
 from femubench.fem import FloatArray
 from femubench.modal import pair_measured
 from femubench.update import (
     Joints,
     UpdateOptions,
-    all_elements,
-    scale_property,
     sensitivity_update,
-    set_property,
 )
 
 ARM = 0.02  # m, from the column's axis to its face
@@ -50,8 +48,8 @@ def physical_model(case: Case) -> TimoshenkoFit:
     )
     places = tuple(f"{end}:ry" for end in _ENDS)
     changes = [
-        set_property("k_theta", "spring", places, _START, 1e2, 1e9, unit="N m/rad"),
-        scale_property("E", "E", all_elements(sprung)),
+        Change.set_property("k_theta", "spring", places, _START, 1e2, 1e9, unit="N m/rad"),
+        Change.scale_property("E", "E", sprung.elements),
     ]
     options = UpdateOptions(residual="relative-eigenvalue")
     result = sensitivity_update(sprung, changes, case.used_measurement(0), options)

@@ -12,8 +12,6 @@ from femubench.update import (
     Joints,
     SensitivityStrategy,
     UpdateOptions,
-    all_elements,
-    scale_property,
 )
 
 _OPTIONS = UpdateOptions(residual="frequency", weighting="statistical", damping=0.0, restarts=1)
@@ -74,8 +72,10 @@ class Bayesian(SensitivityStrategy):
             return model, [stiffness, *mass]
         torsion = []
         if structure.frame.plane != "in-plane":
-            every = all_elements(structure)
-            torsion = [scale_property("GJ all members", "GJ", every, prior_std=self.torsion_std)]
+            every = structure.elements
+            torsion = [
+                Change.scale_property("GJ all members", "GJ", every, prior_std=self.torsion_std)
+            ]
         joints = [
             Changes(structure).joint(group, prior_std=self.joint_std)
             for group in Joints(structure).groups()
@@ -93,6 +93,6 @@ class Bayesian(SensitivityStrategy):
         mass = Changes(model).groups("mass", own_prior=True)
         if mass or measurement.total_mass is None:
             return mass
-        every = ("all",) if model.structure is None else all_elements(model.structure)
+        every = ("all",) if model.structure is None else model.structure.elements
         name = "density all members"
-        return [scale_property(name, "density", every, prior_std=self.density_std)]
+        return [Change.scale_property(name, "density", every, prior_std=self.density_std)]

@@ -10,7 +10,7 @@ import numpy as np
 from femubench import Measurement, Model
 from femubench.effect import Change
 from femubench.fem import Structure
-from femubench.update import Changes, JointGroup, Joints, SensitivityStrategy, set_property
+from femubench.update import Changes, JointGroup, Joints, SensitivityStrategy
 
 _SHARE_WITHOUT_DEPTH = 0.1  # of the element
 _ALMOST_NOTHING = 3.12e-6  # m, the initial offset of the passing member in table 4(e)
@@ -80,4 +80,4 @@ def _length(structure: Structure, group: JointGroup, start: float) -> Change:
     room = min(Joints(structure).available_length(end) for end in group.ends)
     limits = -_LONGEST_EXTENSION * room, room
     name = f"a {group.name}"
-    return set_property(name, "rigid", group.ends, start, *limits, unit="m", signed=True)
+    return Change.set_property(name, "rigid", group.ends, start, *limits, unit="m", signed=True)

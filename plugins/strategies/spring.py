@@ -14,9 +14,6 @@ from femubench.update import (
     JointGroup,
     Joints,
     SensitivityStrategy,
-    all_elements,
-    scale_property,
-    set_property,
 )
 
 _BENDING, _TORSION, _TRANSLATION = ("ry", "rz"), ("rx",), ("x", "y", "z")
@@ -75,7 +72,7 @@ class Spring(SensitivityStrategy):
         placed = {end: values[name] for name, ends in groups.items() for end in ends}
         sprung = Joints(structure).with_springs(placed, arm=self.arm, arm_factor=self.arm_factor)
         if self.variant == "global":
-            mass = scale_property("rhoA all members", "rhoA", all_elements(sprung), fatal=True)
+            mass = Change.scale_property("rhoA all members", "rhoA", sprung.elements, fatal=True)
             return sprung, [Changes(sprung).stiffness(), mass]
         return sprung, self._springs(sprung, groups, values, len(measurement))
 
@@ -123,4 +120,6 @@ def _spring(group: str, ends: tuple[str, ...], direction: str, start: float) -> 
     places = tuple(f"{end}:{direction}" for end in ends)
     unit = "N m/rad" if direction.startswith("r") else "N/m"
     limits = _SOFTEST * start, _STIFFEST * start
-    return set_property(f"k_{direction} {group}", "spring", places, start, *limits, unit=unit)
+    return Change.set_property(
+        f"k_{direction} {group}", "spring", places, start, *limits, unit=unit
+    )
