@@ -11,7 +11,7 @@ import pytest
 import scipy.io
 
 import femubench
-from femubench import Identification, Sensors, identify
+from femubench import Identification, InputError, Sensors, identify
 from femubench.core.identify.averaging import average_records, guess_excitation
 from femubench.modal import TimeSignals, mac
 from tests import struck_structures as struck
@@ -79,6 +79,29 @@ def test_free_decays_need_no_force() -> None:
     found = identify(motions)
     assert len(found) == 3
     check(found, structure)
+
+
+@pytest.mark.slow(8)
+@pytest.mark.parametrize("name", ["a.npz", "a.csv"])
+def test_what_moves_between_marks_of_rest_is_no_decay(tmp_path: Path, name: str) -> None:
+    whole = record(frame(), 0, 3)
+    time = np.arange(len(whole.values)) / RATE
+    rest = np.sin(2.0 * np.pi * (time - 0.1) / 4.0) < -0.2  # hits are 0.2 s after every fourth one
+    knock = np.exp(-np.maximum(time % 4.0 - 2.6, 0.0) / 0.02) * rest
+    motion = whole.values + 3.0 * np.abs(whole.values).max() * knock[:, None]
+    if name == "a.npz":
+        more = {"responses": np.array(whole.sensors.labels), "at_rest": rest}
+        np.savez(tmp_path / name, fs=RATE, acc=motion, **more)
+    else:
+        head = ",".join(["time", *whole.sensors.labels, "Rest"])
+        rows = np.column_stack([time, motion, rest])
+        np.savetxt(tmp_path / name, rows, "%.9g", ",", header=head, comments="")
+    found = identify(tmp_path / name)
+    assert "3 free motions" in found.said
+    check(found, frame())
+    np.savez(tmp_path / "b.npz", fs=RATE, acc=motion, rest=0.0 * rest)
+    with pytest.raises(InputError, match=r"b\.npz.*rest: no rests between motions"):
+        identify(tmp_path / "b.npz")
 
 
 @pytest.mark.slow(6)

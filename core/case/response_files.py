@@ -175,6 +175,7 @@ def _labelled(file: Path, found: Responses, known: Sensors | None) -> Responses:
         sides = (found.responses, found.references)
         responses, references = _both_sides(file, sides, known)
         return replace(found, responses=responses, references=references)
+    found = _between_rests(file, found)
     named = [_parse_channel(label) for label in found.sensors.labels]
     acting = np.array([kind == "force" for kind, _, _ in named], dtype=bool)
     quantities = {kind for kind, _, _ in named if kind != "force"} - {""} or {found.quantity}
@@ -191,6 +192,22 @@ def _labelled(file: Path, found: Responses, known: Sensors | None) -> Responses:
     sensors, own = _both_sides(file, (sensors, own), known)
     quantity: Any = quantities.pop()
     return replace(found, sensors=sensors, values=values[:, ~acting], forces=own, quantity=quantity)
+
+
+def _between_rests(file: Path, found: TimeSignals) -> TimeSignals:
+    """Return what lies between the samples that a channel ``rest`` marks, each as a record."""
+    marks = np.array([label.strip().lower() == "rest" for label in found.sensors.labels])
+    level = np.abs(found.values[:, marks]).max(axis=1, initial=0.0)
+    kept, others = np.flatnonzero(2.0 * level <= level.max()), np.flatnonzero(~marks)
+    if not marks.any():
+        return found
+    if len(kept) in (0, len(level)):
+        raise InputError("no rests between motions", file=file, key="rest", expected="1 at rest")
+    starts = np.flatnonzero((np.diff(kept, prepend=-2) > 1) | np.isin(kept, found.starts))
+    values, force = found.values[np.ix_(kept, others)], found.force_values
+    force, first = force[kept[: len(force)]], tuple(starts.tolist())
+    sensors = found.sensors.take(others)
+    return replace(found, sensors=sensors, values=values, force_values=force, starts=first)
 
 
 def _parse_channel(name: str) -> tuple[str, float, str]:

@@ -125,12 +125,9 @@ class Examination:
         return max(self.own_share(state), self.error.unshared_share(scales))
 
     def own_error(self, state: State, *, rigid: bool = False) -> float:
-        """Return by which share the size of a cause is in error, as an idealisation of what is.
+        """Return by which share the size of a cause is in error, or of a spring drawn as rigid.
 
         That a cause fits every datum well does not tell: all data may be moved by one factor.
-
-        Arguments:
-            rigid: whether the size is of a spring where the drawing is rigid.
         """
         own = self.own_share(state)
         return max(own, settings.own_error_of_size[rigid]) if own > 0.0 else 0.0

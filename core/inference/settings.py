@@ -148,9 +148,7 @@ class Settings:
         0.3, "of the change", "an effect at a place is an idealisation: width of its own error"
     )
     own_error_of_size: tuple[float, float] = _prior(
-        (0.12, 0.3),
-        "of a size",
-        "sizes of 18 solids were as far off; springs where the drawing is rigid farther",
+        (0.12, 0.3), "of a size", "as far off were 18 solids; a spring drawn as rigid is farther"
     )
     trust_in_model_error: float = _prior(
         0.7, "power of the evidence", "model error is no more than a model of what is not known"

@@ -210,10 +210,9 @@ def rank(
             classes or instances, also of a notebook; all that are installed where there is none.
         store: folder that keeps the results.
         progress: called with (result, jobs done, jobs in all).
-        keywords: what is computed, and where: ``seeds``, ``seed``, ``nominal``,
-            ``drawing``, ``twins`` (a number, or that and a seed), ``resume``, ``overwrite``,
-            ``timeout``, ``timeouts``, ``memory``; ``jobs``, ``scheduler``, ``cluster``,
-            ``sandbox``.
+        keywords: what is computed, and where: ``seeds``, ``seed``, ``nominal``, ``drawing``,
+            ``twins`` (a number, or that and a seed), ``resume``, ``overwrite``, ``timeout``,
+            ``timeouts``, ``memory``; ``jobs``, ``scheduler``, ``cluster``, ``sandbox``.
 
     Raises:
         InputError: for an unknown name, an option that does not exist, or a faulty case.

@@ -28,6 +28,7 @@ _OVER_TIME: Mapping[str, tuple[str, ...]] = {
     "time": ("time", "t", "times"),
     "rate": ("rate", "fs", "samplerate", "samplingrate", "samplingfrequency", "samplefrequency"),
     "force": ("force", "forces", "hammer", "input", "inputs", "u", "f"),
+    "rest": ("rest", "rests", "atrest"),
     "motion": (
         "motion", "motions", "signals", "response", "output", "outputs", "y", "data",
         *(name for key, names in _MOTIONS.items() for name in (key, *names)),
@@ -85,7 +86,7 @@ def read_response_variables(
 
 def _numbers(found: Mapping[str, Any], key: str, path: Path) -> Any:  # noqa: ANN401 - an array
     value = np.asarray(found[key])
-    if value.dtype.kind not in "fiuc" or not value.size:
+    if value.dtype.kind not in "fiucb" or not value.size:
         raise InputError("no numbers", file=path, key=key, expected=EXPECTED)
     return value.astype(complex if value.dtype.kind == "c" else float)
 
@@ -169,6 +170,10 @@ def _over_time(found: Mapping[str, Any], path: Path) -> TimeSignals:
     sensors = _side(found, "responses", motion.shape[1], path)
     points = 1 if apart and np.size(found.get("references", ())) == 1 else count
     forces, quantity = _side(found, "references", points, path), _quantity(found, "motion", path)
+    if "rest" in found:  # one more channel, which cuts all of them
+        rest = _by_lines(found, "rest", lines, path).real[:, :1, None]
+        motion = np.concatenate([motion, np.repeat(rest, motion.shape[2], axis=2)], axis=1)
+        sensors = Sensors.united([sensors, Sensors.unplaced(["rest"])])
     parts = []
     for k in range(motion.shape[2]):
         column = slice(k, k + 1) if apart and count > 1 else slice(None)
