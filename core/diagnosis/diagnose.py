@@ -139,10 +139,10 @@ def diagnose(
             differs = None if states is None else states.differs
             decision = decide(posterior, leader, proof.test, differs)
             found = _written(repaired, inquiry, decision, proof, looks, begin)
-        # With a reference both states have what the drawing lacks.
-        budget = budget_of(repaired, registered) if states is None else None
-        if budget is not None:
-            found = _with_budget(repaired, found, budget)
+            # With a reference both states have what the drawing lacks.
+            budget = budget_of(repaired, registered) if states is None else None
+            if budget is not None:
+                found = _with_budget(repaired, found, budget)
     left_out = list_left_out(repaired.model, known, reference)
     notes = (*case.notes, *found.notes, *notes_left_out(left_out), *_conditions(effort))
     return replace(found, states=states, left_out=left_out, notes=notes)
