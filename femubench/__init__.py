@@ -67,7 +67,7 @@ _NAMES = {
     "femubench.core.modal.eigen": "Modes solve_modes",
     "femubench.core.fem.model": "Model",
     "femubench.core.plugin.markers": "hookimpl",
-    "femubench.core.roles": "Scenario",
+    "femubench.core.roles": "Reader Scenario",
     "femubench.core.update.strategy": "ParameterEstimate Strategy UpdateResult",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
@@ -113,7 +113,7 @@ if TYPE_CHECKING:
     from femubench.core.modal.eigen import Modes as Modes, solve_modes as solve_modes
     from femubench.core.modal.measurement import Measurement as Measurement
     from femubench.core.plugin.markers import hookimpl as hookimpl
-    from femubench.core.roles import Scenario as Scenario
+    from femubench.core.roles import Reader as Reader, Scenario as Scenario
     from femubench.core.update.strategy import (
         ParameterEstimate as ParameterEstimate,
         Strategy as Strategy,

@@ -73,7 +73,7 @@ def test_no_door_more() -> None:
     doors = {page: import_module(f"femubench.{page}").__all__ for page in pages}
     # Where pytest rewrites assertions a module has names of its own, such as `@pytest_ar`.
     count = {page: sum(map(str.isidentifier, names)) for page, names in doors.items()}
-    assert sum(count.values()) + len(femubench.__all__) <= 192, count
+    assert sum(count.values()) + len(femubench.__all__) <= 193, count
 
 
 def test_index_of_the_docs_names_every_page() -> None:

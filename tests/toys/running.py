@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from typing import Any
 
 from femubench.core.case.case import Case
@@ -28,7 +29,8 @@ def run_jobs(
     **keywords: Any,
 ) -> RunData:
     """Run every strategy on every case with every seed; keywords as of `rank`."""
-    given, where = split_keywords(keywords, options)
-    plan = Plan(cases, strategies, RunOptions(**given), starts or Starts())
+    given, where = split_keywords(keywords)
+    asked = replace(options or RunOptions(), **given)
+    plan = Plan(cases, strategies, asked, starts or Starts())
     with open_executor(where) if executor is None else nullcontext(executor) as place:
         return plan.run(place, Receivers(store, progress))
