@@ -64,13 +64,14 @@ def play_advice(
             raise InputError("has no budget of its drawing", file=read.folder, expected=expected)
         mode = None if found.verdict == "named" or not left else loosest_mode(budget)
         others = [one for one in budget.modes if one.mode in read.held_out]
+        off, rest, std = (rms([getattr(m, n) for m in others]) if others else None for n in _ERRORS)
         yield AdviceRound(
             tuple(read.used),
             found.verdict,
             tuple(f"{cause.effect} at {cause.place}" for cause in found.causes),
             sum(len(line.unseen) for line in budget.lines),
-            *(rms([getattr(one, name) for one in others]) if others else None for name in _ERRORS),
-            next_mode=mode,
+            *(off, rest, std),
+            mode,
         )
         if mode is None:
             return
