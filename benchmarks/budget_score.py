@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # the truths are not install
 from sweep_data import PAGE, as_markdown, filled
 
 import femubench
-from femubench.core.diagnosis.budget import budget_of, frequency_slopes
+from femubench.core.diagnosis.budget import budget_of
 from femubench.core.plugin.loader import list_effects
 from truths.lacks_file import LACKS, Lacks, read_lacks, rms
 
@@ -145,9 +145,7 @@ class BudgetScore:
     @cached_property
     def advised(self) -> int:
         """Return the row of the held-out mode that is known least, which is advised first."""
-        slopes = frequency_slopes(self.budget.state)
-        variance = np.einsum("mk,kl,ml->m", slopes, self.budget.covariance, slopes)
-        return int(np.argmax(np.where(self.used, -1.0, variance)))
+        return int(np.argmax(np.where(self.used, -1.0, self.budget.variance)))
 
     def left_with(self, row: int) -> Array:
         """Return what a budget leaves of every mode that has one more of them to use, (m,)."""

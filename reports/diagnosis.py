@@ -51,6 +51,7 @@ _WHEN = ("before", "after")
 _KINDS = {"frequency": "Frequencies", "shape": "Mode shapes, rms over the sensors"}
 _MAP, _SMALL = (4.8, 3.7), (3.4, 2.4)  # inch
 _ARROWS = "Arrows: from the reference to the present. Bands: ±2 standard deviations of both states."
+_LACKS = "Blue: drawn too soft or too heavy. Purple: too stiff or too light. Dark: much of it."
 _EVIDENCE = "Thick lines and large dots: strong evidence. Numbers: the causes. "
 
 
@@ -200,11 +201,11 @@ def _budget(data: Data, *, page: bool) -> list[Block]:
         *(Column(f"{m['mode']}" if m["used"] else f"({m['mode']})", 6, say=say) for m in modes),
         Column("not seen", 30, left=True, wrap=True),
     ]
+    worth = [row for row in data["budget"] if abs(row["rms_percent"]) >= _NOTABLE]
     rows: list[list[Cell]] = [
         [row["class"], words.place(row["place"]), row["rms_percent"], row["rms_std"], row["source"],
          *row["percent"], ", ".join(row["unseen"])]
-        for row in data["budget"]
-        if abs(row["rms_percent"]) >= _NOTABLE
+        for row in worth
     ]  # fmt: skip
     for name, key in _SUMS.items():
         own = [m[key] for m in modes]
@@ -218,7 +219,10 @@ def _budget(data: Data, *, page: bool) -> list[Block]:
     draw = partial(error_budget, data)
     drawn = _drawn(draw, "budget", title, _lead(data)[0], size) if page else ""
     table = Table(columns, rows, folded=f"The {len(modes)} modes in figures" * page)
-    first: Block = Row([Drawing("", said, drawn)]) if page else said
+    draw = partial(error_budget, {**data, "budget": worth}, by="place")
+    placed = _drawn(draw, "lacks", "What the drawing lacks, by place", said, _MAP) if page else ""
+    drawings = [Drawing("", said, drawn), *[Drawing("", _LACKS, placed)] * bool(placed)]
+    first: Block = Row(drawings) if page else said
     return [first, table, *words.as_drawn(data["budget"], _NOTABLE)]
 
 

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from femubench.core.case.case import Case
+from femubench.core.diagnosis.budget import budget_of
 from femubench.core.library import advise
 from femubench.core.library.advise import play_advice
 from femubench.core.library.cases import cases
-from femubench.core.plugin.loader import load_plugins
+from femubench.core.plugin.loader import list_effects, load_plugins
 from tests.command import call_bench
 
 NAME = "suite/portal"
@@ -25,7 +26,8 @@ def verdicts(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     words: list[str] = []
 
     def search(case: Case, *_: object) -> object:
-        return replace(toys.made(), verdict=words.pop(0) if words else "unknown")
+        found = budget_of(case, list_effects())
+        return replace(toys.made(), verdict=words.pop(0) if words else "unknown", drawing=found)
 
     monkeypatch.setattr(advise, "diagnosis_of", search)
     return words

@@ -7,6 +7,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import diagnosis_toys as toys
 import numpy as np
 import pytest
 from msgspec import structs
@@ -28,6 +29,9 @@ from femubench.core.diagnosis.budget import (
     log_frequencies,
     with_arms,
 )
+from femubench.core.diagnosis.serial import diagnosis_to_json
+from femubench.core.drawing.findings import lacks_found
+from femubench.core.drawing.places import PlacedWireframe
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import MADE, Frame, Joint, JointKind, Material, Member
 from femubench.core.fem.group_factors import Groups
@@ -41,6 +45,7 @@ from femubench.core.inference.settings import settings
 from femubench.core.library.cases import cases
 from femubench.core.modal.eigen import modes_of
 from femubench.core.plugin.loader import list_effects
+from femubench.core.schema.validation import read_plain
 from femubench.core.typing import FloatArray
 from femubench.reports.diagnosis_words import as_drawn, budget
 from truths.lacks_file import LACKS, read_lacks
@@ -325,8 +330,8 @@ def test_a_spring_that_is_softer_than_drawn_is_found() -> None:
 
 @pytest.mark.nightly
 def test_every_drawing_of_the_development_half_has_a_budget() -> None:
-    own = [case for name, case in cases.items() if name.startswith("suite/")]
-    own = [case for case in own if not is_held(case.name) and case.model.structure is not None]
+    names = [name for name in cases if name.startswith("suite/")]
+    own = [cases[name] for name in names if not is_held(name.removeprefix("suite/"))]
     assert len(own) >= 28
     assert [case.name for case in own if budget_of(case, list_effects()) is None] == []
 
@@ -407,6 +412,27 @@ def test_the_drawing_of_a_budget_reaches_every_error(real: Budget) -> None:
     assert apart.argmax() == sum(mode.used for mode in real.modes) - 1
     with pytest.raises(InputError, match="no budget"):
         plot.error_budget({**data, "budget_modes": []})
+
+
+def test_every_line_of_a_budget_is_drawn_where_it_sits(drawn: Case, real: Budget) -> None:
+    made = replace(toys.made(), budget=real.lines, budget_modes=real.modes)
+    data = diagnosis_to_json(made, case=drawn)
+    structure = read_plain(PlacedWireframe, data["structure"])
+    found = lacks_found(data, structure)
+    assert {one.place for one in found} == {line.place for line in real.lines}
+    joints = drawn.model.frame_structure.frame.joints
+    for one in found:
+        own = {joint.xyz for joint in joints if joint.family == one.place}
+        assert one.kind == "all" if one.place == "all" else {*one.points} == own
+        assert own or one.place == "all"
+    worst = max(real.lines, key=lambda line: abs(line.rms_percent))
+    (there,) = [one for one in found if one.place == worst.place]
+    assert there.value == pytest.approx(worst.rms_percent / 100.0)
+    ax = plot.error_budget(data, by="place")
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert any(text.startswith("everywhere: ") for text in texts)
+    with pytest.raises(InputError, match="no structure"):
+        plot.error_budget({**data, "structure": None}, by="place")
 
 
 def test_the_words_say_how_far_off_why_and_what_is_left() -> None:

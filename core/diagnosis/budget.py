@@ -123,7 +123,7 @@ class Entry:
         Arguments:
             covariance: of the coordinates by data and prior, (q, q).
         """
-        left = np.einsum("qk,kl,ql->q", self.root, covariance, self.root)
+        left = variance_of(self.root, covariance)
         prior = np.square(self.root).sum(axis=1)
         return [bool(share >= settings.budget_seen) for share in 1.0 - left / prior]
 
@@ -162,6 +162,11 @@ class Budget:
         """Return the covariance of the coordinates with what each of them idealises, (k, k)."""
         ideal = np.square(settings.own_error_of_change * self.state.x)
         return np.asarray(0.5 * (self.covariance + self.covariance.T) + np.diag(ideal))
+
+    @property
+    def variance(self) -> FloatArray:
+        """Return what is open of ln f of every measured mode, (m,)."""
+        return variance_of(frequency_slopes(self.state), self.covariance)
 
     @property
     def hidden_percent(self) -> float:
@@ -256,7 +261,7 @@ def budget_of_modes(
     state = state_at(wide, places, x)
     slopes, found = frequency_slopes(state), log_frequencies(state)
     fresh = _share_out(entries, state, slopes, covariance)
-    variance = np.einsum("mk,kl,ml->m", slopes, covariance, slopes)
+    variance = variance_of(slopes, covariance)
     # A used mode was fitted with all that its lines idealise, another was not.
     shares = np.array([line.percent for line in fresh]) / 100.0
     ideal = np.square(settings.own_error_of_change * shares).sum(axis=0)
@@ -649,8 +654,7 @@ def advise_modes(budget: Budget, case: Case) -> tuple[Advice, ...]:
     used = state.partner[[mode.used for mode in budget.modes]]
     moving = np.flatnonzero(~state.problem.space.still(state.eigenvalues))
     further = np.setdiff1d(moving, used)[:count]
-    slopes = frequency_slopes(state, further)
-    variance = np.einsum("mk,kl,ml->m", slopes, budget.covariance, slopes)
+    variance = variance_of(frequency_slopes(state, further), budget.covariance)
     separation = variance / settings.budget_rest[0] ** 2
     space, labels = state.problem.space, case.measurement.sensors.labels
     seen = np.abs(space.pad_readings(len(state.vectors)) @ state.vectors[:, further])
@@ -672,9 +676,7 @@ def advise_modes(budget: Budget, case: Case) -> tuple[Advice, ...]:
 
 def loosest_mode(budget: Budget) -> int | None:
     """Return the unused mode whose frequency is known least; None where all are known well."""
-    slopes = frequency_slopes(budget.state)
-    variance = np.einsum("mk,kl,ml->m", slopes, budget.covariance, slopes)
-    variance[[mode.used for mode in budget.modes]] = 0.0
+    variance = np.where([mode.used for mode in budget.modes], 0.0, budget.variance)
     row = int(variance.argmax())
     least = settings.visible_deviations * settings.budget_rest[0] ** 2
     return budget.modes[row].mode if variance[row] >= least else None
@@ -686,6 +688,11 @@ def frequency_slopes(state: State, modes: IntArray | None = None) -> FloatArray:
     values, near = state.eigenvalues[modes], state.vectors[:, modes]
     forces, _ = state.problem.space.forces(state.parts, state.x, near, values)
     return np.asarray(np.einsum("nm,nmk->mk", near, forces) / (2.0 * values[:, None]))
+
+
+def variance_of(slopes: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the variance of values by their slopes in the coordinates, (m, k), as (m,)."""
+    return np.asarray(np.einsum("mk,kl,ml->m", slopes, covariance, slopes))
 
 
 def _share_out(

@@ -154,8 +154,8 @@ def _with_budget(case: Case, found: Diagnosis, budget: Budget) -> Diagnosis:
     That model is provisional: unseen data of every kind must be nearer to it than to the drawing
     and to the best guess.
     """
-    lines, hidden = budget.lines, budget.hidden_percent
-    found = replace(found, budget=lines, budget_modes=budget.modes, hidden_percent=hidden)
+    found = replace(found, budget=budget.lines, budget_modes=budget.modes, drawing=budget)
+    found = replace(found, hidden_percent=budget.hidden_percent)
     if found.verdict == "named":
         return found
     modes, names = advise_modes(budget, case), found.advice

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from femubench.core.case.case import Case
+from femubench.core.diagnosis.budget import Budget
 from femubench.core.display import Shown
 from femubench.core.fem.model import Model
 from femubench.core.inference.examine import Examination
@@ -39,12 +40,14 @@ class Diagnosis(DiagnosisReport, Shown):
         extended: the model with the causes in it; the nominal one where none was named.
         subject: the case itself, for drawings of its structure.
         examination: every explanation that was tried; None where it was read from a file.
+        drawing: its budget with the model of that; None where it has none, or was read from a file.
         case, verdict and all others: as in `DiagnosisReport`.
     """
 
     extended: Model = field(repr=False)
     subject: Case | None = field(default=None, repr=False)
     examination: Examination | None = field(default=None, repr=False, compare=False)
+    drawing: Budget | None = field(default=None, repr=False, compare=False)
 
     def rows(self) -> Sequence[tuple[str, str]]:
         """Return verdict, causes, rivals and gain."""

@@ -56,8 +56,9 @@ def diagnosis_from_json(data: object, *, file: Path | str | None = None) -> dict
 
 
 def _words(diagnosis: Diagnosis) -> Iterator[str]:
-    """Yield every place that causes, rivals, visible effects and the evidence name."""
+    """Yield every place that causes, budget, rivals, visible effects and the evidence name."""
     yield from (cause.place for cause in diagnosis.causes)
+    yield from (row.place for row in diagnosis.budget)
     for rival in diagnosis.rivals:
         yield from rival.place.split(" + ")
     yield from (row.place for row in diagnosis.smallest_visible)

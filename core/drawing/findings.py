@@ -66,6 +66,21 @@ def causes_found(data: Data, structure: PlacedWireframe) -> list[Finding]:
     return found
 
 
+def lacks_found(data: Data, structure: PlacedWireframe) -> list[Finding]:
+    """Return the budget of a diagnosis where its lines sit, one finding a place."""
+    found: dict[str, list[Data]] = {}
+    for row in data["budget"]:
+        found.setdefault(row["place"], []).append(row)
+    findings = []
+    for word, rows in found.items():
+        at = structure.place(word)
+        said = ", ".join(f"{row['class']} {percent(row['rms_percent'] / 100.0)}" for row in rows)
+        label = f"{'everywhere' if at.kind == 'all' else word}: {said}"
+        value = max((row["rms_percent"] for row in rows), key=abs) / 100.0
+        findings.append(Finding(word, at.kind, at.spans, at.points, label=label, value=value))
+    return findings
+
+
 def changes_found(source: Case | Model, parameters: Sequence[Data]) -> list[Finding]:
     """Return what an update changed at each place; what stayed as it was is left out.
 

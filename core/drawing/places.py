@@ -111,11 +111,15 @@ def _plain_place(wireframe: Wireframe, word: str, head: str) -> DrawnPlace:
 def _place(wireframe: Wireframe, frame: Frame | None, word: str) -> DrawnPlace:
     head, _ = split_direction(bare_place(word))
     plain = _plain_place(wireframe, word, head)
-    if frame is not None and plain.kind != "all" and (joints := Places(frame).joints_of(head)):
-        return DrawnPlace(word, "joint", points=_points(frame, joints))
-    if frame is None or plain.kind in ("all", "member", "element"):
+    if frame is None or plain.kind == "all":
         return plain
-    if frame is not None and (named := Places(frame).members(head)):
+    # A budget has free ends and feet by their type, which is none of the grammar of places.
+    alike = [joint.name for joint in frame.joints if joint.family == head]
+    if joints := Places(frame).joints_of(head) or alike:
+        return DrawnPlace(word, "joint", points=_points(frame, joints))
+    if plain.kind in ("member", "element"):
+        return plain
+    if named := Places(frame).members(head):
         spans = tuple(Span(frame.member_index[name], 0.0, 1.0) for name in named)
         return DrawnPlace(word, "member", spans)
     with suppress(ModelError):

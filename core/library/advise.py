@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from femubench.core.diagnosis.budget import budget_of, loosest_mode
+from femubench.core.diagnosis.budget import loosest_mode
 from femubench.core.errors import InputError
 from femubench.core.library.cases import CaseLike, one_case
 from femubench.core.library.diagnose import diagnosis_of
 from femubench.core.plugin.loader import Plugins
+from femubench.core.score.responses import rms
+
+_ERRORS = "error_percent", "left_percent", "std_percent"
 
 
 @dataclass(frozen=True)
@@ -57,20 +58,19 @@ def play_advice(
     left = len(read.held_out) if rounds is None else rounds
     while True:
         found = diagnosis_of(read, None, plugins)
-        budget = budget_of(read, plugins.effects.values()) if read.reference is None else None
+        budget = found.drawing
         if budget is None:
             expected = "a frame, or matrices in groups, without `[reference]`"
             raise InputError("has no budget of its drawing", file=read.folder, expected=expected)
         mode = None if found.verdict == "named" or not left else loosest_mode(budget)
         others = [one for one in budget.modes if one.mode in read.held_out]
+        off, rest, std = (rms([getattr(m, n) for m in others]) if others else None for n in _ERRORS)
         yield AdviceRound(
             tuple(read.used),
             found.verdict,
             tuple(f"{cause.effect} at {cause.place}" for cause in found.causes),
             sum(len(line.unseen) for line in budget.lines),
-            _rms(one.error_percent for one in others),
-            _rms(one.left_percent for one in others),
-            _rms(one.std_percent for one in others),
+            *(off, rest, std),
             mode,
         )
         if mode is None:
@@ -78,8 +78,3 @@ def play_advice(
         held = tuple(number for number in read.held_out if number != mode)
         read = replace(read, used=tuple(sorted((*read.used, mode))), held_out=held)
         left -= 1
-
-
-def _rms(values: Iterable[float]) -> float | None:
-    squares = np.square(list(values))
-    return float(np.sqrt(squares.mean())) if len(squares) else None

@@ -12,11 +12,11 @@ import numpy as np
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_to_json
-from femubench.core.drawing.findings import Finding, causes_found
+from femubench.core.drawing.findings import Finding, causes_found, lacks_found
 from femubench.core.drawing.places import DrawnPlace, PlacedWireframe
 from femubench.core.errors import InputError
 from femubench.core.inference.settings import settings
-from femubench.core.plot.findings import draw_findings, lines_of
+from femubench.core.plot.findings import draw_findings, draw_found, lines_of
 from femubench.core.plot.structure import (
     View,
     draw_lines,
@@ -28,6 +28,7 @@ from femubench.core.plot.structure import (
 )
 from femubench.core.plot.style import AFTER, BEFORE, COLOURS, PAGE, SERIES, SOFT, name_of, own_axes
 from femubench.core.schema.validation import read_plain
+from femubench.core.score.responses import rms
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -134,7 +135,7 @@ def _near(value: float) -> float:
 
 def _rms(rows: Sequence[Data], key: str) -> float | None:
     known = [_near(row[key]) for row in rows if row[key] is not None]
-    return float(np.sqrt(np.mean(np.square(known)))) if known else None
+    return rms(known) if known else None
 
 
 def residuals(
@@ -226,7 +227,9 @@ def state_changes(states: Data, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def error_budget(diagnosis: Diagnosis | Data, *, ax: Axes | None = None) -> Axes:
+def error_budget(
+    diagnosis: Diagnosis | Data, *, by: Literal["mode", "place"] = "mode", ax: Axes | None = None
+) -> Axes:
     """Draw what the drawing lacks: of every mode a bar of classes that reaches its error.
 
     What makes a mode higher than drawn is stacked up, what makes it lower down; what stays
@@ -235,10 +238,12 @@ def error_budget(diagnosis: Diagnosis | Data, *, ax: Axes | None = None) -> Axes
 
     Arguments:
         diagnosis: or its JSON as plain data.
+        by: ``place`` for the structure with the classes where they sit, blue where it is drawn too
+            soft or too heavy, purple where too stiff or too light.
         ax: to draw on; None for axes of a new figure.
 
     Raises:
-        InputError: when it has no budget.
+        InputError: when it has no budget, or no structure to draw it on.
 
     Examples:
         >>> plot.error_budget(found).get_ylabel()
@@ -248,6 +253,9 @@ def error_budget(diagnosis: Diagnosis | Data, *, ax: Axes | None = None) -> Axes
     modes = sorted(data.get("budget_modes") or (), key=lambda m: not m["used"])[:MOST_ROWS]
     if not modes:
         raise InputError("the diagnosis has no budget of what the drawing lacks to draw")
+    if by == "place":
+        structure = _structure(data.get("structure"))
+        return draw_found(structure, lacks_found(data, structure), ax)
     order = [data["budget_modes"].index(mode) for mode in modes]
     lines = [(f"{row['class']}{_at(row['place'])}", row["percent"]) for row in data["budget"]]
     shown, rest = lines[: len(SERIES)], lines[len(SERIES) :]

@@ -68,7 +68,11 @@ def changes(case: Case, result: UpdateResult, *, ax: Axes | None = None) -> Axes
     found = changes_found(case, stated)
     if not any(finding.kind != "elsewhere" for finding in found):
         raise InputError("no parameter that changed has a place on the structure")
-    wireframe = wireframe_of(case)
+    return draw_found(wireframe_of(case), found, ax)
+
+
+def draw_found(wireframe: Wireframe, found: Sequence[Finding], ax: Axes | None) -> Axes:
+    """Draw a structure with findings, on axes or on those of a new figure."""
     view = view_of(wireframe)
     ax = own_axes(ax, (6.0, 4.6))
     draw_structure(ax, wireframe, view)

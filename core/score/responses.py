@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from femubench.core.case.case import Case
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
 from femubench.core.modal.receptances import PredictedResponses
 from femubench.core.schema.results import ResponseBlock
-from femubench.core.typing import FloatArray
 
 _RANGE = 1e-6  # of the largest response: no test resolves less than 120 dB below it
 _DECIBEL = 20.0 / np.log(10.0)
@@ -42,10 +42,11 @@ def score_responses(case: Case, model: Model) -> ResponseBlock | None:
         return None
     least = _RANGE * float(size[counted].max())
     ratio = np.hypot(np.abs(answer), least) / np.hypot(size[counted], least)
-    floor = _rms(_DECIBEL * std[counted] / size[counted])
+    floor = rms(_DECIBEL * std[counted] / size[counted])
     phase = np.angle(answer * lines.receptances[counted].conj(), deg=True)
-    return ResponseBlock(_rms(_DECIBEL * np.log(ratio)), floor, int(counted.sum()), _rms(phase))
+    return ResponseBlock(rms(_DECIBEL * np.log(ratio)), floor, int(counted.sum()), rms(phase))
 
 
-def _rms(values: FloatArray) -> float:
+def rms(values: ArrayLike) -> float:
+    """Return the root mean square of some numbers, one at least."""
     return float(np.sqrt(np.mean(np.square(values))))
