@@ -431,7 +431,10 @@ def test_the_numbers_of_refused_calls_are_those_of_the_kernel() -> None:
     [(hoards.in_sockets, "memory"), (hoards.in_waiting_sockets, "memory"),
      (hoards.in_none, "answer")],
 )  # fmt: skip
-def test_memory_of_sockets_counts(hoard: Callable[[float], bytes], how: str) -> None:
+def test_memory_of_sockets_counts(
+    hoard: Callable[[float], bytes], how: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(guarded_child, "put_in_group", lambda *_: None)
     limits = Limits(120.0, 64 * MIB, sandbox="require")
     ending = run_apart({0: (hoard, 1.5)}, limits, 1)[0]
     assert ending.how == how, ending

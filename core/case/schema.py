@@ -84,7 +84,7 @@ XYZ = "[x, y, z] in m, finite numbers"
 class TomlTable(BaseModel):
     """A table of `case.toml`; unknown keys are errors."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 _SHARE = "true, false or a multiple of rho I, a number >= 0"

@@ -32,7 +32,6 @@ class Confinement:
 
     Arguments:
         limits: what it may take; time and volume are for its parent to watch.
-        path: its search path.
         folder: where it works, but in a sandbox.
         own: whether the folder is its temporary one too, which the parent removes.
         walled: whether it is in a sandbox.

@@ -18,11 +18,13 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from functools import cache, partial
+from pathlib import Path
 from typing import Any, Literal
 
 import psutil
 
 from femubench.core.child.confinement import LENGTH_BYTES, READY, Confinement, object_frames
+from femubench.core.child.control_group import put_in_group, was_full
 from femubench.core.child.limits import FORKS, Limits, format_bytes
 from femubench.core.child.namespaces import FOLDER, libc
 from femubench.core.child.server import LAST_BREATH, NUMBER, WalledServer, end_group, fork_server
@@ -48,8 +50,6 @@ class Ending:
 
     Arguments:
         how: ``answer`` when it handed back its bytes.
-        answer: the bytes.
-        reason: one line on any other end.
         seconds: wall time since the process was ready.
     """
 
@@ -64,10 +64,7 @@ class GuardedChild:
     """A child process.
 
     Arguments:
-        pid: number of the process.
         requests, answers, output, status: our ends of its pipes.
-        confinement: how it runs.
-        limits: on the request that it is at.
         first: number of the first process of its namespace of processes, 0 where it has none.
     """
 
@@ -88,6 +85,7 @@ class GuardedChild:
     _printed: int = 0
     _said: bytes = b""
     _unsent: list[memoryview] = field(default_factory=list)
+    _group: Path | None = None
 
     @classmethod
     def start(
@@ -96,7 +94,6 @@ class GuardedChild:
         """Start a child.
 
         Arguments:
-            confinement: how it runs.
             module: of ours, which the fork server loads first.
             within: from which it forks; None for the fork server itself. One that fails is ended.
 
@@ -132,11 +129,11 @@ class GuardedChild:
 
         Arguments:
             function: importable by name.
-            argument: its argument; pickled.
-            limits: on time, memory and volume until the answer is there.
+            limits: until the answer is there.
         """
         self.limits, self._asked = limits, time.monotonic()
         self._received, self._printed = bytearray(), 0
+        self._group = put_in_group(self.pid, limits.memory and limits.memory + _BASE)
         self._send((function, argument))
 
     def _send(self, what: object) -> None:
@@ -187,6 +184,9 @@ class GuardedChild:
         # What starts others faster than they end is never gone; the server goes on to end it.
         if time.monotonic() > self._killed + LAST_BREATH:
             self._close("status")
+        if self.status < 0 and self._group is not None:
+            with suppress(OSError):
+                self._group.rmdir()
         return self.status < 0
 
     def progress(self, *, look: bool) -> Ending | None:
@@ -211,6 +211,9 @@ class GuardedChild:
         if ended and self.code is None:
             what = "the process from which all workers are started was ended"
             return end("orphaned", reason=what)
+        if ended and self._group is not None and was_full(self._group):
+            what = f"used more memory than allowed, {format_bytes(limits.memory or 0)}"
+            return end("memory", reason=what)
         if ended:
             return end("no-start" if self._ready is None else "died", reason=self._death())
         if self.deadline is not None and now >= self.deadline:
@@ -280,7 +283,7 @@ class GuardedChild:
         processes = processes_of(self.pid, self.first)
         if len(processes) > limits.processes:
             return f"has {len(processes)} processes, allowed {limits.processes}"
-        if limits.memory is not None:
+        if limits.memory is not None and self._group is None:
             used = memory_of(processes, f"/proc/{self.pid}/root" if walled else None)
             if used > limits.memory + _BASE:
                 return f"used {format_bytes(used)} of memory, allowed {format_bytes(limits.memory)}"
@@ -319,12 +322,7 @@ class GuardedChild:
 
 
 def wait_for(children: Iterable[GuardedChild], seconds: float) -> None:
-    """Wait until there is something to do for one of some children, but not for long.
-
-    Arguments:
-        children: that are asked something.
-        seconds: at most.
-    """
+    """Wait until there is something to do for one of some children, some seconds at most."""
     children, now = list(children), time.monotonic()
     deadlines = [child.deadline for child in children]
     seconds = max(min([seconds, *(d - now for d in deadlines if d is not None)]), 0.0)

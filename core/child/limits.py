@@ -23,8 +23,7 @@ class Limits:
         seconds: wall time; None for no limit.
         memory: bytes beyond what a fresh worker has, of all processes of the job together; None
             for no limit.
-        output: bytes that it may print.
-        answer: bytes that it may hand back.
+        output, answer: bytes that it may print, and hand back.
         file: size of the largest file that it may write.
         processes: that it may have, where there is a sandbox with their threads.
         sandbox: whether it runs in one; with ``processes`` only in a namespace of processes where
@@ -51,12 +50,7 @@ def count_processors() -> int:
 
 
 def memory_share(workers: int, given: int | None = None) -> int:
-    """Return the bytes that one of several workers may take: an even share of the machine's.
-
-    Arguments:
-        workers: number of them.
-        given: bytes that they have together where that is less than the machine's.
-    """
+    """Return the bytes that one of several workers may take, of the machine's or those given."""
     import psutil
 
     total = psutil.virtual_memory().total if given is None else given

@@ -30,12 +30,7 @@ _ATTEMPTS = 3  # to start a process
 
 
 class Workers(Generic[Key]):
-    """Runs tasks, at most `count` at a time.
-
-    Arguments:
-        count: number of processes.
-        module: of ours, with what they need.
-    """
+    """Runs tasks, at most `count` at a time, in processes with a module of ours loaded."""
 
     def __init__(self, count: int, module: str = JOBS) -> None:
         self.count, self._module = count, module
@@ -84,8 +79,6 @@ class Workers(Generic[Key]):
         Arguments:
             key: by which `wait` names it.
             function: importable by name.
-            argument: its argument; pickled.
-            limits: what it may take.
         """
         within = None
         try:
@@ -255,7 +248,6 @@ def run_apart(
 
     Arguments:
         tasks: by key, a function that is importable by name and its argument.
-        limits: what each may take.
         count: number of processes at a time.
         module: as for `Workers`.
     """

@@ -194,7 +194,7 @@ def narrow_indices(matrix: SparseArray) -> SparseArray:
 def prune(matrix: SparseArray) -> SparseArray:
     """Return a symmetric matrix without the entries that cancelled to roundoff, (n, n)."""
     scale = np.sqrt(np.abs(matrix.diagonal()))
-    whole = sp.csc_array(matrix)
+    whole = matrix.tocsc()
     whole.sum_duplicates()
     column = np.repeat(np.arange(whole.shape[1]), np.diff(whole.indptr))
     keep = np.abs(whole.data) > 1e-13 * scale[whole.indices] * scale[column]

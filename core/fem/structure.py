@@ -132,8 +132,12 @@ class Structure(MeshedFrame):
         axes = sensors.axes
         values = list(axes)
         columns = list(6 * np.maximum(node, 0)[:, None] + np.arange(6))
-        for i in np.flatnonzero(node < 0):
-            block, moved = point_block(frame, mesh, self.properties, locate(frame, sensors.xyz[i]))
+        between = np.flatnonzero(node < 0)
+        places = self.once(
+            "places", (sensors,), lambda: [locate(frame, xyz) for xyz in sensors.xyz[between]]
+        )
+        for i, place in zip(between, places, strict=True):
+            block, moved = point_block(frame, mesh, self.properties, place)
             values[i], columns[i] = axes[i] @ block, moved
         bounds = np.cumsum([0, *map(len, values)])
         entries = np.concatenate(values), np.concatenate(columns), bounds

@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from femubench.core.child.control_group import delegated
 from femubench.core.child.limits import count_processors, memory_share
 from femubench.core.child.sandbox import Enclosure, enclosure
 from femubench.core.display import count_noun
@@ -36,8 +37,9 @@ class LocalProcesses:
 
     @property
     def spoken(self) -> str:
-        """Return the number of workers in words."""
-        return count_noun(self.workers, "worker")
+        """Return the number of workers, and how their memory is limited, in words."""
+        how = "counted twice a second" if delegated() is None else "limited by control groups"
+        return f"{count_noun(self.workers, 'worker')}, memory {how}"
 
     @property
     def share(self) -> int:
