@@ -460,7 +460,7 @@ def test_four_commands_lead_from_a_deck_to_an_updated_one(tmp_path: Path) -> Non
     before, after = re.findall(r"falls\s+from ([\d.]+) to ([\d.]+) %", section)[0]
     assert "lacks member-stiffness at group:LEFT" in said["diagnose"]
     assert f"falls from {before} to {after}" in said["diagnose"]
-    (change,) = re.findall(r"names the left joint, (-[\d.]+ ± \d+ %)", section)
+    (change,) = re.findall(r"names the left joint, (-[\d.]+ ± [\d.]+ %)", section)
     assert change in said["diagnose"]
     assert re.search(r" 1 +constitutive-er", said["run"])
     assert said["run"].endswith(f"Next: {block.splitlines()[-1].removeprefix('$ ')}")
