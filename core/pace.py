@@ -6,6 +6,8 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+LATE = 1.1  # of a budget of seconds: up to here it counts as kept
+
 
 @dataclass(frozen=True)
 class Advance:

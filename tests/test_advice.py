@@ -47,6 +47,17 @@ class TestWinners:
         more = STD**2 + 0.02**2 / 28 + (2.0 * STD / 1.05) ** 2 / 6.0
         assert loose.separation == pytest.approx(gap**2 / more, rel=0.03)
 
+    def test_what_was_weighed_in_time_is_ranked(self, symmetric: Model) -> None:
+        truth = YoungsModulus().extend(symmetric, "all", [0.05])
+        problem = posed(symmetric, truth, [YoungsModulus(), Density()])
+        fits = [fitted(problem, YoungsModulus(), "all"), fitted(problem, Density(), "all")]
+        given = symmetric, [problem] * 2, fits
+        only, *rest = advise(*given, tolerance=0.0, stops=lambda: True)
+        whole = advise(*given, tolerance=0.0, stops=lambda: False)
+        assert not rest
+        assert whole[0] == only
+        assert len(whole) > 1
+
     def test_a_weighed_structure_is_not_weighed_again(self, symmetric: Model) -> None:
         truth = YoungsModulus().extend(symmetric, "all", [0.05])
         plain = posed(symmetric, truth, [YoungsModulus(), Density()])

@@ -47,7 +47,11 @@ def test_a_spent_budget_leaves_single_causes_and_says_so() -> None:
     assert not any("budget" in note for note in whole.notes)
     assert len(short.causes) == 1
     assert short.chi2[1] > whole.chi2[1] + 10.0
-    assert "ended after its budget of 0 s" in short.notes[-1]
+    assert whole.budget
+    assert not short.budget
+    assert "ended after its budget of 0 s: causes" in short.notes[-1]
+    assert "what the drawing lacks was not judged" in short.notes[-1]
+    assert "What is always done takes" in short.notes[-1]
 
 
 @pytest.mark.nightly

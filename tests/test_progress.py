@@ -142,17 +142,28 @@ class TestEffort:
         assert not effort.stops()
         clock.now += 1.0
         assert effort.stops()
-        assert effort.cut
+        assert effort.cut == {"unseen"}
 
     def test_a_budget_keeps_what_the_proof_takes(self, clock: Clock) -> None:
         effort = Effort(100.0, clock=clock)
-        self.work(effort, clock, "single", 3.0)
-        self.work(effort, clock, "unseen", 3.0)
-        self.work(effort, clock, "advice", 3.0)
-        clock.now += 60.0
-        assert not effort.stops()
-        clock.now += 30.0  # 99 s
-        assert effort.stops()
+        for kind in ("single", "unseen", "drawing", "advice"):
+            self.work(effort, clock, kind, 3.0)
+        clock.now += 87.0  # 99 s
+        assert not effort.stops()  # nothing is to come
+        with effort.scope({"unseen": 1, "drawing": 1, "advice": 1}):
+            assert effort.stops()
+            assert not effort.stops("drawing")  # which may end at 110 s
+            clock.now += 9.0
+            assert effort.stops("drawing")
+        assert effort.cut == {"unseen", "drawing"}
+
+    def test_advice_has_the_budget_to_its_end(self, clock: Clock) -> None:
+        effort = Effort(10.0, clock=clock)
+        with effort.scope({"advice": 1}), effort.piece("advice"):
+            clock.now += 9.9
+            assert not effort.stops("advice")
+            clock.now += 0.1
+            assert effort.stops("advice")
 
 
 def test_a_line_every_ten_seconds_where_there_is_no_terminal(clock: Clock) -> None:

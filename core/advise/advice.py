@@ -53,6 +53,7 @@ class Group:
         tolerance: standard deviation of the relative scatter of every element.
         elements: number of elements that scatter.
         responses: whether frequency responses are given, so that their antiresonances are known.
+        stops: tells whether the time for it is spent.
     """
 
     views: tuple[Outlook, ...]
@@ -62,6 +63,7 @@ class Group:
     tolerance: float
     elements: int
     responses: bool = False
+    stops: Callable[[], bool] = lambda: False
 
     @property
     def data(self) -> Data:
@@ -160,6 +162,8 @@ def _responses(group: Group) -> Iterator[Option]:
         return
     highest, found = float(group.data.measurement.frequencies.max()), []
     for force, label in enumerate(sensors.labels):
+        if group.stops():
+            break
         (own, spread), *others = (view.zeros(force, highest) for view in group.views)
         hertz = own.frequencies
         spread = np.hstack([spread, group.hertz * hertz[:, None]])
@@ -280,8 +284,9 @@ _KINDS: tuple[Callable[[Group], Iterator[Option]], ...] = (
 
 
 def options_for(group: Group) -> list[Option]:
-    """Return every measurement that one could make next."""
-    return [option for kind in _KINDS for option in kind(group)]
+    """Return every measurement that one could make next, as far as there is time."""
+    kinds = (kind for kind in _KINDS if kind is _weighing or not group.stops())
+    return [option for kind in kinds for option in kind(group)]
 
 
 def advise(
@@ -291,6 +296,7 @@ def advise(
     *,
     tolerance: float,
     responses: bool = False,
+    stops: Callable[[], bool] = lambda: False,
 ) -> tuple[Advice, ...]:
     """Return the measurements that tell the first explanation best from all others.
 
@@ -306,6 +312,7 @@ def advise(
         fits: explanations that the data cannot tell apart, the most probable first.
         tolerance: standard deviation of the relative scatter of every element.
         responses: whether frequency responses are given already.
+        stops: tells whether the time for it is spent: what was weighed until then is ranked.
 
     Returns:
         up to eight, largest separation first; at least one where anything can be measured.
@@ -322,7 +329,7 @@ def advise(
     hertz = float(np.median(scatter * m.frequency_std / m.frequencies))
     structure = model.structure
     elements = len(structure.properties) if structure is not None else model.size
-    group = Group(views, points, model.total_mass, hertz, tolerance, elements, responses)
+    group = Group(views, points, model.total_mass, hertz, tolerance, elements, responses, stops)
     return _ranked(options_for(group), [_label(view) for view in views], second_level(group))
 
 

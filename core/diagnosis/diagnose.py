@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.special import chdtrc
@@ -56,12 +56,20 @@ from femubench.core.look.readings import look_at_band
 from femubench.core.look.states import compare_states
 from femubench.core.modal.eigen import DENSE_LIMIT
 from femubench.core.modal.frequency_changes import elastic_modes
+from femubench.core.pace import LATE
 from femubench.core.plugin.loader import list_effects, list_faults
 from femubench.core.roles import Effect, Fault
 from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning, States
 from femubench.core.score.responses import score_responses
 from femubench.core.score.scoring import score_model
 from femubench.core.ties import in_order
+
+# What a budget of time leaves out.
+_LEFT_OUT: dict[Kind, str] = {
+    "unseen": "causes, alone or together, may have been overlooked",
+    "drawing": "what the drawing lacks was not judged",
+    "advice": "not all that could be measured next was weighed",
+}
 
 
 @dataclass(frozen=True)
@@ -104,13 +112,13 @@ def diagnose(
         effects: what may be missing; all registered effects by default.
         faults: what may be wrong with data or input; all registered faults by default.
         pairs: whether more than one cause is sought.
-        effort: counts the fits; the search for several causes ends with its time. None: never.
+        effort: counts the fits; what can be left out ends with its time. None: never.
 
     Raises:
         NotApplicable: when a used frequency has no standard deviation.
         ModelError: when the model has no modes.
     """
-    begin, effort = time.perf_counter(), effort or Effort()
+    effort = effort or Effort()
     case = _with_few_elements(case)
     if case.reference is not None:
         case = _use_all_modes(case)
@@ -133,14 +141,18 @@ def diagnose(
             whole = replace(repaired.measurement, responses=given)
             states = compare_states(whole, repaired.reference)
         proof = _proof(repaired, inquiry.examination, effort, case, states)
+        budget = None
+        # With a reference both states have what the drawing lacks.
+        if states is None and not effort.stops("drawing"):
+            with effort.piece("drawing"):
+                budget = budget_of(repaired, registered)
+        effort.expect("drawing", 0)
         with effort.piece("advice"):
             looks = _looks(case.model, repaired, (*registered, *known))
             posterior, leader = inquiry.examination.posterior, proof.leader
             differs = None if states is None else states.differs
             decision = decide(posterior, leader, proof.test, differs)
-            found = _written(repaired, inquiry, decision, proof, looks, begin)
-            # With a reference both states have what the drawing lacks.
-            budget = budget_of(repaired, registered) if states is None else None
+            found = _written(repaired, inquiry, decision, proof, looks, effort)
             if budget is not None:
                 found = _with_budget(repaired, found, budget)
     left_out = list_left_out(repaired.model, known, reference)
@@ -183,7 +195,7 @@ def _expected(case: Case) -> dict[Kind, Number]:
     """Return what mostly follows the search."""
     # The best guess is solved and judged, and where it fails its rivals are.
     judged = 2.0, 2.0 + bool(case.held_out or case.modifications) * settings.largest_group / 2.0
-    return {"unseen": judged, "advice": 1.0}
+    return {"unseen": judged, "drawing": float(case.reference is None), "advice": 1.0}
 
 
 def _with_few_elements(case: Case) -> Case:
@@ -266,7 +278,7 @@ def _written(
     decision: Decision,
     proof: _Proof,
     looks: tuple[LookWarning, ...],
-    begin: float,
+    effort: Effort,
 ) -> Diagnosis:
     examination = inquiry.examination
     repaired, loose = fault_causes(inquiry.repaired), fault_causes(inquiry.loose)
@@ -303,7 +315,7 @@ def _written(
         causes=(*repaired, *causes, *loose),
         rivals=rivals_of(examination, best if named else None, group),
         reason=_reason(decision),
-        advice=_advice(examination, group),
+        advice=_advice(examination, group, effort),
         smallest_visible=smallest_visible(examination.found[0]),
         residuals=residual_rows(before, after),
         gain=proof.gain,
@@ -321,7 +333,7 @@ def _written(
             *_notes(case, examination, proof, shown),
             *_error_notes(examination, leader),
         ),
-        seconds=time.perf_counter() - begin,
+        seconds=effort.spent,
         evidence=odds_rows(posterior, best) if named else (),
         model_error=error_scales(examination, leader),
         like_a_beam=examination.like_a_beam,
@@ -334,9 +346,14 @@ def _conditions(effort: Effort) -> tuple[str, ...]:
     """Return under what conditions it was found that are not the usual ones."""
     notes = []
     if effort.cut:
+        left = ", ".join(what for kind, what in _LEFT_OUT.items() if kind in effort.cut)
+        took, asked = effort.spent, effort.budget or 0.0
+        # With all left out that may be, no shorter budget is kept either.
+        what = "What is always done takes" if "drawing" in effort.cut else "It took"
+        least = f" {what} {took:.2g} s here." if took > LATE * asked else ""
         notes.append(
-            f"The search was ended after its budget of {effort.budget:g} s: causes, alone or "
-            "together, may have been overlooked; a longer --budget looks for them."
+            f"The diagnosis was ended after its budget of {asked:g} s: {left}; a longer --budget "
+            f"has it.{least}"
         )
     if changed := list_changed():
         words = ", ".join(f"{name} = {format_value(value)}" for name, value in changed.items())
@@ -370,7 +387,9 @@ def _reason(decision: Decision) -> str:
     return f"angle of the sensitivities to those of {first}: {', '.join(parts)}"
 
 
-def _advice(examination: Examination, group: Sequence[Explanation]) -> tuple[Advice, ...]:
+def _advice(
+    examination: Examination, group: Sequence[Explanation], effort: Effort
+) -> tuple[Advice, ...]:
     """Return what parts the names of a group, and each name's places, from each other."""
     others = (e for found in group for e in elsewhere(examination.posterior, found))
     stated = [*group, *others][: settings.advised]
@@ -379,7 +398,9 @@ def _advice(examination: Examination, group: Sequence[Explanation]) -> tuple[Adv
     problems = [examination.problem_of(e) for e in stated]
     fits = [e.fit for e in stated]
     known, scatter = examination.antiresonances > 0, examination.tolerance
-    return advise(examination.model, problems, fits, tolerance=scatter, responses=known)
+    stops = partial(effort.stops, "advice")
+    given = examination.model, problems, fits
+    return advise(*given, tolerance=scatter, responses=known, stops=stops)
 
 
 def _notes(

@@ -8,9 +8,11 @@ from contextlib import contextmanager
 from typing import Literal
 
 from femubench.core.inference.settings import settings
-from femubench.core.pace import Advance, OnAdvance, Pace
+from femubench.core.pace import LATE, Advance, OnAdvance, Pace
 
-Kind = Literal["faults", "typed", "single", "together", "more", "values", "unseen", "advice"]
+Kind = Literal[
+    "faults", "typed", "single", "together", "more", "values", "unseen", "drawing", "advice"
+]  # fmt: skip
 # So many pieces; or so many where what was found leaves no more than noise, and where not.
 Number = float | tuple[float, float]
 
@@ -23,6 +25,7 @@ _KINDS: dict[Kind, str] = {
     "more": "more causes together",
     "values": "a value each direction",
     "unseen": "unseen data",
+    "drawing": "what the drawing lacks",
     "advice": "what to measure next",
 }
 
@@ -60,7 +63,7 @@ class Effort:
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self.budget, self._on_advance, self._clock = budget, on_advance, clock
-        self._begin, self.cut = clock(), False
+        self._begin, self.cut = clock(), set[Kind]()
         self._pace = Pace(dict(zip(_KINDS, settings.work_of_pieces, strict=True)))
         self._done = 0
         self._piece: tuple[Kind, float] | None = None
@@ -129,14 +132,22 @@ class Effort:
             return number[0] if self._adequate else number[1]
         return number
 
-    def stops(self) -> bool:
-        """Tell whether the time is spent but for what the proof and the advice take at least.
+    @property
+    def spent(self) -> float:
+        """Return the seconds since the begin."""
+        return self._clock() - self._begin
+
+    def stops(self, kind: Kind = "unseen") -> bool:
+        """Tell whether the time is spent but for what is to come of a kind and of those after it.
 
         Anyone who asks leaves the rest, which is remembered.
         """
-        kept = self._pace.of("unseen") + self._pace.of("advice")
-        spent = self.budget is not None and self._clock() - self._begin >= self.budget - kept
-        self.cut = self.cut or spent
+        last = [*_KINDS][[*_KINDS].index(kind) :]
+        kept = sum(self._pace.of(k) for k in last if any(own.get(k) for own in self._ahead))
+        # Of the drawing more is said than of anything: it may be as late as a diagnosis may.
+        late = LATE if kind == "drawing" else 1.0
+        spent = self.budget is not None and self.spent >= late * self.budget - kept
+        self.cut |= {kind} if spent else set()
         return spent
 
 

@@ -393,9 +393,9 @@ class Settings:
     most_dofs: int = _cost(ALL_MODES_LIMIT, "dofs", "all of whose modes are solved for")
     fewest_elements: int = _cost(4, "elements", "a member, at least, where these are few enough")
     work_of_pieces: tuple[float, ...] = _cost(
-        (0.35, 0.018, 1.0, 0.45, 1.0, 0.4, 0.35, 0.9),
+        (0.35, 0.018, 1.0, 0.45, 1.0, 0.4, 0.35, 0.9, 0.3),
         "searches for single causes",
-        "medians of the cases that come along (benchmarks/time_left.py)",
+        "medians of the cases that come along, of the drawing the most (benchmarks/time_left.py)",
     )
     # Memory and rounding.
     block: int = _cost(512, "rows", "worked on at once, so that arrays fit the memory")

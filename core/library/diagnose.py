@@ -51,8 +51,8 @@ def diagnose(
         pairs: whether more than one cause is sought.
         faults: whether faults of the data and of what was typed in are sought too.
         tolerance: standard deviation of every element's relative scatter; the case's by default.
-        budget: seconds after which the search for several causes ends, and a note says so; None
-            for no end. What is found then depends on how fast the machine is.
+        budget: seconds after which it ends, and a note says what was left out; None for no end.
+            What is found then depends on how fast the machine is.
         output: new folder for the extended model as a case, where one was found.
         plugins: installed plugins whose effects and faults are tried too; they are imported here.
 
@@ -103,6 +103,7 @@ def diagnosis_of(
     if tolerance is not None and not 0.0 <= tolerance <= LARGEST_TOLERANCE:
         expected = f"a number >= 0 and <= {LARGEST_TOLERANCE}"
         raise InputError(f"tolerance = {tolerance!r}", expected=expected)
+    effort = Effort(budget, on_advance)
     wanted = _effects(effects, plugins, others)
     read = one_case(case, plugins)
     if tolerance is not None:
@@ -110,7 +111,6 @@ def diagnosis_of(
     try:
         # Many small matrices: threads would only wait for each other.
         with threadpool_limits(1), overridden(decisions or {}):
-            effort = Effort(budget, on_advance)
             wrong = (list_faults(*others) if others else None) if faults else ()
             return search(read, effects=wanted, faults=wrong, pairs=pairs, effort=effort)
     except NotApplicable as fault:

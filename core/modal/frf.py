@@ -215,7 +215,8 @@ def modal_sum(
         ModelError: at the very frequency of an undamped mode.
     """
     compliance = 1.0 / dynamic_stiffness(eigenvalues, frequencies, damping)
-    return np.asarray((compliance[:, None, :] * out) @ into.T)
+    pairs = (out[:, None] * into).reshape(-1, len(eigenvalues))
+    return np.asarray(compliance @ pairs.T).reshape(-1, len(out), len(into))
 
 
 def dynamic_stiffness(
