@@ -9,15 +9,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from advice_problems import STD, advised, every_option, fitted, posed
-from diagnosis_problems import measured, problem_of
+from diagnosis_problems import clamped_portal, measured, problem_of
 
-from femubench import Model
+from femubench import Model, solve_modes
 from femubench.core.advise.advice import advise
+from femubench.core.advise.point_attachments import list_supports
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
-from femubench.fem import Frame, Joint, Material, Member, Place, Section, Support
+from femubench.fem import Frame, GroundSpring, Joint, Material, Member, Place, Section, Support
 from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.material import Density, YoungsModulus
+from femubench.plugins.effects.support_flexibility import SupportFlexibility
 from femubench.plugins.effects.temperature import Temperature
 
 FrameBuilder = Callable[..., Frame]
@@ -121,6 +123,85 @@ class TestWinners:
         (only,) = advised(symmetric, problem, [found, found])
         assert only.separation < 1e-12
         assert advised(symmetric, problem, [found]) == ()
+
+
+class TestSupports:
+    """A structure that is held otherwise shows which of two explanations is right."""
+
+    def test_a_soft_foot_or_a_softer_whole(self) -> None:
+        """Two frequencies of a bent post on one foot leave both; hung free, one is out."""
+        section, steel = Section.rectangular_tube(0.04, 0.03, 0.002), Material(2.1e11, 0.3, 7850.0)
+        whole = clamped_portal(4, section, steel)
+        foot, other = SupportFlexibility(), YoungsModulus()
+        model = Model.of(replace(whole, supports=whole.supports[:1]))
+        soft = foot.extend(model, "support:fl", [1e8, 2e4])
+        problem = posed(model, soft, [foot, other], count=2)
+        fits = [fitted(problem, foot, "support:fl", 1.0), fitted(problem, other, "all", -0.5)]
+        best = advised(model, problem, fits)[0]
+        assert best.measurement.startswith("hang it free, not held at fl and measure again, above")
+        # Free, E alone lowers both modes, as far as two held ones say: known to STD / sqrt(2).
+        modulus = float(fits[1].parts[0].hypothesis.values(fits[1].state.x[None])[0, 0])
+        ratio = np.sqrt(1.0 + modulus)
+        expected = 2.0 * ((1.0 - ratio) / STD) ** 2 / (1.0 + ratio**2)
+        assert best.separation == pytest.approx(expected, rel=0.02)
+
+    def test_mirrored_feet(self) -> None:
+        """Frequencies are the same; those without a foot are not, and the modes named are."""
+        section, steel = Section.rectangular_tube(0.04, 0.03, 0.002), Material(2.1e11, 0.3, 7850.0)
+        frame, foot = clamped_portal(4, section, steel), SupportFlexibility()
+        model = Model.of(frame)
+        problem = posed(model, foot.extend(model, "support:fl", [2e6, 3e4]), [foot])
+        fits = [fitted(problem, foot, f"support:{at}", 1.0) for at in ("fl", "fr")]
+        best = advised(model, problem, fits)[0]
+        text = "take away the support at fr and measure again, above all the modes near"
+        assert best.measurement.startswith(text)
+        # The model with the foot at fl alone, soft or rigid, meshed anew.
+        bare = Model.of(replace(frame, supports=frame.supports[:1]))
+        values = fits[0].parts[0].hypothesis.values(fits[0].state.x[None])[0].tolist()
+        first, second = (
+            solve_modes(one).natural_frequencies[:6]
+            for one in (foot.extend(bare, "support:fl", values), bare)
+        )
+        apart = np.abs(first / second - 1.0)
+        named = [float(f) for f in re.findall(r"[0-9.]+", best.measurement)]
+        shown = [int(np.abs(first - f).argmin()) for f in named]
+        assert set(shown) == set(np.argsort(-apart)[:2].tolist())
+        # Two deviations of the fit come on top of those of the measurement.
+        assert 1.0 < best.separation < np.square(apart / STD).sum()
+
+    def test_one_that_hangs_free_is_held_at_sensors(
+        self, symmetric: Model, ladder: FrameBuilder
+    ) -> None:
+        soft, frame = JointRotation(), ladder(polar=False, accelerometer=False)
+        truth = soft.extend(symmetric, "A", [3e3])
+        test = measured(truth, frame, shapes=1, weighed=False)
+        near = [i for i, label in enumerate(test.sensors.labels) if label == "Dz"]
+        seen = test.sensors.take(near), test.shapes[near], test.shape_std[near]
+        test = replace(test, sensors=seen[0], shapes=seen[1], shape_std=seen[2])
+        problem = problem_of(symmetric, test, [soft])
+        fits = [fitted(problem, soft, at, 0.5) for at in ("A", "F")]
+        held = [text for text in every_option(symmetric, problem, fits) if "hold " in text]
+        values = fits[0].parts[0].hypothesis.values(fits[0].state.x[None])[0].tolist()
+        pinned = Model.of(replace(frame, supports=(Support(Place("D"), ("z",)),), free=False))
+        exact = solve_modes(soft.extend(pinned, "A", values)).elastic.natural_frequencies
+        assert len(held) == 1
+        assert held[0].startswith("hold D in z and measure again")
+        for named in re.findall(r"[0-9.]+", held[0]):
+            assert np.abs(exact / float(named) - 1.0).min() < 5e-3
+
+    def test_no_mechanism_and_no_soil_is_taken_away(self) -> None:
+        section, steel = Section.rectangular_tube(0.04, 0.03, 0.002), Material(2.1e11, 0.3, 7850.0)
+        hinges = Support(Place("fl"), ("x", "z")), Support(Place("fr"), ("z",))
+        frame = replace(clamped_portal(4, section, steel), supports=hinges)
+        frame = frame.with_attachments((), (GroundSpring(Place(member="left", s=0.5), "x", 1e4),))
+        model, whole = Model.of(frame), YoungsModulus()
+        problem = posed(model, whole.extend(model, "all", [0.05]), [whole, Density()])
+        fits = [fitted(problem, effect, "all") for effect in (whole, Density())]
+        ways = [text for text, *_ in list_supports(frame, problem.data.measurement.sensors)]
+        assert ways == ["take away the support at fl", "take away the support at fr"]
+        # Without fr the spring keeps it from turning about fl; without fl it can turn.
+        options = [text for text in every_option(model, problem, fits) if "take away" in text]
+        assert [text.startswith(ways[1]) for text in options] == [True]
 
 
 class TestGroups:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 from advice_problems import STD, every_option, fitted, one_outlook, posed
-from diagnosis_problems import measured, part_at, problem_of
+from diagnosis_problems import clamped_portal, measured, part_at, problem_of
 from numpy.testing import assert_allclose
 from scipy.special import logsumexp
 
@@ -17,18 +17,23 @@ from femubench import Model, solve_modes
 from femubench.core.advise.advice import align_shapes
 from femubench.core.advise.point_attachments import antiresonances, predict_loaded_frequencies
 from femubench.core.advise.prediction import Outlook, Points, Predicted, distance
+from femubench.core.fem.alteration import Alteration
 from femubench.core.fit.modal_fit import Fit, Problem, state_at
 from femubench.core.inference.settings import overridden
 from femubench.core.modal.antiresonances import predict_antiresonances
 from femubench.core.modal.receptances import PredictedResponses
+from femubench.core.roles import Effect
 from femubench.effect import ModelPlaces
-from femubench.fem import FloatArray, Frame, Place, PointMass, Support
+from femubench.fem import FloatArray, Frame, Material, Place, PointMass, Section, Support
 from femubench.plugins.effects.added_mass import AddedMass
 from femubench.plugins.effects.grounding_spring import GroundingSpring
 from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.material import YoungsModulus
+from femubench.plugins.effects.support_flexibility import SupportFlexibility
 
 FrameBuilder = Callable[..., Frame]
+TUBE, STEEL = Section.rectangular_tube(0.04, 0.03, 0.002), Material(2.1e11, 0.3, 7850.0)
+FEET = clamped_portal(4, TUBE, STEEL)
 STEP = 1e-3  # deviations
 
 
@@ -154,6 +159,40 @@ class TestPredictions:
             gap = np.abs(spread[:, column] - slope)
             assert np.median(gap) < 1e-4 * np.abs(spread).max()
             assert gap.max() < 1e-2 * np.abs(spread).max()
+
+    @pytest.mark.parametrize(
+        ("effect", "place", "shown"),
+        [
+            (SupportFlexibility(), "support:fl", 0),
+            (SupportFlexibility(), "support:fr", 2),
+            (YoungsModulus(), "all", 1),
+        ],
+    )
+    def test_without_a_support_as_drawn_without_it(
+        self, effect: Effect, place: str, shown: int
+    ) -> None:
+        """What gives at the support itself goes with it, all else stays."""
+        model = Model.of(FEET)
+        typical = [float(p.value(0.6)) for p in effect.parameters(model, place)]
+        problem = posed(model, effect.extend(model, place, typical), [effect])
+        found = fitted(problem, effect, place, 0.5)
+        view, _ = one_outlook(problem, found)
+        away = Alteration(removed=FEET.supports[:1])
+        without = view.altered(away)
+        assert without is not None
+        bare = Model.of(replace(FEET, supports=FEET.supports[1:]))
+        values = found.parts[0].hypothesis.values(found.state.x[None])[0].tolist()
+        exact = effect.extend(bare, place, values) if shown else bare
+        expected = solve_modes(exact).natural_frequencies[:6]
+        assert_allclose(without.values, expected, rtol=5e-4)
+        assert (np.abs(without.spread) > 1e-6 * expected[:, None]).any(axis=0).sum() == shown
+        for column, pair in enumerate(views_around(problem, found) if shown else ()):
+            low, high = (side.altered(away) for side in pair)
+            assert low is not None
+            assert high is not None
+            slope = (high.values - low.values) / (2.0 * STEP)
+            scale = np.abs(slope).max()
+            assert_allclose(without.spread[:, column], slope, atol=1e-4 * scale)
 
     def test_deflection_of_a_held_frame(self, ladder: FrameBuilder) -> None:
         frame = ladder(polar=False, accelerometer=False)

@@ -10,6 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from femubench.core.advise.point_attachments import (
     antiresonances,
+    list_supports,
     nearest,
     points_of,
     predict_loaded_frequencies,
@@ -127,6 +128,24 @@ def _masses(group: Group) -> Iterator[Option]:
     for label, *predicted in zip(group.points.labels, *tables, strict=True):
         text = f"attach {kilograms} kg at {label} and measure again"
         yield group.option("load", text, predicted, group.hertz * predicted[0].values)
+
+
+def _supports(group: Group) -> Iterator[Option]:
+    """Yield a frame held otherwise, with the modes in which explanations then differ most."""
+    structure, measured = group.views[0].state.problem.model.structure, group.data.measurement
+    ways = list(list_supports(structure.frame, measured.sensors)) if structure else []
+    for change, alteration, unsure in ways[:: -(-len(ways) // settings.advised) or 1]:
+        first, *rest = (view.altered(alteration) for view in group.views)
+        if first is not None and len(first.values) == len(measured):
+            moved = first.values - np.sort(measured.frequencies)
+            std = np.hypot(group.hertz * first.values, unsure * moved)
+            gaps = (
+                np.abs([first.values - other.values for other in rest if other]).sum(axis=0) / std
+            )
+            best = np.sort(np.argsort(-gaps, kind="stable")[: settings.least_modes])
+            near = " and ".join(_hertz(f) for f in first.values[best])
+            text = f"{change} and measure again, above all the modes near {near} Hz"
+            yield group.option("support", text, [first, *rest], std)
 
 
 def _antiresonances(group: Group) -> Iterator[Option]:
@@ -279,7 +298,8 @@ def _hertz(frequency: float) -> str:
 
 
 _KINDS: tuple[Callable[[Group], Iterator[Option]], ...] = (
-    _weighing, _more_modes, _masses, _antiresonances, _responses, _shapes, _readings, _deflection,
+    _weighing, _more_modes, _masses, _supports, _antiresonances, _responses, _shapes, _readings,
+    _deflection,
 )  # fmt: skip
 
 

@@ -6,13 +6,16 @@ ones to a force there, so that every point costs an eigensolution of a few dozen
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from femubench.core.advise.prediction import Outlook, Points, Predicted
 from femubench.core.effect.model_places import ModelPlaces
+from femubench.core.fem.alteration import Alteration
+from femubench.core.fem.frame import ACTIVE, Frame, GroundSpring, Place, Support
 from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import Sensors
 from femubench.core.fit.modal_fit import signed_hz
 from femubench.core.inference.settings import settings
 from femubench.core.typing import FloatArray
@@ -25,6 +28,25 @@ def points_of(model: Model) -> Points:
     pairs = [(label, ModelPlaces(model).free(ModelPlaces(model).point(label))) for label in chosen]
     moving = [(label, free) for label, free in pairs if free]
     return Points(tuple(label for label, _ in moving), tuple(free for _, free in moving))
+
+
+def list_supports(frame: Frame, sensors: Sensors) -> Iterator[tuple[str, Alteration, float]]:
+    """Yield ways to hold a frame otherwise, in words, and the share of the change that is unsure.
+
+    Its supports are taken away one at a time; one that hangs free is held at joints near sensors.
+    """
+    parts: tuple[Support | GroundSpring, ...] = (*frame.supports, *frame.springs)
+    for place in dict.fromkeys(part.at for part in parts if part.at.joint):  # no soil along piles
+        own = tuple(part for part in parts if part.at == place)
+        away = "take away the support at" if len(own) < len(parts) else "hang it free, not held at"
+        yield f"{away} {place}", Alteration(removed=own), 0.0
+    if not parts:
+        fixed = tuple(d for d in ACTIVE[frame.plane] if not d.startswith("r"))
+        gap = np.linalg.norm(sensors.xyz[:, None] - frame.corners, axis=2)
+        for i in dict.fromkeys(gap.argmin(axis=1).tolist()):
+            place = Place(frame.joints[i].name)
+            held = Alteration((Support(place, fixed),))
+            yield f"hold {place} in {', '.join(fixed)}", held, settings.idealisation_error
 
 
 def _chosen(model: Model) -> list[str]:
@@ -95,12 +117,8 @@ def antiresonances(outlook: Outlook) -> list[Predicted]:
     values = outlook.state.eigenvalues
     seen, low = outlook.seen[:, None, :], _low(outlook)
     basis = _ritz(values, seen, low)
-    row = (seen @ basis)[:, 0]
-    # Householder: all but the first column of the mirror are orthogonal to the row.
-    mirror = row / np.linalg.norm(row, axis=1, keepdims=True)
-    mirror[:, 0] += np.where(mirror[:, 0] < 0.0, -1.0, 1.0)
-    share = 2.0 * mirror / np.square(mirror).sum(axis=1, keepdims=True)
-    still = np.eye(basis.shape[2])[:, 1:] - share[:, :, None] * mirror[:, None, 1:]
+    # All but the first column are orthogonal to what the point sees.
+    still = np.linalg.qr(np.swapaxes(seen @ basis, 1, 2), mode="complete")[0][:, :, 1:]
     basis = basis @ still
     inner = np.swapaxes(basis, 1, 2) @ (values[:, None] * basis)
     eigenvalues, vectors = np.linalg.eigh(inner)

@@ -11,15 +11,18 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from femubench.core.change.hypothesis import Hypothesis
+from femubench.core.change.tabulated import place_change
 from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.reading import Reading
+from femubench.core.errors import ModelError, NotApplicable
+from femubench.core.fem.alteration import Alteration, alter_model
 from femubench.core.fem.model import Model
 from femubench.core.fit.modal_basis import place_parts
 from femubench.core.fit.modal_fit import Fit, Problem, State, signed_hz, state_at
 from femubench.core.inference.coordinates import modes_for, place_data
 from femubench.core.inference.settings import settings
 from femubench.core.modal.antiresonances import Antiresonances, predict_antiresonances
-from femubench.core.modal.eigen import Modes
+from femubench.core.modal.eigen import Modes, once_for
 from femubench.core.modal.receptances import PredictedResponses
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
@@ -82,10 +85,8 @@ class Points:
     def rows(self, model: Model) -> SparseArray:
         """Return the translations from the dofs of a model, sparse (n_sensors, n)."""
         pairs = zip(self.labels, self.directions, strict=True)
-        rows = [
-            ModelPlaces(model).translations(ModelPlaces(model).point(label), d)
-            for label, d in pairs
-        ]
+        places = ModelPlaces(model)
+        rows = [places.translations(places.point(label), d) for label, d in pairs]
         return sp.csr_array(sp.vstack(rows)) if rows else sp.csr_array((0, model.size))
 
 
@@ -157,9 +158,8 @@ class Outlook:
             frequencies (..., q) and spread (..., q, p).
         """
         spread = np.zeros((*values.shape, len(self.stiffness_spread)))
-        for i, (stiff, heavy) in enumerate(
-            zip(self.stiffness_spread, self.mass_spread, strict=True)
-        ):
+        pairs = zip(self.stiffness_spread, self.mass_spread, strict=True)
+        for i, (stiff, heavy) in enumerate(pairs):
             force = stiff @ vectors - (heavy @ vectors) * values[..., None, :]
             spread[..., i] = (vectors * force).sum(axis=-2)
         frequencies = signed_hz(values)
@@ -233,6 +233,30 @@ class Outlook:
                     value += float(parameter.value(self.state.x[i])) - parameter.neutral
                     slope[i] = (high - low) / (2.0 * settings.slope_step)
         return Predicted(np.array([value]), slope[None] @ self.root)
+
+    def altered(self, change: Alteration) -> Predicted | None:
+        """Return as many frequencies in Hz as are used, of the structure held otherwise.
+
+        A cause of a support goes with it. None where a cause cannot be there, or nothing holds.
+        """
+        problem, columns, kept = self.state.problem, list[int](), list[Hypothesis]()
+        gone = tuple(f"support:{part.at}:" for part in change.removed if hasattr(part, "at"))
+        try:
+            model = once_for(problem.model, change, lambda: alter_model(problem.model, change))
+            for one, own in self.causes:
+                if not f"{one.place}:".startswith(gone):
+                    there = place_change(one.effect, model, one.place, one.parameters)
+                    kept.append(replace(one, change=there))
+                    columns += range(own.start, own.stop)
+            posed = place_data(model, problem.data, problem.noise, kept)
+            state = state_at(posed, posed.space.projections, self.state.x[columns])
+        except (ModelError, NotApplicable):
+            return None
+        left = model.frame_structure.frame
+        if posed.space.rigid and change.removed and (left.supports or left.springs):
+            return None
+        moving = np.flatnonzero(~posed.space.still(state.eigenvalues))[: len(self.state.partner)]
+        return replace(self, state=state, root=self.root[columns]).frequencies(moving)
 
     def without(self, columns: slice) -> State:
         """Return the explanation with some coordinates of the causes at zero."""

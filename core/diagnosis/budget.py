@@ -164,11 +164,6 @@ class Budget:
         return np.asarray(0.5 * (self.covariance + self.covariance.T) + np.diag(ideal))
 
     @property
-    def variance(self) -> FloatArray:
-        """Return what is open of ln f of every measured mode, (m,)."""
-        return variance_of(frequency_slopes(self.state), self.covariance)
-
-    @property
     def hidden_percent(self) -> float:
         """Return the rms change of the frequencies below which no defect shows next to it."""
         left = [mode.left_percent for mode in self.modes if mode.used]
@@ -315,10 +310,8 @@ def extend_model(model: Model, entries: Sequence[Entry], x: FloatArray) -> Model
     if model.structure is not None:
         return Model.of(model.structure.rebuilt(extend_frame(model.structure.frame, entries, x)))
     factors = [Property(entry.kind, entry.quantities[0], (entry.place,)) for entry in entries]
-    grown = [
-        1.0 + entry.grow(x[None, own])[0, 0]
-        for entry, own in zip(entries, _split(entries), strict=True)
-    ]
+    pairs = zip(entries, _split(entries), strict=True)
+    grown = [1.0 + entry.grow(x[None, own])[0, 0] for entry, own in pairs]
     return Groups(model).with_factors(factors, grown)
 
 
@@ -327,17 +320,14 @@ def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame
 
     Changes of the matrices add up, as in the fit, where factors of a frame multiply.
     """
-    everywhere: dict[str, float] = {}
-    zones: dict[tuple[str, str], float] = {}
-    added: list[PointMass] = []
-    held: dict[str, float] = {}
-    inertia: dict[str, float] = {}
+    everywhere, held, inertia = dict[str, float](), dict[str, float](), dict[str, float]()
+    zones, added = defaultdict[tuple[str, str], float](float), list[PointMass]()
     for entry, own in zip(entries, _split(entries), strict=True):
         values = entry.grow(x[None, own])[0].tolist()
         if entry.kind == _JOINTS:
             for quantity, value in zip(entry.quantities, values, strict=True):
                 for label in entry.at:
-                    zones[quantity, label] = zones.get((quantity, label), 0.0) + value
+                    zones[quantity, label] += value
         elif entry.kind == _SPRINGS:
             held |= {name: 1.0 + value for name, value in zip(entry.names, values, strict=True)}
         elif entry.kind == _LUMPS:
@@ -349,28 +339,18 @@ def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame
     stiffer, twist, heavier = (everywhere.get(quantity, 0.0) for quantity in _WHOLES)
     stiffer, twisted = 1.0 + stiffer, 1.0 + stiffer + twist
     values = (stiffer, twisted / stiffer, 1.0 + heavier)
-    factors = [
-        Factor(quantity, ("all",), value) for quantity, value in zip(_WHOLES, values, strict=True)
-    ]
-    alike: dict[tuple[str, float], list[str]] = {}
+    factors = [Factor(name, ("all",), value) for name, value in zip(_WHOLES, values, strict=True)]
+    alike = defaultdict[tuple[str, float], list[str]](list)
     for (quantity, label), value in zones.items():
         whole = twisted if quantity == "GJ" else stiffer
-        alike.setdefault((quantity, max(1.0 + value / whole, settings.quiet_share)), []).append(
-            label
-        )
+        alike[quantity, max(1.0 + value / whole, settings.quiet_share)].append(label)
     factors += [Factor(name, tuple(labels), factor) for (name, factor), labels in alike.items()]
-    wanted = tuple(factor for factor in factors if factor.factor != 1.0)
+    wanted = tuple(one for one in (*frame.factors, *factors) if one.factor != 1.0)
     bodies = [(mass, inertia.get(_family(frame, mass.at), 0.0)) for mass in frame.masses]
     masses = [part for mass, share in bodies for part in _spread(mass, share)]
-    springs = [
-        replace(one, stiffness=one.stiffness * held.get(_along(one), 1.0)) for one in frame.springs
-    ]
-    return replace(
-        frame,
-        factors=(*(factor for factor in frame.factors if factor.factor != 1.0), *wanted),
-        masses=(*masses, *added),
-        springs=tuple(springs),
-    )
+    springs = [replace(s, stiffness=s.stiffness * held.get(_along(s), 1.0)) for s in frame.springs]
+    masses += added
+    return replace(frame, factors=wanted, masses=tuple(masses), springs=tuple(springs))
 
 
 def halve_zones(model: Model) -> Model:
@@ -468,9 +448,9 @@ def list_entries(model: Model) -> list[Entry]:
             operator = ElementOperator(structure, every, blocks)
             term = Term("mass" if blocks is heavy else "stiffness", operator)
             found.append(_alone("all", quantity, term, std, (quantity,), ("all",)))
-    kinds: dict[str, list[str]] = {}
+    kinds = defaultdict[str, list[str]](list)
     for joint in frame.joints:
-        kinds.setdefault(joint.family, []).append(joint.name)
+        kinds[joint.family].append(joint.name)
     for place, alike_joints in kinds.items():
         std = mass * model.total_mass / np.sqrt(len(alike_joints))
         for name in alike_joints:
@@ -499,10 +479,9 @@ def _list_groups(model: Model) -> list[Entry]:
 def _attached(structure: Structure) -> list[Entry]:
     """Return what is open of drawn springs to ground, and of drawn masses, which have no extent."""
     frame = structure.frame
-    springs: dict[str, dict[str, list[GroundSpring]]] = {}
+    springs = defaultdict[str, dict[str, list[GroundSpring]]](dict)
     for one in frame.springs:
-        alike_springs = springs.setdefault(_family(frame, one.at), {})
-        alike_springs.setdefault(_along(one), []).append(one)
+        springs[_family(frame, one.at)].setdefault(_along(one), []).append(one)
     found = []
     for place, groups in springs.items():
         held = [structure.assemble_attachments((), alike)[1] for alike in groups.values()]
@@ -573,8 +552,7 @@ def _ends_of_joints(frame: Frame) -> dict[tuple[str, str], list[str]]:
     for joint in frame.joints:
         ends = frame.ends_at(joint.name)
         if joint.name in held and len(ends) == 1:
-            own = found.setdefault((joint.family, "foot"), [])
-            own.append(f"{next(iter(ends))}@{joint.name}")
+            found.setdefault((joint.family, "foot"), []).append(f"{next(iter(ends))}@{joint.name}")
     return found
 
 
@@ -659,9 +637,8 @@ def advise_modes(budget: Budget, case: Case) -> tuple[Advice, ...]:
     space, labels = state.problem.space, case.measurement.sensors.labels
     seen = np.abs(space.pad_readings(len(state.vectors)) @ state.vectors[:, further])
     found = []
-    for mode, size, std, reading in zip(
-        further, separation, np.sqrt(variance), seen.T, strict=True
-    ):
+    rows = zip(further, separation, np.sqrt(variance), seen.T, strict=True)
+    for mode, size, std, reading in rows:
         if size < settings.visible_deviations:  # hardly more than is not known anyhow
             continue
         hertz = state.frequencies[mode]
@@ -676,7 +653,8 @@ def advise_modes(budget: Budget, case: Case) -> tuple[Advice, ...]:
 
 def loosest_mode(budget: Budget) -> int | None:
     """Return the unused mode whose frequency is known least; None where all are known well."""
-    variance = np.where([mode.used for mode in budget.modes], 0.0, budget.variance)
+    variance = variance_of(frequency_slopes(budget.state), budget.covariance)
+    variance = np.where([mode.used for mode in budget.modes], 0.0, variance)
     row = int(variance.argmax())
     least = settings.visible_deviations * settings.budget_rest[0] ** 2
     return budget.modes[row].mode if variance[row] >= least else None
