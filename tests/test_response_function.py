@@ -20,7 +20,7 @@ from femubench.core.library.rank import plan_run
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.run.jobs import Job, execute
 from femubench.core.schema.records import run_from_json, run_to_json
-from femubench.core.schema.run_options import RunOptions
+from femubench.core.schema.run_options import RunKeywords
 from femubench.core.score.responses import score_responses
 from femubench.core.update.response_residuals import ResponseTargets
 from femubench.core.update.sensitivity_update import Iteration
@@ -174,13 +174,13 @@ def test_a_run_shows_responses_next_to_gains_that_are_as_without(tmp_path: Path)
     case = simulated_case(FACTORS)
     write_case(tmp_path / "with", case)
     write_case(tmp_path / "without", replace(case, split=None))
-    given = RunOptions(twins=0, nominal="drawn")
-    run = femubench.rank(tmp_path / "with", ["unchanged", "response-function"], given, jobs=1)
+    given = RunKeywords(twins=0, nominal="drawn")
+    run = femubench.rank(tmp_path / "with", ["unchanged", "response-function"], jobs=1, **given)
     frame = run.table.set_index("strategy")
     found = frame.loc["response-function"]
     assert found["responses_db"] == pytest.approx(found["responses_floor_db"], rel=0.1)
     assert frame.loc["unchanged", "responses_db"] > 3.0 * found["responses_db"]
-    plain = femubench.rank(tmp_path / "without", ["unchanged"], given, jobs=1)
+    plain = femubench.rank(tmp_path / "without", ["unchanged"], jobs=1, **given)
     (one,), (other,) = plain.results, [r for r in run.results if r.strategy == "unchanged"]
     assert (one.blocks, one.gain, one.responses) == (other.blocks, other.gain, None)
     text = TerminalReporter().render(run)
