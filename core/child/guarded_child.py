@@ -368,9 +368,12 @@ def memory_of(processes: Iterable[psutil.Process], root: str | None) -> int:
     """
     total, sockets, before = 0, 0, 0
     seen = set[tuple[int, int]]()
-    # As a worker starts its root is still that of this process.
-    if walled := root is not None and os.path.exists(root) and not os.path.samefile(root, "/"):
-        before = _count_sockets(str(root))
+    walled = False
+    if root is not None:
+        with suppress(OSError):  # it may have ended
+            # As a worker starts its root is still that of this process.
+            walled = not os.path.samefile(root, "/")
+            before = _count_sockets(root) if walled else 0
     for process in processes:
         with suppress(psutil.Error, OSError):
             total += _resident(process)

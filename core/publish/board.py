@@ -181,6 +181,8 @@ def _marks(strategy: str, findings: Iterable[Outcome]) -> list[str]:
     proof = min(best, key=_PROOFS.index, default="recomputed")
     marks: list[str] = [proof]
     twins = [twin_gains(run.run).get(strategy) for run in runs]
+    if not any(twins):
+        marks.append("no twins")
     if any(found is not None and found.suspicious for found in twins):
         marks.append("knows the cases?")
     if any(strategy in unsteady(run.run) for run in runs):
