@@ -248,7 +248,7 @@ def test_workers_that_a_user_started(tmp_path: Path, monkeypatch: pytest.MonkeyP
             time.sleep(0.1)
         address = re.findall(r'"(tcp://[^"]*)"', file.read_text())[0]
         monkeypatch.setattr(cluster, "_ANSWER", 1.0)
-        there = Where(scheduler=address)
+        there = Where(cluster=address)
         with open_executor(there) as place, pytest.raises(InputError, match="no worker"):
             run_jobs([toys.tiny_case()], [toys.Unchanged()], executor=place)
         monkeypatch.setattr(cluster, "_ANSWER", 60.0)
@@ -332,13 +332,12 @@ def test_jobs_of_a_stand_in_for_slurm(tmp_path: Path, monkeypatch: pytest.Monkey
 @pytest.mark.parametrize(
     ("words", "stated"),
     [
-        ({"scheduler": "host"}, r"'host' is no address \(expected tcp://HOST:PORT\)"),
-        ({"scheduler": "tcp://127.0.0.1:9"}, "no scheduler of Dask answers at tcp://127.0.0.1:9"),
-        ({"scheduler": "tcp://a:1", "cluster": "local:2"}, "two places for the same jobs"),
-        ({"cluster": "local:0"}, r"'local:0' is no cluster \(expected local:N, .* slurm:QUEUE\)"),
+        ({"cluster": "tcp://a"}, r"'tcp://a' is no address \(expected tcp://HOST:PORT\)"),
+        ({"cluster": "tcp://127.0.0.1:9"}, "no scheduler of Dask answers at tcp://127.0.0.1:9"),
+        ({"cluster": "local:0"}, r"'local:0' is no cluster \(.* slurm:QUEUE or tcp://HOST:PORT\)"),
         ({"cluster": "local"}, "'local' is no cluster"),
         ({"cluster": "local:2", "jobs": 2}, "local:2 tells the number of workers"),
-        ({"scheduler": "tcp://a:1", "jobs": 2}, "that of the threads of its workers"),
+        ({"cluster": "tcp://a:1", "jobs": 2}, "that of the threads of its workers"),
         ({"cluster": "slurm:short"}, "slurm:short needs sbatch, which is not here"),
     ],
 )

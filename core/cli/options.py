@@ -150,7 +150,7 @@ def of_jobs(json: str) -> Option:
     Arguments:
         json: what is in the file of JSON.
     """
-    where = of_fields(Where, "jobs", "scheduler", "cluster", "sandbox")
+    where = of_fields(Where, "jobs", "cluster", "sandbox")
     limits = of_fields(RunOptions, "timeouts", "memory")
     files = (json_file(json), store("Keep results there."), _report_file, quiet)
 

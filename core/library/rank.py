@@ -212,7 +212,7 @@ def rank(
         progress: called with (result, jobs done, jobs in all).
         keywords: what is computed, and where: ``seeds``, ``seed``, ``nominal``, ``drawing``,
             ``twins`` (a number, or that and a seed), ``resume``, ``overwrite``, ``timeout``,
-            ``timeouts``, ``memory``; ``jobs``, ``scheduler``, ``cluster``, ``sandbox``.
+            ``timeouts``, ``memory``; ``jobs``, ``cluster``, ``sandbox``.
 
     Raises:
         InputError: for an unknown name, an option that does not exist, or a faulty case.

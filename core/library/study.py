@@ -95,7 +95,7 @@ def study(
         file: a study file; see docs/studies.md.
         store: folder that keeps the results; a study goes on where it stopped. None for none.
         progress: called with (result, jobs done, jobs in all).
-        keywords: ``jobs``, ``scheduler``, ``cluster``, ``sandbox``, ``timeout``, ``timeouts``,
+        keywords: ``jobs``, ``cluster``, ``sandbox``, ``timeout``, ``timeouts``,
             ``memory`` and ``overwrite`` (``failed`` by default), as in `femubench.rank`; a timeout
             may be that of a strategy with or without options.
 

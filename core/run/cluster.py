@@ -252,13 +252,13 @@ def connect(where: Where) -> Iterator[DaskWorkers]:
     Raises:
         InputError: where nobody answers there, or for a number of jobs.
     """
-    address = str(where.scheduler)
+    address = str(where.cluster)
     if where.jobs is not None:
         what = "the number of jobs at a time is that of the threads of its workers"
-        raise InputError(what, key="scheduler", expected="no --jobs with it")
+        raise InputError(what, key="cluster", expected="no --jobs with it")
     if not re.fullmatch(r"[a-z]+://[^\s/]+:\d{1,5}", address):
         expected = "tcp://HOST:PORT"
-        raise InputError(f"{address!r} is no address", key="scheduler", expected=expected)
+        raise InputError(f"{address!r} is no address", key="cluster", expected=expected)
     with _quiet(), _client(address) as client:
         yield DaskWorkers(client, address, waits=False, sandbox=where.sandbox)
 
@@ -287,7 +287,7 @@ def start_cluster(where: Where) -> Iterator[DaskWorkers]:
             raise InputError(what, key="cluster", expected="a machine that submits to Slurm")
         make, jobs = partial(slurm_cluster, rest), jobs or _SLURM_JOBS
     else:
-        expected = "local:N, such as local:4, or slurm:QUEUE"
+        expected = "local:N, such as local:4, slurm:QUEUE or tcp://HOST:PORT"
         raise InputError(f"{words!r} is no cluster", key="cluster", expected=expected)
     with _quiet(), ExitStack() as stack:
         try:

@@ -67,21 +67,17 @@ class LocalProcesses:
 
 
 def open_executor(where: Where) -> AbstractContextManager[Executor]:
-    """Give what runs jobs: worker processes here, unless a scheduler or a cluster is named.
+    """Give what runs jobs: worker processes here, unless a cluster is named.
 
     Raises:
-        InputError: for both, for words that mean neither, or where nobody answers.
+        InputError: for words that mean no cluster, or where nobody answers.
     """
-    if where.scheduler is None and where.cluster is None:
+    if where.cluster is None:
         return nullcontext(LocalProcesses(count_workers(where.jobs), where.sandbox))
-    if where.scheduler is not None and where.cluster is not None:
-        what = "--scheduler and --cluster are two places for the same jobs"
-        raise InputError(what, expected="one of them")
-    flag = "--cluster" if where.scheduler is None else "--scheduler"
-    require("distributed", "cluster", flag)
+    require("distributed", "cluster", "--cluster")
     from femubench.core.run.cluster import connect, start_cluster
 
-    return start_cluster(where) if where.scheduler is None else connect(where)
+    return connect(where) if "://" in where.cluster else start_cluster(where)
 
 
 def count_workers(jobs: int | None) -> int:

@@ -57,14 +57,13 @@ class Where:
     Arguments:
         jobs: Number of worker processes. Default: one per core. With --cluster slurm:QUEUE the
             number of Slurm jobs.
-        scheduler: Run the jobs on the workers of the Dask scheduler there, e.g. tcp://host:8786.
-        cluster: Start a Dask cluster for the run: local:N workers here, or slurm:QUEUE.
+        cluster: Run the jobs on the workers of a Dask scheduler, e.g. tcp://host:8786, or of a
+            cluster that is started for the run: local:N workers here, or slurm:QUEUE.
         sandbox: Run strategies where they see no case, no file of yours, no other process and no
             network (Linux): where that is possible, or not at all, or without.
     """
 
     jobs: Annotated[Count | None, Flag("-j --jobs", "N")] = None
-    scheduler: Annotated[str | None, Flag(metavar="ADDRESS")] = None
     cluster: Annotated[str | None, Flag(metavar="CLUSTER")] = None
     sandbox: Annotated[Sandbox, Flag(show_default=True)] = "auto"
 
@@ -122,7 +121,6 @@ class StudyKeywords(TypedDict, total=False):
     """Keywords for options of a run, except those that stand in a study file."""
 
     jobs: int | None
-    scheduler: str | None
     cluster: str | None
     sandbox: Sandbox
     timeout: float | None
