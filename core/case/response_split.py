@@ -42,6 +42,9 @@ def split_responses(
         if label not in found.responses.labels:
             expected = f"one of {', '.join(found.responses.labels[:20])}"
             raise BadKey((*_KEY, "held_out_sensors", j), f"no response of {label[:40]!r}", expected)
+        if label in found.references.labels:  # by reciprocity the others say what it reads
+            what = f"a force acts at {label[:40]!r}"
+            raise BadKey((*_KEY, "held_out_sensors", j), what, "sensors where none acts")
     for path, band in _bands(split):
         if not in_bands(found.frequencies, [band]).any():
             there = "{:.6g} to {:.6g} Hz".format(*found.frequencies[[0, -1]])
