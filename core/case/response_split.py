@@ -39,9 +39,11 @@ def split_responses(
     found = _at_sensors(measured.transpose() if turned else measured, tested.sensors)
     split = ResponseSplit(spec.used, spec.held_out, spec.held_out_sensors)
     for j, label in enumerate(split.held_out_sensors):
-        if label not in found.responses.labels:
-            expected = f"one of {', '.join(found.responses.labels[:20])}"
-            raise BadKey((*_KEY, "held_out_sensors", j), f"no response of {label[:40]!r}", expected)
+        driven = label in found.references.labels  # reciprocity would give what it reads
+        if driven or label not in found.responses.labels:
+            what = f"{'a force acts at' if driven else 'no response of'} {label[:40]!r}"
+            expected = f"one of {', '.join(found.responses.labels[:20])}, driven by none"
+            raise BadKey((*_KEY, "held_out_sensors", j), what, expected)
     for path, band in _bands(split):
         if not in_bands(found.frequencies, [band]).any():
             there = "{:.6g} to {:.6g} Hz".format(*found.frequencies[[0, -1]])
