@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from femubench import Model
 from femubench.core.modal.eigen import (
@@ -91,6 +92,16 @@ def test_repeated_eigenvalues_give_orthonormal_shapes() -> None:
     np.testing.assert_allclose(pairs[:, 0], pairs[:, 1], rtol=1e-9)
     gram = modes.shapes.T @ model.mass.toarray() @ modes.shapes
     np.testing.assert_allclose(gram, np.eye(len(modes)), atol=1e-8)
+
+
+def test_low_eigenvalues_keep_their_digits_where_most_dofs_hardly_have_mass() -> None:
+    """Floors on columns almost without mass, whose own eigenvalues are 1e13 times higher."""
+    springs = 1e5 * np.array([1.0, 2.0, 3.0, 1.0, 2.0, 3.0, 1.0, 2.0])
+    stiffness = np.diag(springs[:-1] + springs[1:])
+    stiffness -= np.diag(springs[1:-1], 1) + np.diag(springs[1:-1], -1)
+    mass = np.diag([1e-12, 5.0, 1e-12, 4.0, 1e-12, 3.0, 1e-12])
+    expected = 1.0 / eigh(mass, stiffness, eigvals_only=True)[::-1]
+    np.testing.assert_allclose(solve_dense(mass, stiffness)[0][:3], expected[:3], rtol=1e-12)
 
 
 def test_what_is_known_of_a_large_model_is_not_solved_again(ladder: FrameBuilder) -> None:
