@@ -432,7 +432,7 @@ class JointZones:
                 ends = frame.ends_at(end.rpartition("@")[2])
                 if len(ends) > 2 or len({within[name] for name in ends}) > 1:
                     found.setdefault((group.type, group.role), []).append(end)
-        held = {str(s.at) for s in (*frame.supports, *frame.springs)}
+        held = {str(s.at) for s in frame.supports} | {str(s.at) for s in frame.springs}
         for joint in frame.joints:
             ends = frame.ends_at(joint.name)
             if joint.name in held and len(ends) == 1:
