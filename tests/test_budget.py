@@ -14,6 +14,7 @@ import pytest
 from msgspec import structs
 
 import femubench
+from benchmarks.budget_score import BudgetScore
 from femubench import fem, plot
 from femubench.core.case.case import Case
 from femubench.core.case.writing import write_case
@@ -25,7 +26,7 @@ from femubench.core.diagnosis.budget import (
     frequency_slopes,
     log_frequencies,
 )
-from femubench.core.diagnosis.budget_advice import advise_modes
+from femubench.core.diagnosis.budget_advice import advise_modes, loosest_mode
 from femubench.core.diagnosis.entries import extend_frame, list_entries
 from femubench.core.diagnosis.serial import diagnosis_to_json
 from femubench.core.drawing.findings import lacks_found
@@ -387,6 +388,8 @@ def test_the_mode_that_says_most_of_what_is_open_is_advised_first(drawn: Case) -
     rest = 100.0 * settings.budget_rest[0]
     assert row.separation == pytest.approx((stds[loosest] / rest) ** 2)
     assert [r.separation for r in rows] == sorted((r.separation for r in rows), reverse=True)
+    score = BudgetScore(read_lacks(LACKS / "h-tube.toml"))
+    assert score.budget.modes[score.advised].mode == loosest == loosest_mode(found)
     # A fit with it knows it.
     more = replace(drawn, used=(*drawn.used, loosest), held_out=())
     again = budget_of(more, list_effects())

@@ -16,7 +16,7 @@ from truths.lacks import in_overlap
 from truths.lacks_file import LACKS, Lacks, lacks_of, lacks_text, read_lacks, refusal
 from truths.modes_of import assembled, mesh_of
 from truths.posing import ROOT, SUITE
-from truths.section_features import SHEAR_CENTRE, WARPING, Sections, constants
+from truths.section_features import ECCENTRIC, SHEAR_CENTRE, WARPING, Sections, constants
 from truths.sections import angle, bar, channel, i_beam, rectangular_tube
 from truths.structure import Member
 from truths.suite import structures
@@ -150,3 +150,9 @@ def test_a_force_at_its_centroid_twists_a_channel_by_less_where_its_end_cannot_w
         stiffness = sections.refine(plain, names).stiffness.toarray()
         moved = np.linalg.solve(stiffness, np.eye(plain.size)[tip[0]])
         np.testing.assert_allclose(moved[tip[1]], share * twist, rtol=1e-3)
+    beside = tuple((a + 0.03, b + 0.03, *rest) for a, b, *rest in shape.rectangles)
+    off = replace(made, sections={"u": replace(shape, rectangles=beside)})
+    stiffness = Sections(off, frame, ()).refine(plain, [ECCENTRIC]).stiffness.toarray()
+    pull, turn = (plain.dofs.direction.index(d) for d in ("x", "rz"))
+    moved = np.linalg.solve(stiffness, np.eye(plain.size)[pull])
+    np.testing.assert_allclose(moved[turn], 0.03 * span / (steel.E * yy), rtol=1e-6)

@@ -30,6 +30,7 @@ Refinement = tuple[str, str, str]  # class, place, in words
 Edit = Callable[[Frame], Frame]
 SHEAR_CENTRE = "shear-centre", "all", "bending about the shear centres of open sections"
 WARPING = "warping", "all", "open sections that resist warping"
+ECCENTRIC = "eccentricity", "all", "centroids off the drawn axes"
 LEAST = 1e-6  # relative; what is less is rounding
 # Of twist and its rate times the length at both ends: GJ / 30 L, linear and cubic; E Cw / L^3.
 _LINEAR = 30.0 * np.array([[1, 0, -1, 0], [0, 0, 0, 0], [-1, 0, 1, 0], [0, 0, 0, 0]])
@@ -45,6 +46,7 @@ class Constants:
         area, torsion, warping: m2; St Venant's constant, m4; Vlasov's, m6.
         second: integrals of y y, y z and z z, (2, 2), m4.
         centre: y and z of the shear centre, (2,), m.
+        centroid: y and z from the drawn axis, (2,), m.
     """
 
     area: float
@@ -52,12 +54,14 @@ class Constants:
     warping: float
     second: Array
     centre: Array
+    centroid: Array
 
     def scaled(self, area: float) -> Constants:
         """Return those of a section of the same shape and another area, m2."""
         s = np.sqrt(area / self.area)
         warping, second = s**6 * self.warping, s**4 * self.second
-        return Constants(area, float(s**4 * self.torsion), float(warping), second, s * self.centre)
+        torsion, points = float(s**4 * self.torsion), (s * self.centre, s * self.centroid)
+        return Constants(area, torsion, float(warping), second, *points)
 
 
 @cache
@@ -101,7 +105,7 @@ def constants(rectangles: tuple[Rectangle, ...]) -> Constants:
     centre = np.linalg.solve([[-yz, yy], [-zz, yz]], at @ (inner @ warping))
     warping = warping - centre[1] * at[0] + centre[0] * at[1]
     own = float(warping @ (inner @ warping))
-    return Constants(float(cells.sum()), torsion, own, second, centre)
+    return Constants(float(cells.sum()), torsion, own, second, centre, centroid)
 
 
 class Sections:
@@ -133,8 +137,9 @@ class Sections:
             found[name] = partial(_changed, change=_twisting, known=self.shaped)
             if self.open:
                 found[WARPING] = lambda frame: frame  # of the matrices
-            if any(np.abs(own.centre).max() ** 2 > LEAST * own.area for own in self.open.values()):
-                found[SHEAR_CENTRE] = lambda frame: frame
+            for name, at in ((SHEAR_CENTRE, "centre"), (ECCENTRIC, "centroid")):
+                if any(self._is_off(own, at) for own in self.open.values()):
+                    found[name] = lambda frame: frame
         if self.structure.plane == "3d":
             skew = {k: c for k, c in self.open.items() if abs(c.second[0, 1]) > LEAST * c.area**2}
             if skew:
@@ -145,29 +150,47 @@ class Sections:
             found["taper", "all", "sections that taper along a member"] = self._taper
         return found
 
+    def _is_off(self, own: Constants, at: str) -> bool:
+        return bool(np.abs(getattr(own, at)).max() ** 2 > LEAST * own.area)
+
     def refine(self, model: Model, names: Collection[Refinement]) -> Model:
         """Return a model with those refinements of a list that are none of its frame."""
-        model = self._bend_about_centres(model) if SHEAR_CENTRE in names else model
+        bent = self._moved(model, "centre", SHEAR_CENTRE in names)
+        line = self._moved(model, "centroid", ECCENTRIC in names)
+        # The axial displacement too is that of the centroid, of the shear centre it is not.
+        for end in (0, 6):
+            line[:, end, end + 4] = -line[:, end + 1, end + 3]  # z ry
+            line[:, end, end + 5] = -line[:, end + 2, end + 3]  # -y rz
+        p = model.frame_structure.properties
+        turn = bent @ line
+        more = turn.transpose(0, 2, 1) @ p.stiffness_matrices() @ turn - p.stiffness_matrices()
+        heavy = line.transpose(0, 2, 1) @ p.mass_matrices() @ line - p.mass_matrices()
+        own = np.arange(len(turn))
+        stiffer, heavier = (
+            sparse_matrix(ElementOperator(model.frame_structure, own, blocks), model.size)
+            for blocks in (more, heavy)
+        )
+        model = replace(model, stiffness=model.stiffness + stiffer, mass=model.mass + heavier)
         return self._restrain_warping(model) if WARPING in names else model
 
-    def _bend_about_centres(self, model: Model) -> Model:
-        """Return a model that bends about the shear centres, with axial forces at the centroids.
+    def _moved(self, model: Model, point: str, wanted: bool) -> Array:
+        """Return the displacements of a point of open sections from those of nodes, (k, 12, 12).
 
-        A shear centre at y and z moves by v - z rx and w + y rx.
+        A point at y and z moves by v - z rx and w + y rx.
         """
         meshed = model.frame_structure
         turn = np.tile(np.eye(12), (len(meshed.properties), 1, 1))
         for number, drawn in enumerate(self.frame.members):
-            if drawn.name in self.open:
+            if wanted and drawn.name in self.open:
                 rows = meshed.mesh.member == number
-                before, centre = member_axes(self.frame, drawn)[0], self.open[drawn.name].centre
-                y, z = meshed.mesh.axes[rows][0, 1:] @ before[1:].T @ centre
+                before, at = (
+                    member_axes(self.frame, drawn)[0],
+                    getattr(self.open[drawn.name], point),
+                )
+                y, z = meshed.mesh.axes[rows][0, 1:] @ before[1:].T @ at
                 for end in (0, 6):
                     turn[rows, end + 1, end + 3], turn[rows, end + 2, end + 3] = -z, y
-        own = meshed.properties.stiffness_matrices()
-        more = turn.transpose(0, 2, 1) @ own @ turn - own
-        operator = ElementOperator(meshed, np.arange(len(own)), more)
-        return replace(model, stiffness=model.stiffness + sparse_matrix(operator, model.size))
+        return turn
 
     def _restrain_warping(self, model: Model) -> Model:
         """Return a model whose open sections warp with the rate of twist, which takes stiffness.
