@@ -1,16 +1,16 @@
 """Compare budgets of errors with what drawings lack; write docs/diagnosis-accuracy.md.
 
-    python benchmarks/budget_score.py           # development half: means, structures, advice
+    python benchmarks/budget_score.py           # development half: budgets and the advised mode
     python benchmarks/budget_score.py held      # the other half: its rows are kept unless asked
     python benchmarks/budget_score.py portal    # one structure, class by class
 
-The truths are those of `make truths ARGS="--only lacks"`; half a minute.
+The truths are those of `make truths ARGS="--only lacks"`; a minute.
 """
 
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -22,9 +22,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # the truths are not install
 from sweep_data import PAGE, as_markdown, filled
 
 import femubench
-from femubench.core.diagnosis.budget import budget_of
+from femubench.core.diagnosis.budget import budget_of_modes
+from femubench.core.diagnosis.budget_advice import open_variance
 from femubench.core.plugin.loader import list_effects
-from truths.lacks_file import LACKS, Lacks, read_lacks, rms
+from femubench.core.score.responses import rms
+from truths.lacks_file import LACKS, Lacks, read_lacks
 
 Array = npt.NDArray[np.float64]
 Class = tuple[str, str]
@@ -40,7 +42,7 @@ KINDS = {
     **dict.fromkeys(("joint-mass", "joint mass", "overlap of members", "added-mass"), "mass"),
     "rotary inertia of masses": "mass",
     **dict.fromkeys(("shear-deformation", "rotary-inertia"), "shear"),
-    "GJ": "torsion-constant",
+    **dict.fromkeys(("GJ", "warping"), "torsion-constant"),
     "density": "mass",
 }
 
@@ -63,7 +65,13 @@ class BudgetScore:
     @cached_property
     def budget(self) -> femubench.diagnosis.Budget:
         """Return the budget by the used modes."""
-        found = budget_of(femubench.cases[f"suite/{self.truth.structure}"], list_effects())
+        return self.budget_with()
+
+    def budget_with(self, *more: int) -> femubench.diagnosis.Budget:
+        """Return the budget by the used modes and others."""
+        case = femubench.cases[f"suite/{self.truth.structure}"]
+        used = sorted((*case.used, *more))
+        found = budget_of_modes(case.model, case.measurement, used, list_effects())
         assert found is not None
         return found
 
@@ -145,34 +153,27 @@ class BudgetScore:
     @cached_property
     def advised(self) -> int:
         """Return the row of the held-out mode that is known least, which is advised first."""
-        return int(np.argmax(np.where(self.used, -1.0, self.budget.variance)))
+        return int(open_variance(self.budget).argmax())
 
-    def left_with(self, row: int) -> Array:
-        """Return what a budget leaves of every mode that has one more of them to use, (m,)."""
-        case = femubench.cases[f"suite/{self.truth.structure}"]
-        used = sorted((*case.used, self.budget.modes[row].mode))
-        found = budget_of(replace(case, used=tuple(used), held_out=()), list_effects())
-        assert found is not None
-        return np.array([mode.left_percent for mode in found.modes])
+    @cached_property
+    def left_with(self) -> dict[int, Array]:
+        """Return what is left of held-out modes, (h,), by the row of the one that is used too."""
+        rows = np.flatnonzero(~self.used)
+        found = {int(row): self.budget_with(self.budget.modes[row].mode) for row in rows}
+        return {r: np.array([b.modes[i].left_percent for i in rows]) for r, b in found.items()}
 
-    def advice(self) -> tuple[dict[str, str], int, float]:
-        """Return the row of a table, the rank of the advised mode, and the ratio with it."""
-        all_left = {int(row): self.left_with(int(row)) for row in np.flatnonzero(~self.used)}
-        after = {row: rms(left[~self.used]) for row, left in all_left.items()}
-        rank = 1 + sorted(after, key=lambda row: after[row]).index(self.advised)
-        unseen = ~self.used & (np.arange(len(self.used)) != self.advised)
-        ratio = rms(all_left[self.advised][unseen]) / rms(self.handbook[unseen])
-        cells = {
-            "structure": f"`{self.truth.structure}`",
-            "held out": str(len(after)),
-            "advised": str(self.budget.modes[self.advised].mode),
-            "its rank": str(rank),
-            "error of held-out modes without, %": f"{rms(self.left[~self.used]):.2f}",
-            "with it": f"{after[self.advised]:.2f}",
-            "with the best": f"{min(after.values()):.2f}",
-            "of those still unseen, of the handbook's": f"{ratio:.2f}",
-        }
-        return cells, rank, ratio
+    @property
+    def after(self) -> list[float]:
+        """Return the errors of held-out modes with one of them used, the advised one first."""
+        rows = sorted(self.left_with, key=lambda row: row != self.advised)
+        return [rms(self.left_with[row]) for row in rows]
+
+    @property
+    def ratio_with(self) -> float:
+        """Return the error of modes unseen with the advised one too, of the handbook's."""
+        unseen = np.flatnonzero(~self.used) != self.advised
+        left, book = self.left_with[self.advised], self.handbook[~self.used]
+        return rms(left[unseen]) / rms(book[unseen])
 
     def intervals(self) -> tuple[list[bool], list[Class]]:
         """Tell of every class whether its interval has the truth, and which signs are wrong."""
@@ -211,8 +212,39 @@ def row(name: str, scores: list[BudgetScore]) -> dict[str, str]:
     }
 
 
+def advice_row(name: str, scores: list[BudgetScore]) -> dict[str, str]:
+    """Return what one more mode does to the budgets of some structures, as geometric means."""
+    ranks = [1 + int((np.array(one.after) < one.after[0]).sum()) for one in scores]
+    best_two, alone = sum(rank <= 2 for rank in ranks), len(scores) == 1
+    figures = {
+        "error of held-out modes without, %": [rms(one.left[~one.used]) for one in scores],
+        "with it": [one.after[0] for one in scores],
+        "with the best": [min(one.after) for one in scores],
+        "of those still unseen, of the handbook's": [one.ratio_with for one in scores],
+    }
+    return {
+        "structure": name,
+        "held out": str(sum(len(one.after) for one in scores)),
+        "advised": str(scores[0].budget.modes[scores[0].advised].mode) if alone else "",
+        "its rank": str(ranks[0]) if alone else f"of the best two in {best_two} of {len(ranks)}",
+        **{key: f"{np.exp(np.mean(np.log(values))):.2f}" for key, values in figures.items()},
+    }
+
+
+def merged(text: str, mark: str, order: list[str], fresh: dict[str, dict[str, str]]) -> str:
+    """Return a page with fresh rows in a table, the others as they stand."""
+    old, keys = {}, list(next(iter(fresh.values())))
+    for line in text.partition(f"<!-- {mark} -->")[2].partition("<!-- /")[0].splitlines():
+        if cells := [cell.strip() for cell in line.strip("|").split("|")]:
+            old[cells[0]] = cells
+    there = [name for name in order if name in fresh or name in old]
+    rows = [fresh.get(name) or dict(zip(keys, old[name], strict=True)) for name in there]
+    print(as_markdown(rows))
+    return filled(text, as_markdown(rows), mark)
+
+
 def main() -> None:
-    """Write the table, or show one structure."""
+    """Write the tables, or show one structure."""
     truths = [read_lacks(file) for file in sorted(LACKS.glob("*.toml"))]
     scores = [BudgetScore(truth) for truth in truths if not truth.refused]
     for score in scores:
@@ -223,29 +255,15 @@ def main() -> None:
     run = "held" if sys.argv[1:] == ["held"] else "development"
     if sys.argv[1:] and run != "held":
         return
-    text, old = PAGE.read_text(encoding="utf-8"), {}
-    for line in text.partition(f"<!-- {MARK} -->")[2].partition("<!-- /")[0].splitlines():
-        if cells := [cell.strip() for cell in line.strip("|").split("|")]:
-            old[cells[0]] = cells
-    halves = {half: [s for s in scores if s.truth.held == (half == "held")] for half in HALVES}
-    named = {
-        half: {f"{half} ({len(own)})": own, **{f"`{s.truth.structure}`": [s] for s in own}}
-        for half, own in halves.items()
-    }
-    fresh = {name: row(name, own) for name, own in named[run].items()}
-    keys = list(next(iter(fresh.values())))
+    named = {}
+    for half in HALVES:
+        own = [score for score in scores if score.truth.held == (half == "held")]
+        named[half] = {f"{half} ({len(own)})": own, **{f"`{s.truth.structure}`": [s] for s in own}}
     order = [next(iter(names)) for names in named.values()]
     order += [name for names in named.values() for name in list(names)[1:]]
-    rows = [fresh.get(n) or dict(zip(keys, old[n], strict=True)) for n in order]
-    text = filled(text, as_markdown(rows), MARK)
-    print(as_markdown(rows))
-    if run == "development":
-        table, ranks, ratios = zip(*(score.advice() for score in halves[run]), strict=True)
-        print(as_markdown(list(table)))
-        print(
-            f"best two {np.mean(np.array(ranks) <= 2):.2f}, {np.exp(np.mean(np.log(ratios))):.2f}"
-        )
-        text = filled(text, as_markdown(list(table)), ADVICE)
+    text = PAGE.read_text(encoding="utf-8")
+    for mark, make in ((MARK, row), (ADVICE, advice_row)):
+        text = merged(text, mark, order, {n: make(n, own) for n, own in named[run].items()})
     PAGE.write_text(text, encoding="utf-8")
 
 

@@ -9,16 +9,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from advice_problems import STD, advised, every_option, fitted, posed
-from diagnosis_problems import clamped_portal, measured, problem_of
+from diagnosis_problems import clamped_portal, measured, problem_of, sensors_on_joints
 
 from femubench import Model, solve_modes
 from femubench.core.advise.advice import advise
 from femubench.core.advise.point_attachments import list_supports
+from femubench.core.fem.alteration import alter_model
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
-from femubench.fem import Frame, GroundSpring, Joint, Material, Member, Place, Section, Support
+from femubench.fem import (
+    Frame,
+    GroundSpring,
+    Joint,
+    Material,
+    Member,
+    Place,
+    Section,
+    Support,
+    matrix_model,
+)
 from femubench.plugins.effects.joint_rotation import JointRotation
-from femubench.plugins.effects.material import Density, YoungsModulus
+from femubench.plugins.effects.material import Density, MemberStiffness, YoungsModulus
 from femubench.plugins.effects.support_flexibility import SupportFlexibility
 from femubench.plugins.effects.temperature import Temperature
 
@@ -197,11 +208,46 @@ class TestSupports:
         model, whole = Model.of(frame), YoungsModulus()
         problem = posed(model, whole.extend(model, "all", [0.05]), [whole, Density()])
         fits = [fitted(problem, effect, "all") for effect in (whole, Density())]
-        ways = [text for text, *_ in list_supports(frame, problem.data.measurement.sensors)]
+        ways = [text for text, *_ in list_supports(model, problem.data.measurement.sensors)]
         assert ways == ["take away the support at fl", "take away the support at fr"]
         # Without fr the spring keeps it from turning about fl; without fl it can turn.
         options = [text for text in every_option(model, problem, fits) if "take away" in text]
         assert [text.startswith(ways[1]) for text in options] == [True]
+
+    def test_a_support_of_matrices_is_a_group(self) -> None:
+        """Frequencies do not say which of two pads is soft; those without one of them do."""
+        section, steel = Section.rectangular_tube(0.04, 0.03, 0.002), Material(2.1e11, 0.3, 7850.0)
+        bare = replace(clamped_portal(4, section, steel), supports=())
+        pad = {"x": 2e6, "z": 4e6, "ry": 3e4}
+
+        def on(**shares: float) -> Model:
+            feet = [(Place(f), share) for f, share in shares.items()]
+            springs = [GroundSpring(at, d, s * k) for at, s in feet for d, k in pad.items()]
+            return Model.of(bare.with_attachments((), tuple(springs)))
+
+        parts = {f: on(**{f: 1.0}).stiffness - on().stiffness for f in ("fl", "fr")}
+        groups, kinds = {"portal": on().stiffness, **parts}, dict.fromkeys(parts, "support")
+        model = replace(on(fl=1.0, fr=1.0), structure=None, groups=groups, group_kinds=kinds)
+        test = measured(on(fl=0.5, fr=1.0), bare, shapes=0, weighed=False)
+        problem = problem_of(model, test, [MemberStiffness()])
+        fits = [fitted(problem, MemberStiffness(), f"group:{f}", -0.5) for f in parts]
+        best = advised(model, problem, fits)[0]
+        text = "take away the support at group:fr and measure again, above all the modes near"
+        assert best.measurement.startswith(text)
+        exact = solve_modes(on(fl=0.5)).natural_frequencies
+        for named in re.findall(r"[0-9.]+", best.measurement):
+            assert np.abs(exact / float(named) - 1.0).min() < 6e-3
+
+    def test_matrices_that_hang_free_are_held_at_nodes(self, symmetric: Model) -> None:
+        dofs = symmetric.dofs
+        known = symmetric.mass, symmetric.stiffness, dofs.node.tolist(), dofs.direction, dofs.xyz
+        plain = matrix_model(*known)
+        sensors = sensors_on_joints(symmetric.frame_structure.frame)
+        assert list(list_supports(plain, sensors)) == []
+        (way, held, _), *_ = list_supports(replace(plain, free=True), sensors)
+        assert way == "hold 0 in z"
+        free, pinned = (solve_modes(m) for m in (plain, alter_model(plain, held)))
+        assert (free.rigid.sum(), pinned.rigid.sum()) == (3, 2)
 
 
 class TestGroups:

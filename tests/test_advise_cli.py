@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from femubench.core.case.case import Case
-from femubench.core.diagnosis.budget import budget_of
+from femubench.core.diagnosis.budget import budget_of_modes
 from femubench.core.library import advise
 from femubench.core.library.advise import play_advice
 from femubench.core.library.cases import cases
@@ -26,7 +26,8 @@ def verdicts(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     words: list[str] = []
 
     def search(case: Case, *_: object) -> object:
-        found = budget_of(case, list_effects())
+        read = case.model, case.measurement, case.used
+        found = budget_of_modes(*read, list_effects())
         return replace(toys.made(), verdict=words.pop(0) if words else "unknown", drawing=found)
 
     monkeypatch.setattr(advise, "diagnosis_of", search)

@@ -76,7 +76,9 @@ def test_a_faulty_key_is_one_line(tmp_path: Path, old: str, new: str, line: str)
 
 def test_a_truth_in_a_folder_of_another_half_is_refused(tmp_path: Path) -> None:
     room = written(tmp_path)
-    other = next(name for name in map(str, range(99)) if is_held(name) != is_held(room.name))
+    names = [str(number) for number in range(99)]
+    assert [is_held(f"suite/{name}") for name in names] == [is_held(name) for name in names]
+    other = next(name for name in names if is_held(name) != is_held(room.name))
     with pytest.raises(InputError, match="held: the half is another"):
         read_truth(room.rename(tmp_path / other))
 

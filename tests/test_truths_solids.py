@@ -35,7 +35,7 @@ TRUTHS = Path(__file__).parents[1] / "truths"
 POSING = {
     *("opensees_cases.py", "shear_cases.py", "posing.py", "faults.py", "defect_cases.py"),
     *("published.py", "stretch_file.py", "tables.py", "truth_text.py", "__main__.py"),
-    *("counterfactuals.py", "lacks_file.py"),
+    *("counterfactuals.py", "lacks_file.py", "section_features.py"),
 }
 
 

@@ -40,7 +40,8 @@ SOLVER = (
 
 DEFECTS = ("defects", "defect_cases", "prestress")  # what those of a defect follow from as well
 STRETCHES = ("affine", "remade", "reduction", "stretch", "stretch_file")  # and what twins have
-LACKS = ("lacks", "counterfactuals", "lacks_file", "drawing")  # and what drawings lack
+# And what drawings lack.
+LACKS = ("lacks", "counterfactuals", "section_features", "lacks_file", "drawing")
 
 
 def digest(name: str, *more: str) -> str:

@@ -10,13 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
-from itertools import combinations, pairwise
+from itertools import combinations
 from math import comb
 
 import numpy as np
 import numpy.typing as npt
-import skfem
-from skfem.models.poisson import laplace
 
 from femubench import Model, Sensors, read_case, solve_modes
 from femubench.fem import Frame, ModelError, RigidEnd
@@ -27,7 +25,7 @@ from truths.measurement import mac, paired
 from truths.modes_of import SHARES, SPARE, Observed, assembled, modes_of
 from truths.posing import SUITE
 from truths.reduction import PLANES
-from truths.sections import Section
+from truths.section_features import Refinement, Sections, constants
 from truths.solid import Solid
 from truths.structure import Block, Member, Structure
 
@@ -37,7 +35,6 @@ FINER = 4  # elements of the fine drawing for one of the drawn one, at most
 ROOM = 1.05  # of an arm, which the first element of a member must hold
 State = tuple[Array, Array]  # frequencies, Hz, and shapes at stations, a row a mode
 Made = tuple[tuple[Member, ...], tuple[Block, ...]]
-Refinement = tuple[str, str, str]  # class, place, in words
 
 
 @dataclass(frozen=True)
@@ -116,46 +113,11 @@ def weighing_as_drawn(structure: Structure, solid: Solid, joint: str) -> Solid:
     volume = np.ptp(solid.points[:, solid.cells[:, cells]], axis=1).prod(axis=0)
     wanted = sum(
         structure.materials[member.material].rho
-        * constants(structure.sections[member.section])[0]
+        * constants(structure.sections[member.section].rectangles).area
         * face
         for member, _, face in ends_at(structure, joint)
     )
     return solid.scaled(cells, mass=float(wanted / (volume @ solid.density[cells])))
-
-
-@cache
-def _load() -> skfem.LinearForm:
-    return skfem.LinearForm(lambda v, w: w.x[1] * v.grad[0] - w.x[0] * v.grad[1])
-
-
-def constants(section: Section) -> tuple[float, float]:
-    """Return area (m2) and torsion constant (m4) of a section's rectangles.
-
-    Four cells across the thinnest, 16 in all or more.
-
-    Source: St Venant's warping function, J = Ip minus the energy of the warping.
-    """
-    lines = []
-    for axis in (0, 2):
-        edges = np.unique(np.round([r[axis + i] for r in section.rectangles for i in (0, 1)], 9))
-        step = min(np.diff(edges).min() / 4, np.ptp(edges) / 16)
-        counts = np.clip(np.diff(edges) / step + 1.01, 2, 25).astype(int)
-        pieces = [
-            np.linspace(a, b, n)[:-1] for (a, b), n in zip(pairwise(edges), counts, strict=True)
-        ]
-        lines.append(np.append(np.concatenate(pieces), edges[-1]))
-    mesh = skfem.MeshQuad.init_tensor(*lines)
-    y, z = mesh.p[:, mesh.t].mean(axis=1)
-    solid = np.zeros(len(y), dtype=bool)
-    for y0, y1, z0, z1, filled in section.rectangles:
-        solid[(y > y0) & (y < y1) & (z > z0) & (z < z1)] = filled
-    corners = mesh.p[:, mesh.t[:, solid]]
-    sides, area = np.ptp(corners, axis=1), np.ptp(corners, axis=1).prod(axis=0)
-    polar = area @ (corners.mean(axis=1) ** 2 + sides**2 / 12).sum(axis=0)
-    basis = skfem.CellBasis(mesh.restrict(np.flatnonzero(solid)), skfem.ElementQuad2(), intorder=4)
-    load = _load().assemble(basis)
-    warping = skfem.solve(*skfem.condense(laplace.assemble(basis), load, D=np.array([0])))
-    return float(area.sum()), float(polar - load @ warping)
 
 
 def arms(structure: Structure, joint: str) -> Iterable[RigidEnd]:
@@ -179,8 +141,9 @@ class Drawings:
         self.structure = structure
         self.frame = read_case(SUITE / structure.name).model.frame_structure.frame
         self.refinements: dict[Refinement, Callable[[Frame], Frame]] = {}
-        longest: dict[str, float] = {}
+        longest, held = dict[str, float](), {clamp.at for clamp in structure.clamps}
         for kind, joints in joints_by_type(structure).items():
+            held |= {*joints}
             ends = tuple(arm for joint in joints for arm in arms(structure, joint))
             for arm in ends:
                 longest[arm.member] = max(longest.get(arm.member, 0.0), arm.stiffness_length)
@@ -192,18 +155,17 @@ class Drawings:
         if self.frame.beam == "euler-bernoulli":
             theory = partial(replace, beam="timoshenko", bending_mass="shear-consistent")
             self.refinements["shear-deformation", "all", "shear and rotary inertia"] = theory
-        if structure.plane != "in-plane":
-            self.refinements["torsion-constant", "all", "torsion constants of the shapes"] = (
-                partial(_twisting, structure=structure)
-            )
+        self.sections = Sections(structure, self.frame, held)
+        self.refinements |= self.sections.refinements()
 
     def solve(self, names: Iterable[Refinement]) -> State:
         """Return the elastic modes of the drawing with some refinements."""
         frame, structure = self.frame, self.structure
+        names, count = list(names), structure.used + structure.held_out
         for name in names:
             frame = self.refinements[name](frame)
         try:
-            model, count = Model.of(frame), structure.used + structure.held_out
+            model = self.sections.refine(Model.of(frame), names)
         except ModelError as error:
             raise ValueError(f"{structure.name}: {error}") from error
         modes = solve_modes(model, min(count + SPARE + 6, model.size)).elastic
@@ -232,17 +194,6 @@ def _divided(frame: Frame, longest: Mapping[str, float], finer: int) -> Frame:
 
 def _armed(frame: Frame, longest: Mapping[str, float], ends: tuple[RigidEnd, ...]) -> Frame:
     return replace(_divided(frame, longest, 1), rigid_ends=(*frame.rigid_ends, *ends))
-
-
-def _twisting(frame: Frame, structure: Structure) -> Frame:
-    members = []
-    for member in frame.members:
-        section = structure.sections[structure.member(member.name).section]
-        # Circles are squares here until they are warped.
-        if section.rectangles and "diameter" not in section.drawn:
-            member = replace(member, section=replace(member.section, J=constants(section)[1]))
-        members.append(member)
-    return replace(frame, members=tuple(members))
 
 
 def shapley(

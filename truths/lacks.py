@@ -22,10 +22,10 @@ Array = npt.NDArray[np.float64]
 STIFFNESS, MASS, SUPPORT, LUMP = "joint-stiffness", "joint-mass", "support", "added-mass"
 # Chosen before any result was seen; a file without `LACKS` has no plates, gussets or feet.
 TRIED = (
-    *("a-frame", "box-frame", "bracket", "c-press", "footing-frame", "gantry", "grid-tabs"),
-    *("h-tube", "haunched-portal", "lathe-bed", "mast-lumps", "mast-on-pad", "pi-portal"),
-    *("pile-bent", "portal", "skew-grid", "table-feet", "tower", "trailer", "two-material-tee"),
-    *("vierendeel", "warren-truss"),
+    *("a-frame", "box-frame", "bracket", "c-press", "curved-deck", "footing-frame", "gantry"),
+    *("grid-tabs", "h-tube", "haunched-portal", "lathe-bed", "mast-lumps", "mast-on-pad"),
+    *("pi-portal", "pile-bent", "portal", "skew-grid", "table-feet", "tower", "trailer"),
+    *("two-material-tee", "vierendeel", "warren-truss", "wing-spar"),
 )
 
 
@@ -111,9 +111,10 @@ def joints_by_type(structure: Structure) -> dict[str, tuple[str, ...]]:
 
 def ends_at(structure: Structure, joint: str) -> list[tuple[Member, int, float]]:
     """Return member, end (0, 1) and distance to the face of the crossing member (m) at a joint."""
+    made = replace(structure, members=tuple(structure.solid_members))
     return [
-        (member, end, face_of(structure, member, end))
-        for member in structure.solid_members
+        (member, end, face_of(made, member, end))
+        for member in made.members
         for end in (0, 1)
         if member.ends[end] == joint
     ]

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from femubench.core.challenge.truth_file import is_held
+from femubench.core.score.responses import rms
 from truths.counterfactuals import Budget, Share, budget_of
 from truths.drawing import table
 from truths.posing import ROOT
@@ -24,6 +25,7 @@ Array = npt.NDArray[np.float64]
 LACKS = ROOT / "truths" / "data" / "lacks"
 PAGE = ROOT / "docs" / "diagnosis-accuracy.md"
 MARK, END = "<!-- lacks -->", "<!-- /lacks -->"
+OF_OPEN = ("eccentricity", "product-of-inertia", "shear-centre", "taper", "warping")
 LARGEST_REMAINDER = 1 / 3  # of the misfit, rms over the modes
 LEAST_MAC = 0.9  # of the ideal solid and the ideal drawing, in every mode
 DIGITS = 5  # decimals of ln f: 0.001 %
@@ -82,11 +84,6 @@ class Lacks:
     mac: tuple[float, ...]
     features: tuple[Part, ...]
     net: tuple[Part, ...]
-
-
-def rms(values: npt.ArrayLike) -> float:
-    """Return the root of the mean square."""
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _numbers(values: Array) -> tuple[float, ...]:
@@ -178,6 +175,16 @@ def write_table(page: Path = PAGE, folder: Path = LACKS) -> None:
             f"refused: {item.refused}" if item.refused else "kept",
         ]
         rows.append(f"| {' | '.join(cells)} |")
+    rows += [
+        "",
+        "Of open sections and tapers, in % of the frequency of each mode, used ones first:",
+        "",
+    ]
+    rows += ["| structure | of its sections | what they do |", "| :--- | :--- | :--- |"]
+    for item, part in ((i, p) for i in found for p in i.net if p.kind in OF_OPEN):
+        pairs = zip(part.contribution, part.spread, strict=True)
+        percent = ", ".join(f"{100 * value:+.1f} ± {100 * spread:.1f}" for value, spread in pairs)
+        rows.append(f"| `{item.structure}` | {part.kind} | {percent} |")
     kept = [item for item in found if not item.refused]
     foot = f"\n{len(kept)} of {len(found)} are kept, {sum(i.held for i in kept)} of them held.\n"
     before, _, rest = page.read_text(encoding="utf-8").partition(MARK)

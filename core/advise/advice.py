@@ -131,9 +131,9 @@ def _masses(group: Group) -> Iterator[Option]:
 
 
 def _supports(group: Group) -> Iterator[Option]:
-    """Yield a frame held otherwise, with the modes in which explanations then differ most."""
-    structure, measured = group.views[0].state.problem.model.structure, group.data.measurement
-    ways = list(list_supports(structure.frame, measured.sensors)) if structure else []
+    """Yield a structure held otherwise, with the modes in which explanations then differ most."""
+    measured = group.data.measurement
+    ways = list(list_supports(group.views[0].state.problem.model, measured.sensors))
     for change, alteration, unsure in ways[:: -(-len(ways) // settings.advised) or 1]:
         first, *rest = (view.altered(alteration) for view in group.views)
         if first is not None and len(first.values) == len(measured):

@@ -13,7 +13,7 @@ import numpy as np
 from femubench.core.advise.prediction import Outlook, Points, Predicted
 from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.fem.alteration import Alteration
-from femubench.core.fem.frame import ACTIVE, Frame, GroundSpring, Place, Support
+from femubench.core.fem.frame import GroundSpring, Place, Support
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fit.modal_fit import signed_hz
@@ -30,21 +30,30 @@ def points_of(model: Model) -> Points:
     return Points(tuple(label for label, _ in moving), tuple(free for _, free in moving))
 
 
-def list_supports(frame: Frame, sensors: Sensors) -> Iterator[tuple[str, Alteration, float]]:
-    """Yield ways to hold a frame otherwise, in words, and the share of the change that is unsure.
+def list_supports(model: Model, sensors: Sensors) -> Iterator[tuple[str, Alteration, float]]:
+    """Yield ways to hold a structure otherwise, in words, and what share of the change is unsure.
 
-    Its supports are taken away one at a time; one that hangs free is held at joints near sensors.
+    Its supports are taken away one at a time; one that hangs free is held at points near sensors.
+    Of matrices, supports are the groups that are said to be some: what is held has no rows there.
     """
-    parts: tuple[Support | GroundSpring, ...] = (*frame.supports, *frame.springs)
-    for place in dict.fromkeys(part.at for part in parts if part.at.joint):  # no soil along piles
-        own = tuple(part for part in parts if part.at == place)
-        away = "take away the support at" if len(own) < len(parts) else "hang it free, not held at"
-        yield f"{away} {place}", Alteration(removed=own), 0.0
-    if not parts:
-        fixed = tuple(d for d in ACTIVE[frame.plane] if not d.startswith("r"))
-        gap = np.linalg.norm(sensors.xyz[:, None] - frame.corners, axis=2)
+    frame, free = model.structure and model.structure.frame, model.free
+    if frame:
+        parts: tuple[Support | GroundSpring, ...] = (*frame.supports, *frame.springs)
+        free = not parts
+        for at in dict.fromkeys(part.at for part in parts if part.at.joint):  # no soil along piles
+            own = tuple(part for part in parts if part.at == at)
+            away = "take away the support" if len(own) < len(parts) else "hang it free, not held"
+            yield f"{away} at {at}", Alteration(removed=own), 0.0
+    elif model.dofs.internal.any():
+        return  # reduced, without the shapes of a structure that is held otherwise
+    for name in (name for name, kind in model.group_kinds.items() if kind == "support"):
+        yield f"take away the support at group:{name}", Alteration(groups=(name,)), 0.0
+    nodes = {at: xyz for at, xyz in ModelPlaces(model).nodes.items() if np.isfinite(xyz).all()}
+    if free and nodes:
+        gap = np.linalg.norm(sensors.xyz[:, None] - list(nodes.values()), axis=2)
         for i in dict.fromkeys(gap.argmin(axis=1).tolist()):
-            place = Place(frame.joints[i].name)
+            place = Place(list(nodes)[i])
+            fixed = ModelPlaces(model).free(place)
             held = Alteration((Support(place, fixed),))
             yield f"hold {place} in {', '.join(fixed)}", held, settings.idealisation_error
 

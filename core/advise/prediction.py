@@ -252,8 +252,10 @@ class Outlook:
             state = state_at(posed, posed.space.projections, self.state.x[columns])
         except (ModelError, NotApplicable):
             return None
-        left = model.frame_structure.frame
-        if posed.space.rigid and change.removed and (left.supports or left.springs):
+        frame = model.structure and model.structure.frame
+        grounds = {name for name, kind in model.group_kinds.items() if kind == "support"}
+        left = frame.supports or frame.springs if frame else grounds - {*change.groups}
+        if posed.space.rigid and left and not change.supports:
             return None
         moving = np.flatnonzero(~posed.space.still(state.eigenvalues))[: len(self.state.partner)]
         return replace(self, state=state, root=self.root[columns]).frequencies(moving)

@@ -11,7 +11,8 @@ from scipy.special import chdtrc
 
 from femubench.core.advise.advice import advise
 from femubench.core.case.case import Case
-from femubench.core.diagnosis.budget import Budget, advise_modes, budget_of
+from femubench.core.diagnosis.budget import Budget, budget_of_modes
+from femubench.core.diagnosis.budget_advice import advise_modes
 from femubench.core.diagnosis.faults import correct_case, fault_causes, with_faults
 from femubench.core.diagnosis.proof import (
     Unseen,
@@ -145,7 +146,8 @@ def diagnose(
         # With a reference both states have what the drawing lacks.
         if states is None and not effort.stops("drawing"):
             with effort.piece("drawing"):
-                budget = budget_of(repaired, registered)
+                own = repaired.model, repaired.measurement, repaired.used
+                budget = budget_of_modes(*own, registered)
         effort.expect("drawing", 0)
         with effort.piece("advice"):
             looks = _looks(case.model, repaired, (*registered, *known))
@@ -173,16 +175,12 @@ def _with_budget(case: Case, found: Diagnosis, budget: Budget) -> Diagnosis:
     modes, names = advise_modes(budget, case), found.advice
     # Where unseen data do not bear the budget out, what parts the names comes first.
     first = replace(found, advice=(*modes, *names)[: settings.advised])
-    if found.verdict == "ambiguous":
-        found = replace(found, advice=(*names, *modes)[: settings.advised])
-    else:
-        found = first
+    last = replace(found, advice=(*names, *modes)[: settings.advised])
+    found = last if found.verdict == "ambiguous" else first
     before, after = (score_model(case, model) for model in (case.model, budget.extended))
     gain = rms_gain_of(before, after, None)
-    pairs = (
-        (gain.held_out_percent, found.gain_rms.held_out_percent),
-        (gain.modified_percent, found.gain_rms.modified_percent),
-    )
+    kinds = "held_out_percent", "modified_percent"
+    pairs = [(getattr(gain, kind), getattr(found.gain_rms, kind)) for kind in kinds]
     unseen = [(*own, *other) for own, other in pairs if own is not None and other is not None]
     # Nearer than the drawing, and than the best guess, which may be all that a beam model lacks.
     if not unseen or any(new >= min(old, *guess) for old, new, *guess in unseen):
@@ -395,12 +393,10 @@ def _advice(
     stated = [*group, *others][: settings.advised]
     if len(stated) < 2:
         return ()
-    problems = [examination.problem_of(e) for e in stated]
-    fits = [e.fit for e in stated]
+    given = [examination.problem_of(e) for e in stated], [e.fit for e in stated]
     known, scatter = examination.antiresonances > 0, examination.tolerance
     stops = partial(effort.stops, "advice")
-    given = examination.model, problems, fits
-    return advise(*given, tolerance=scatter, responses=known, stops=stops)
+    return advise(examination.model, *given, tolerance=scatter, responses=known, stops=stops)
 
 
 def _notes(

@@ -17,7 +17,7 @@ from femubench.core.fem.model import Model
 from femubench.core.fit.discrepancy import Discrepancy
 from femubench.core.fit.extended_model import extend_model, raw_residual
 from femubench.core.fit.mesh_error import mesh_bias, mesh_corrections
-from femubench.core.fit.modal_fit import Fit, Problem, State, bounds_of, state_at
+from femubench.core.fit.modal_fit import Fit, Problem, State, bounds_of, state_at, variance_of
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
 from femubench.core.inference.effort import Effort
@@ -28,6 +28,7 @@ from femubench.core.modal.eigen import enough_modes, keep_last, modes_of
 from femubench.core.modal.measurement import Measurement
 from femubench.core.schema.diagnosis import Gain, States
 from femubench.core.schema.results import Block
+from femubench.core.score.responses import rms
 from femubench.core.score.scoring import frequency_error, many_modifications, pair_modified
 from femubench.core.typing import BoolArray, FloatArray
 
@@ -168,7 +169,7 @@ def predict_held_out(
     exact = raw_residual(replace(whole, data=own_data), extended)
     relative = everything.frequency_std[rows] / everything.frequencies[rows]
     spread = data.by_mode(after.jacobian)[rows]
-    own = np.einsum("ik,kl,il->i", spread, found.covariance, spread) if spread.shape[1] else 0.0
+    own = variance_of(spread, found.covariance) if spread.shape[1] else 0.0
     std = np.sqrt(np.square(relative) * (1.0 + own) + scatter**2)
     first, last = data.by_mode(before.raw)[rows], data.by_mode(exact)[rows]
     if examination is None or found.state.problem.noise.beam:
@@ -319,8 +320,7 @@ def rms_gain_of(before: Blocks, after: Blocks, crossed: Unseen | None) -> Gain:
     }
     cross = None
     if crossed is not None and len(crossed.before):
-        mean = [float(np.mean(np.square(e))) for e in (crossed.before, crossed.after)]
-        cross = 100.0 * mean[0] ** 0.5, 100.0 * mean[1] ** 0.5
+        cross = 100.0 * rms(crossed.before), 100.0 * rms(crossed.after)
     return Gain(pairs["used"], pairs.get("higher"), pairs.get("modified"), cross)
 
 

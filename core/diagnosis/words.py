@@ -177,9 +177,8 @@ def _either(options: Sequence[Sequence[Cause]], reference: bool) -> str:
 
 def words_of_provisional(gain: Gain) -> str:
     """Return what a model gains that has all that its drawing lacks, while no name is sure."""
-    return f"Provisional, with all that the drawing lacks in the model{_gain(gain)}.".replace(
-        "model; ", "model: "
-    )
+    said = f"Provisional, with all that the drawing lacks in the model{_gain(gain)}."
+    return said.replace("model; ", "model: ")
 
 
 def _gain(gain: Gain) -> str:

@@ -16,8 +16,10 @@ import scipy.sparse as sp
 
 from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.frame import Frame, GroundSpring, Member, Place, PointMass, Support
+from femubench.core.fem.group_factors import Groups
 from femubench.core.fem.mesh import ON_MEMBER, locate, place_xyz
 from femubench.core.fem.model import Geometry, Model, carry_over
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
@@ -42,14 +44,16 @@ class Alteration:
 
     Arguments:
         removed: parts of the structure as drawn that are taken away.
+        groups: names of those of the stiffness of matrices that are taken away.
     """
 
     supports: tuple[Support, ...] = ()
     removed: tuple[Removable, ...] = ()
     exchanged: tuple[Exchange, ...] = ()
+    groups: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
-        return bool(self.supports or self.removed or self.exchanged)
+        return bool(self.supports or self.removed or self.exchanged or self.groups)
 
 
 @dataclass(frozen=True)
@@ -105,7 +109,9 @@ def alter_model(model: Model, alteration: Alteration) -> Model:
         if alteration.removed or alteration.exchanged:
             what = "the model came as matrices, in which nothing but supports can be added"
             raise NotApplicable(what)
-        return _hold(model, alteration.supports)
+        for place in (f"{Groups.PREFIX}{name}" for name in alteration.groups):
+            model = Groups(model).with_factors([Property(place, "E", (place,))], [0.0])
+        return _hold(model, alteration.supports) if alteration.supports else model
     old, members = model.structure, [p for p in alteration.removed if isinstance(p, Member)]
     if (members or alteration.exchanged) and not model.has_matrices(*old.matrices()):
         what = "the matrices were updated as a whole, in which no member can be taken or exchanged"

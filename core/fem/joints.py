@@ -1,18 +1,20 @@
-"""Joints of any frame as the update methods of the H-frame see them: roles, springs, rigid ends."""
+"""Joints of any frame: roles, springs and rigid ends as for the H-frame; zones that may give."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
 from femubench.core.errors import NotApplicable
-from femubench.core.fem.frame import ACTIVE, Frame, JointSpring, Member, RigidEnd
+from femubench.core.fem.frame import ACTIVE, Factor, Frame, JointSpring, Member, RigidEnd, halves_of
 from femubench.core.fem.mesh import member_axes
 from femubench.core.fem.structure import Structure
-from femubench.core.typing import FloatArray
+from femubench.core.typing import FloatArray, IntArray
 
 _COLLINEAR = np.cos(np.radians(175.0))
 # An arm takes this much of the element behind it at most; a rigid length likewise.
@@ -408,3 +410,101 @@ def without_overlaps(structure: Structure, group: JointGroup) -> Structure:
         if length
     }
     return joints.with_rigid_ends(lengths) if lengths else structure
+
+
+@dataclass(frozen=True)
+class JointZones:
+    """The ends of a frame's members that may give at joints, at most a `part` of each member."""
+
+    structure: Structure
+    part: float
+
+    @cached_property
+    def ends(self) -> dict[tuple[str, str], list[str]]:
+        """Return ``member@joint`` by joint type and role; a foot is an end that is held alone.
+
+        Where a member only goes on there is no joint.
+        """
+        found, frame = dict[tuple[str, str], list[str]](), self.structure.frame
+        within = {name: pieces for pieces in whole_members(frame) for name in pieces}
+        for group in joint_groups(frame):
+            for end in group.ends:
+                ends = frame.ends_at(end.rpartition("@")[2])
+                if len(ends) > 2 or len({within[name] for name in ends}) > 1:
+                    found.setdefault((group.type, group.role), []).append(end)
+        held = {str(s.at) for s in frame.supports} | {str(s.at) for s in frame.springs}
+        for joint in frame.joints:
+            ends = frame.ends_at(joint.name)
+            if joint.name in held and len(ends) == 1:
+                found.setdefault((joint.family, "foot"), []).append(f"{ends[0]}@{joint.name}")
+        return found
+
+    @cached_property
+    def labels(self) -> dict[int, str]:
+        """Return by element what the factors of a frame call it."""
+        return {row: at for at, own in self.structure.place_index.items() for row in own.tolist()}
+
+    def zone(self, end: str) -> tuple[IntArray, float]:
+        """Return the elements of a zone, one at least, (k,), and its length in m.
+
+        It reaches half the depth of what crosses, and once the own depth, from the joint's centre.
+
+        Arguments:
+            end: ``member@joint``.
+        """
+        structure, (name, _, joint) = self.structure, end.rpartition("@")
+        frame, mesh = structure.frame, structure.mesh
+        number = frame.member_index[name]
+        own = np.flatnonzero(mesh.member == number)
+        own = own[np.argsort(mesh.stations[own, 0])]
+        own = own[[bool(structure.labels[row]) for row in own]]
+        if structure.element_ends[end][1] == 1:
+            own = own[::-1]
+        section, length = frame.members[number].section, structure.properties.length[own]
+        crossing = half_depth(frame, end) if len(frame.ends_at(joint)) > 1 else 0.0
+        reach = crossing + max(section.height or 0.0, section.width or 0.0)
+        reach = min(reach, self.part * float(length.sum()))
+        inside = np.cumsum(length) - 0.5 * length < reach
+        inside[0] = True
+        return np.asarray(own[inside]), reach
+
+    def halve(self) -> Structure:
+        """Return the frame with halves of elements at joints where a zone is no longer.
+
+        A zone as long as a coarse element would act on modes that hardly bend the joint.
+        """
+        structure, halves = self.structure, dict[str, None]()
+        for end in (end for ends in self.ends.values() for end in ends):
+            (first, *_), reach = self.zone(end)
+            # The middle of the other half lies behind the zone.
+            if 0.75 * structure.properties.length[first] > reach:
+                halves[halves_of(structure.labels[first])[structure.element_ends[end][1]]] = None
+        return self._with_softer({1.0: halves}, structure.frame) if halves else structure
+
+    def stiffen(self, ends: Iterable[str]) -> Structure:
+        """Return the frame with members rigid up to the faces of what they meet, soft behind.
+
+        Under a constant moment a zone turns as drawn, so that what no data see stays as drawn; but
+        what gives does so at a face, where moments are others than at the crossing of centre lines.
+
+        Arguments:
+            ends: ``member@joint`` of each.
+        """
+        structure, joints = self.structure, Joints(self.structure)
+        rigid = {f"{one.member}@{one.joint}": one for one in structure.frame.rigid_ends}
+        soft = defaultdict[float, dict[str, None]](dict)
+        for end in ends:
+            member, _, joint = end.rpartition("@")
+            there = rigid.get(end, RigidEnd(joint, member, 0.0))  # its overlap may be out
+            arm = min(joints.half_depth(end), joints.available_length(end))
+            if arm > 0.0 == there.stiffness_length:
+                rows, _ = self.zone(end)
+                share = round(1.0 - arm / float(structure.properties.length[rows].sum()), 6)
+                rigid[end] = replace(there, stiffness_length=arm)
+                soft[share] |= dict.fromkeys(self.labels[row] for row in rows.tolist())
+        frame = replace(structure.frame, rigid_ends=tuple(rigid.values()))
+        return self._with_softer(soft, frame) if soft else structure
+
+    def _with_softer(self, soft: Mapping[float, Iterable[str]], frame: Frame) -> Structure:
+        factors = (Factor("E", tuple(labels), share) for share, labels in soft.items())
+        return self.structure.rebuilt(replace(frame, factors=(*frame.factors, *factors)))

@@ -312,3 +312,8 @@ def log_evidence(point: State) -> float:
             centre = -gradient[i] * spread[i] ** 2
         result += float(np.log(2.0) + log_ndtr(centre / spread[i]))
     return result
+
+
+def variance_of(slopes: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the variance of values by their slopes in the coordinates, (m, k), as (m,)."""
+    return np.asarray(np.einsum("mk,kl,ml->m", slopes, covariance, slopes))

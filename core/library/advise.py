@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from femubench.core.diagnosis.budget import loosest_mode
+from femubench.core.diagnosis.budget_advice import loosest_mode
 from femubench.core.errors import InputError
 from femubench.core.library.cases import CaseLike, one_case
 from femubench.core.library.diagnose import diagnosis_of

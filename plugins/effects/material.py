@@ -210,9 +210,9 @@ class GroupMaterial(GroupMass):
 
     def extend_matrices(self, model: Model, place: str, values: Sequence[float]) -> Model:
         """Return the model with the matrices of the group scaled."""
-        mass, stiffness = 1.0 + values[0], (1.0 + values[0]) * (1.0 + values[1])
+        grown = 1.0 + self.change(model, place).coefficients(np.array([values]))[0]
         scaled = [Property(f"{place} {name}", name, (place,)) for name in ("density", "E")]
-        return Groups(model).with_factors(scaled, [mass, stiffness])
+        return Groups(model).with_factors(scaled, grown)
 
     def change(self, model: Model, place: str) -> Change:
         """Return both matrices of the group."""

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from truths.lacks import LUMP, plates
 from truths.sections import bar, thin_walled
 from truths.structure import Array, Block, Change, Lump, Material, Member, Spring, Structure
 
@@ -109,4 +110,9 @@ arms to the bearings and to the places of the sensors.
     shape_scatter=0.03,
     together=0.6,
     weighed=0.0,
+)
+
+LACKS = (
+    *plates("all", "a parapet", "parapet", mass=LUMP, stiffness="plate"),
+    *plates("G4", "a cross beam", "cross", mass=LUMP, stiffness="plate"),
 )
