@@ -153,7 +153,6 @@ def case_of(frame: Frame, directions: str, sensors: int, damage: float = -0.15) 
 
 
 CASES: dict[str, Callable[[], Case]] = {
-    "small ladder": lambda: case_of(ladder(2, 4), "z", 6),
     "lattice": lambda: case_of(lattice((3, 3, 3), 3), "xyz", 16),
     "lattice dense": lambda: case_of(lattice((3, 3, 3), 3), "xyz", 64),
     "ladder": lambda: case_of(ladder(3, 1000), "z", 8),
