@@ -177,14 +177,15 @@ class Outlook:
         at = sp.eye_array(len(sensed), format="csr")
         modes = Modes(values, sensed, signed_hz(values) <= self.zero)
         lines = np.array([0.5 * own.min(), highest])
-        undamped = np.zeros(len(values))
+        undamped, heavy = np.zeros(len(values)), self.mass_spread.any()
         answer = PredictedResponses(modes, self.state.partner, (at, at, lines), undamped)
         for force, found in zip(sensed, zeros_by_force(answer), strict=True):
             found = found.take((found.frequencies >= lines[0]) & (found.frequencies <= highest))
             square = np.square(2.0 * np.pi * found.frequencies)
             compliance = 1.0 / (values - square[:, None])
             left, right = compliance * sensed[found.response], compliance * force
-            pull = self.stiffness_spread @ right.T - (self.mass_spread @ right.T) * square
+            pull = self.stiffness_spread @ right.T
+            pull -= (self.mass_spread @ right.T) * square if heavy else 0.0
             steep = 2.0 * square * (left * right).sum(axis=1) / found.frequencies
             yield found, np.einsum("kN,pNk->kp", left, pull) / steep[:, None]
 
