@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import tomllib
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -50,6 +52,15 @@ def test_facade_gives_every_name_that_it_lists() -> None:
     assert len(femubench.__all__) <= 45
     with pytest.raises(AttributeError, match="no attribute 'Stratgy'"):
         femubench.Stratgy  # noqa: B018
+
+
+def test_a_case_its_diagnosis_and_all_effects_load_nothing_else() -> None:
+    code = "import femubench, femubench.core.library.diagnose as _, sys; femubench.cases['frame'];"
+    code += "[femubench.effects[name] for name in femubench.effects]; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    needless = {"scipy.io", "tomlkit", "femubench.core.update.entries"}
+    readers = "femubench.plugins.readers."
+    assert [m for m in done.stdout.split() if m in needless or m.startswith(readers)] == []
 
 
 def test_no_door_more() -> None:
