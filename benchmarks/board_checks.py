@@ -176,6 +176,7 @@ def main() -> None:
     """Write the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--noise", metavar="FILE", help="a run of `bench run --seeds N --json`")
+    parser.add_argument("--boards", nargs="*", default=BOARDS)
     parser.add_argument("--trials", type=int, default=4000, help="of an error rate")
     words = parser.parse_args()
     file = words.noise
@@ -186,7 +187,7 @@ def main() -> None:
         made = {"noise": compare_noise(run)}
     else:
         figures = ROOT / "docs" / "figures"
-        runs = {name: femubench.read_run(figures / f"board-{name}.json") for name in BOARDS}
+        runs = {name: femubench.read_run(figures / f"board-{name}.json") for name in words.boards}
         kinds = {
             "rules": vary,
             "families": partial(families, trials=words.trials),

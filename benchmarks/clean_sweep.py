@@ -154,6 +154,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("seeds", type=int, help="number of seeds, four data sets each")
     parser.add_argument("--first", type=int, default=0, help="seed")
+    parser.add_argument("--sets", type=int, help="at most so many data sets")
     parser.add_argument("--seconds", type=float, default=np.inf, help="of the processor, in all")
     parser.add_argument("--results", type=Path, default=RESULTS)
     options = parser.parse_args()
@@ -164,7 +165,7 @@ def main() -> None:
     seeds = range(options.first, options.first + options.seeds)
     tasks = [(s, f, r) for s in seeds for f in ("shear", "frame") for r in (False, True)]
     with options.results.open("a") as stream:
-        for task in tasks:
+        for task in tasks[: options.sets]:
             if task not in known and time.process_time() < options.seconds:
                 records.append(diagnosed(*task))
                 stream.write(json.dumps(records[-1]) + "\n")

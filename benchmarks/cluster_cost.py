@@ -31,7 +31,7 @@ from femubench.core.run.runner import Plan
 from femubench.core.schema.run_options import Where
 
 BOARD = Path(__file__).parents[1] / "docs" / "figures" / "board-suite.json"
-AHEAD = 8  # jobs of the run before
+AHEAD = 8  # jobs of the run before, at most
 
 
 class Waiting:
@@ -92,7 +92,7 @@ def main(words: Sequence[str] | None = None) -> None:
     mean = statistics.fmean(one["seconds"] for one in json.loads(BOARD.read_text())["results"])
     for workers in asked.workers:
         with start_cluster(Where(cluster=f"local:{workers}")) as place:
-            null_plan(AHEAD * workers).run(place)
+            null_plan(min(AHEAD, asked.jobs) * workers).run(place)
             scheduler, around, within = cost_of(null_plan(asked.jobs), place)
         print(
             f"{workers} workers: scheduler {scheduler:.1f}, around a job on its worker "

@@ -11,13 +11,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import os
 import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +39,7 @@ from stated_probabilities import (
     percent,
     wilson,
 )
-from sweep_data import DATA, PAGE, as_markdown, filled, write_rows
+from sweep_data import DATA, PAGE, as_markdown, each, filled, write_rows
 from threadpoolctl import threadpool_limits
 from true_fit import fits_worse, is_search_fault
 
@@ -79,11 +77,8 @@ def run(path: Path, wanted: Sequence[SweepCase], jobs: int) -> None:
     rest = [task for task in wanted if task.key not in known]
     path.parent.mkdir(parents=True, exist_ok=True)
     print(f"{len(wanted) - len(rest)} of {len(wanted)} cases are in {path}", file=sys.stderr)
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, mp_context=context) as pool, path.open("a") as stream:
-        futures = [pool.submit(diagnosed, task) for task in rest]
-        for i, future in enumerate(as_completed(futures), 1):
-            record = future.result()
+    with path.open("a") as stream:
+        for i, record in enumerate(each(diagnosed, [(task,) for task in rest], jobs), 1):
             stream.write(json.dumps(record) + "\n")
             stream.flush()
             mark = "right" if record["right"] else "WRONG"

@@ -1,8 +1,8 @@
 """Search for readings of the ladder paper that give its open columns; write docs/reproduce.md.
 
-    python benchmarks/open_cells.py [--quick] [--write]     # some minutes on one core
+    python benchmarks/open_cells.py [--every N] [--write]     # some minutes on one core
 
-`equation_readings` says what a reading is. `--quick` tries a twentieth of them.
+`equation_readings` says what a reading is. `--every` tries one of so many of them.
 """
 
 from __future__ import annotations
@@ -158,15 +158,15 @@ def _rigid(rigid: FloatArray) -> str:
     return " ".join(f"{-hz:.0f}i" if hz < -0.5 else f"{abs(hz):.0f}" for hz in rigid)
 
 
-def axis_rows() -> list[dict[str, str]]:
+def axis_rows(every: int) -> list[dict[str, str]]:
     """Return what single departures from the built-in reading do to the two open columns."""
     rows = []
-    for axis, choices in AXES.items():
+    for axis, choices in list(AXES.items())[::every]:
         row = {"departure": axis}
         for family in ("physical", "nobari", "generic-adjusted"):
             base = Reading(family=family)
             skipped = ALONE.get(axis, family) != family
-            results = [] if skipped else found(replace(base, **choice) for choice in choices)
+            results = [] if skipped else found(replace(base, **one) for one in choices[::every])
             off = [one.deviation for one in results]
             said = f"{_percent(min(off))} to {_percent(max(off))}" if len(off) > 1 else ""
             row[f"{COLUMNS[family][0]}, %"] = said or (_percent(off[0]) if off else "-")
@@ -174,12 +174,13 @@ def axis_rows() -> list[dict[str, str]]:
     return rows
 
 
-def numbering_rows() -> list[dict[str, str]]:
+def numbering_rows(every: int) -> list[dict[str, str]]:
     """Return the adjusted column where tied cores follow the numbering of the members."""
     rows = []
     for name, words in SHAPES.items():
         base = replace(Reading(family="generic-adjusted"), **words)
-        tried = found(replace(base, sharing="numbered", backward=b) for b in DIRECTIONS)
+        turned = DIRECTIONS[::every]
+        tried = found(replace(base, sharing="numbered", backward=b) for b in turned)
         off = [round(one.deviation, 6) for one in tried]  # all turned is none turned
         best = tried[int(np.argmin(off))]
         rows.append(
@@ -195,7 +196,7 @@ def numbering_rows() -> list[dict[str, str]]:
     return rows
 
 
-def need_rows() -> list[dict[str, str]]:
+def need_rows(every: int) -> list[dict[str, str]]:
     """Return what the physical column would need, for equations with and without orthogonality."""
     rows = []
     for words in (
@@ -203,7 +204,7 @@ def need_rows() -> list[dict[str, str]]:
         {"diagonal": 0.0, "cross": 0.0},
         {"expansion": "force", "start": "nominal"},
         {"expansion": "force", "start": "nominal", "diagonal": 0.0, "cross": 0.0},
-    ):
+    )[::every]:
         reading = replace(Reading(), **words)
         start, least, there, largest = nearest_with(reading, column("physical"))
         rows.append(
@@ -218,11 +219,11 @@ def need_rows() -> list[dict[str, str]]:
     return rows
 
 
-def firm_rows() -> list[dict[str, str]]:
+def firm_rows(every: int) -> list[dict[str, str]]:
     """Return how the readings that close a column stand against other shapes."""
     rows = []
-    for reading in CLOSING:
-        drawn = [replace(reading, noise=0.01, seed=seed) for seed in range(20)]
+    for reading in CLOSING[::every]:
+        drawn = [replace(reading, noise=0.01, seed=seed) for seed in range(0, 20, every)]
         off = [one.deviation for one in found(drawn)]
         other = replace(reading, data="beam" if reading.data == "twin" else "twin")
         moved = "-" if reading.expansion == "all dofs" else _percent(found([other])[0].deviation)
@@ -243,12 +244,12 @@ def firm_rows() -> list[dict[str, str]]:
     return rows
 
 
-def search(quick: bool) -> tuple[str, dict[str, list[dict[str, str]]]]:
+def search(every: int) -> tuple[str, dict[str, list[dict[str, str]]]]:
     """Return the generated part of the page, and the rows of the tables in docs/data."""
     results: list[Found] = []
     for family in COLUMNS:
         readings = grid(family)
-        results += found(readings[:: 20 if quick else 1])
+        results += found(readings[::every])
         print(f"{family}: {len(readings)} readings", flush=True)
     parts = [
         f"{len(results)} readings gave a model. Printed, modes 1 to 5 in Hz:",
@@ -258,21 +259,21 @@ def search(quick: bool) -> tuple[str, dict[str, list[dict[str, str]]]]:
     ]
     return "\n\n".join(parts), {
         "best": [row for family in COLUMNS for row in best_rows(results, family)],
-        "departures": axis_rows(),
-        "numbering": numbering_rows(),
-        "equations": need_rows(),
-        "shapes": firm_rows(),
+        "departures": axis_rows(every),
+        "numbering": numbering_rows(every),
+        "equations": need_rows(every),
+        "shapes": firm_rows(every),
     }
 
 
 def main() -> None:
     """Search, print, and with --write replace the generated block of the page and its data."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="a twentieth of the readings")
+    parser.add_argument("--every", type=int, default=1, help="readings of which one is tried")
     parser.add_argument("--write", action="store_true", help=f"into {PAGE.name} and {DATA.name}")
     options = parser.parse_args()
     with threadpool_limits(1):
-        text, tables = search(options.quick)
+        text, tables = search(options.every)
     print(text)
     for name, rows in tables.items():
         print(f"\n{name}\n\n{as_markdown(rows)}")

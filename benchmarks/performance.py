@@ -258,10 +258,10 @@ def exponent(sizes: Sequence[float], seconds: Sequence[float]) -> float:
     return float(np.polyfit(np.log(sizes[-half:]), np.log(seconds[-half:]), 1)[0])
 
 
-def rows_of(section: Section, within: float) -> list[dict[str, Any]]:
+def rows_of(section: Section, within: float, sizes: int | None) -> list[dict[str, Any]]:
     """Return the measurements of a section, those of one size after each other."""
     rows = []
-    for place in range(max(len(series.sizes) for series in section.series)):
+    for place in range(max(len(series.sizes) for series in section.series))[:sizes]:
         for series in section.series:
             if place < len(series.sizes):
                 row = measured(series.name, series.sizes[place], within)
@@ -343,12 +343,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", nargs="+", choices=[one.word for one in SECTIONS])
     parser.add_argument("--within", type=float, default=100.0, help="seconds a measurement")
+    parser.add_argument("--sizes", type=int, help="at most so many, the smallest first")
     parser.add_argument("--write", action="store_true", help=f"into {PAGE.name}")
     words = parser.parse_args()
     kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
     for section in SECTIONS:
         if not words.only or section.word in words.only:
-            kept[section.word] = {"machine": machine(), "rows": rows_of(section, words.within)}
+            rows = rows_of(section, words.within, words.sizes)
+            kept[section.word] = {"machine": machine(), "rows": rows}
             if words.write:
                 write(kept)
     print(page_of(kept))

@@ -35,6 +35,7 @@ from femubench.core.errors import FemubenchError
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
 from femubench.core.fit.residuals import Data
+from femubench.core.inference.effort import Effort
 from femubench.core.modal.eigen import Modes, modes_of, solve_modes
 from femubench.core.modal.frf import FrequencyResponses, ResponseSplit, receptance
 from femubench.core.modal.measurement import Measurement
@@ -186,11 +187,11 @@ def hidden(name: str, seed: int) -> tuple[Case, KnownCase] | None:
     return posed, KnownCase(f"{name}-{kind}-{seed}", name, "defect", seed, causes, chi2, 0.0, 0)
 
 
-def judged(case: Case, truth: KnownCase) -> Iterator[tuple[str, float]]:
+def judged(case: Case, truth: KnownCase, budget: float | None) -> Iterator[tuple[str, float]]:
     """Yield outcome and probability by modes alone, then with the responses of both states."""
     bare = replace(case, frfs=None, split=None)
     for posed in (bare, case):
-        answer = Answer.of(diagnose(posed))
+        answer = Answer.of(diagnose(posed, effort=Effort(budget)))
         same = same_place(case.model.frame_structure.frame)
         yield outcome(truth, record_of(answer), same), float(answer.probability or 0.0)
 
@@ -200,6 +201,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("seeds", type=int, nargs="+")
     parser.add_argument("--structures", nargs="*", default=NAMES)
+    parser.add_argument("--budget", type=float, help="seconds of a diagnosis; no end by default")
     options = parser.parse_args(arguments)
     totals: dict[str, list[int]] = {}
     with threadpool_limits(1):
@@ -207,7 +209,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             for name in options.structures:
                 if (found := hidden(name, seed)) is None:
                     continue
-                rows = list(judged(*found))
+                rows = list(judged(*found, options.budget))
                 print(f"{found[1].name:40} {found[1].chi2:6.0f}", *rows, flush=True)
                 for k, (word, _) in enumerate(rows):
                     totals.setdefault(word, [0, 0])[k] += 1

@@ -148,12 +148,13 @@ def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("cases", nargs="*")
     parser.add_argument("-s", "--strategies", nargs="*", default=[])
+    parser.add_argument("--null-jobs", type=int, default=NULL_JOBS)
     parser.add_argument("--sandbox", choices=["auto", "require", "off"], default="auto")
     asked = parser.parse_args(words)
     plugins = usable_plugins()
     chosen = asked.strategies or [name for name in plugins.strategies if name != "diagnosed"]
     start_server()
-    costs = [null_job(sandbox=asked.sandbox) for _ in range(3)]
+    costs = [null_job(asked.null_jobs, sandbox=asked.sandbox) for _ in range(3)]
     for name in ("parent", "server", "workers", "whole", "wall"):
         least = min(getattr(cost, name) / cost.jobs for cost in costs)
         print(f"null job, {name:8}{1000.0 * least:8.1f} ms")

@@ -1,10 +1,11 @@
 """What a store of many results costs: to write, to load and rank, to resume, in time and memory.
 
-    python benchmarks/store.py [--results 100000] [--store DIR]
+    python benchmarks/store.py [--results 100000] [--store DIR] [--times 3]
 
 The results are made up from those of one job, 25 cases x 20 strategies x seeds. Seconds are of the
 processor, the least of three fresh processes, next to those of an anchor in the same process: ten
 solutions of a dense symmetric eigenvalue problem of 600 unknowns. DIR is kept and used again.
+`--times 0` measures once in this process.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -172,6 +174,7 @@ MEASURED: dict[str, Callable[[Store], int]] = {
 }
 
 
+@cache
 def anchor() -> float:
     """Return the seconds of ten dense eigenvalue solutions."""
     matrix = np.random.default_rng(0).standard_normal((600, 600))
@@ -181,13 +184,15 @@ def anchor() -> float:
     return time.process_time() - start
 
 
-def measured(folder: Path, what: str, times: int = 3) -> dict[str, float]:
+def measured(folder: Path, what: str, times: int) -> dict[str, float]:
     """Return seconds of processor, those of the anchor, peak memory in MB: the least of several.
 
     Arguments:
         folder: of the store.
         what: a name of `MEASURED`.
     """
+    if not times:
+        return one(folder, what)
     command = [sys.executable, __file__, "--store", str(folder), "--one", what]
     runs = [
         json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
@@ -215,6 +220,7 @@ def main() -> None:
     words = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     words.add_argument("--results", type=int, default=100_000)
     words.add_argument("--store", type=Path)
+    words.add_argument("--times", type=int, default=3)
     words.add_argument("--one", choices=list(MEASURED), help=argparse.SUPPRESS)
     asked = words.parse_args()
     if asked.one is not None:
@@ -225,7 +231,7 @@ def main() -> None:
         (file,) = make(folder, asked.results).files
         print(f"{asked.results} results, {file.stat().st_size / 1e6:.0f} MB")
         for what in MEASURED:
-            found = measured(folder, what)
+            found = measured(folder, what, asked.times)
             bar = f", asked for {BARS[what]:g} s" if what in BARS else ""
             print(
                 f"{what}: {found['seconds']:.2f} s{bar}, {found['seconds'] / found['anchor']:.1f} "

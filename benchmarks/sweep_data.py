@@ -1,15 +1,32 @@
-"""The tables of the sweeps as data: CSV files in docs/data, of which a run of a sweep owns rows."""
+"""What sweeps share: cases in processes, and tables in docs/data, of which a run owns rows."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import multiprocessing
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from itertools import starmap
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data"
 PAGE = ROOT / "docs" / "diagnosis-accuracy.md"
+
+
+def each(call: Callable[..., Any], tasks: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
+    """Yield what a function makes of tasks as they are done, one job's in this process."""
+    if jobs == 1:
+        yield from starmap(call, tasks)
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, mp_context=context) as pool:
+        for future in as_completed([pool.submit(call, *task) for task in tasks]):
+            if future.exception() is not None:
+                pool.shutdown(cancel_futures=True)
+            yield future.result()
 
 
 def write_rows(path: Path, run: str, rows: Iterable[Mapping[str, str]]) -> None:

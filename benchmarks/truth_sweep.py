@@ -14,14 +14,12 @@ import argparse
 import hashlib
 import json
 import math
-import multiprocessing
 import signal
 import sys
 import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cache
@@ -47,7 +45,7 @@ from stated_probabilities import (
     statements,
     wilson,
 )
-from sweep_data import DATA, PAGE, as_markdown, filled, write_rows
+from sweep_data import DATA, PAGE, as_markdown, each, filled, write_rows
 from true_fit import CataloguedCause, fits_of, fits_worse, is_search_fault
 
 from femubench import Model, read_case
@@ -242,13 +240,8 @@ def run(path: Path, tasks: Sequence[Task], jobs: int) -> None:
     rest = [(task, key) for task, key in keyed if not is_of(known.get(key[0]), key)]
     path.parent.mkdir(parents=True, exist_ok=True)
     print(f"{len(keyed) - len(rest)} of {len(keyed)} cases are in {path}", file=sys.stderr)
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, mp_context=context) as pool, path.open("a") as stream:
-        futures = [pool.submit(diagnosed, task, key) for task, key in rest]
-        for i, future in enumerate(as_completed(futures), 1):
-            if future.exception() is not None:
-                pool.shutdown(cancel_futures=True)
-            record = future.result()
+    with path.open("a") as stream:
+        for i, record in enumerate(each(diagnosed, rest, jobs), 1):
             stream.write(json.dumps(record) + "\n")
             stream.flush()
             said = record.get("error", record["verdict"])

@@ -33,8 +33,7 @@ The example of every function starts from these lines:
 from __future__ import annotations
 
 import os
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if not os.path.isdir(os.path.join(os.path.dirname(__file__), "core")):
     raise ImportError(
@@ -42,36 +41,7 @@ if not os.path.isdir(os.path.join(os.path.dirname(__file__), "core")):
         "`git clone -c core.symlinks=true` (on Windows, in developer mode)"
     )
 
-from femubench.core.version import __version__ as __version__
-
-# Module -> the names that it gives.
-_NAMES = {
-    "femubench.core.case.case": "Case",
-    "femubench.core.diagnosis.result": "Diagnosis",
-    "femubench.core.errors": ("Diverged FemubenchError InputError NotApplicable StrategyFailure"),
-    "femubench.core.identify.identification": "Identification",
-    "femubench.core.library.cases": "cases effects read_case strategies",
-    "femubench.core.library.challenge": "challenge score_challenge",
-    "femubench.core.library.compare": "compare",
-    "femubench.core.library.diagnose": "diagnose",
-    "femubench.core.library.identify": "identify",
-    "femubench.core.library.models": "read_model write_model",
-    "femubench.core.library.plugins": "check init_case new_plugin",
-    "femubench.core.library.publish": "publish",
-    "femubench.core.library.rank": "Run rank read_run",
-    "femubench.core.library.report": "report",
-    "femubench.core.library.reproduce": "reproduce",
-    "femubench.core.library.study": "study",
-    "femubench.core.fem.sensors": "Sensors",
-    "femubench.core.modal.measurement": "Measurement",
-    "femubench.core.modal.eigen": "Modes solve_modes",
-    "femubench.core.fem.model": "Model",
-    "femubench.core.plugin.markers": "hookimpl",
-    "femubench.core.roles": "Reader Scenario",
-    "femubench.core.update.strategy": "ParameterEstimate Strategy UpdateResult",
-}
-_HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
-__all__ = sorted(["__version__", *_HOME])
+from femubench.core.plugin.door import open_door
 
 if TYPE_CHECKING:
     from femubench.core.case.case import Case as Case
@@ -119,14 +89,6 @@ if TYPE_CHECKING:
         Strategy as Strategy,
         UpdateResult as UpdateResult,
     )
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401 - one door for every name
-    home = _HOME.get(name)
-    if home is None:
-        raise AttributeError(f"module 'femubench' has no attribute {name!r}")
-    return getattr(import_module(home), name)
-
-
-def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME])
+    from femubench.core.version import __version__ as __version__
+else:
+    __all__, __getattr__, __dir__ = open_door(__name__, __file__)

@@ -137,7 +137,7 @@ class TestPredictions:
         found = fitted(problem, JointRotation(), "L", 1.0)
         view, _ = one_outlook(problem, found)
         highest = float(test.frequencies.max())
-        own, spread = view.zeros(0, highest)
+        own, spread = next(view.zeros(highest))
         values = found.parts[0].hypothesis.values(found.state.x[None])[0].tolist()
         whole = JointRotation().extend(model, "L", values)
         at = whole.observe(test.sensors)
@@ -153,7 +153,7 @@ class TestPredictions:
         apart = np.abs(own.frequencies / exact.frequencies[pairs] - 1.0)[pairs >= 0]
         assert apart.max() < 1e-3
         for column, views in enumerate(views_around(problem, found)):
-            low, high = (view.zeros(0, highest)[0] for view in views)
+            low, high = (next(view.zeros(highest))[0] for view in views)
             slope = high.frequencies[own.pair(high)] - low.frequencies[own.pair(low)]
             slope /= 2.0 * STEP
             gap = np.abs(spread[:, column] - slope)

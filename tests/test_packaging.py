@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import ast
 import re
+import subprocess
+import sys
 import tomllib
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -48,23 +49,18 @@ def test_facade_gives_every_name_that_it_lists() -> None:
     for name in femubench.__all__:
         assert getattr(femubench, name) is not None
     assert set(femubench.__all__) <= set(dir(femubench))
+    assert len(femubench.__all__) <= 45
     with pytest.raises(AttributeError, match="no attribute 'Stratgy'"):
         femubench.Stratgy  # noqa: B018
 
 
-def test_facade_says_the_same_to_python_and_to_type_checkers() -> None:
-    tree = ast.parse((ROOT / "femubench" / "__init__.py").read_text(encoding="utf-8"))
-    checked = {
-        alias.name: node.module
-        for block in tree.body
-        if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING"
-        for node in ast.walk(block)
-        if isinstance(node, ast.ImportFrom)
-        for alias in node.names
-    }
-    assert checked == femubench._HOME
-    assert {*checked, "__version__"} == set(femubench.__all__)
-    assert len(femubench.__all__) <= 45
+def test_a_case_its_diagnosis_and_all_effects_load_nothing_else() -> None:
+    code = "import femubench, femubench.core.library.diagnose as _, sys; femubench.cases['frame'];"
+    code += "[femubench.effects[name] for name in femubench.effects]; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    needless = {"scipy.io", "tomlkit", "femubench.core.update.entries"}
+    readers = "femubench.plugins.readers."
+    assert [m for m in done.stdout.split() if m in needless or m.startswith(readers)] == []
 
 
 def test_no_door_more() -> None:

@@ -180,10 +180,10 @@ def _responses(group: Group) -> Iterator[Option]:
     if group.responses or not len(group.data.shape_rows[0]):
         return
     highest, found = float(group.data.measurement.frequencies.max()), []
-    for force, label in enumerate(sensors.labels):
+    zeros = zip(*(view.zeros(highest) for view in group.views), strict=True)
+    for label, ((own, spread), *others) in zip(sensors.labels, zeros, strict=True):
         if group.stops():
             break
-        (own, spread), *others = (view.zeros(force, highest) for view in group.views)
         hertz = own.frequencies
         spread = np.hstack([spread, group.hertz * hertz[:, None]])
         distances = []

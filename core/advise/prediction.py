@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,7 +21,7 @@ from femubench.core.fit.modal_basis import place_parts
 from femubench.core.fit.modal_fit import Fit, Problem, State, signed_hz, state_at
 from femubench.core.inference.coordinates import modes_for, place_data
 from femubench.core.inference.settings import settings
-from femubench.core.modal.antiresonances import Antiresonances, predict_antiresonances
+from femubench.core.modal.antiresonances import Antiresonances, zeros_by_force
 from femubench.core.modal.eigen import Modes, once_for
 from femubench.core.modal.receptances import PredictedResponses
 from femubench.core.typing import FloatArray, IntArray, SparseArray
@@ -166,11 +166,10 @@ class Outlook:
         scale = 8.0 * np.pi**2 * np.maximum(np.abs(frequencies), 1e-9)
         return frequencies, spread / scale[..., None]
 
-    def zeros(self, force: int, highest: float) -> tuple[Antiresonances, FloatArray]:
-        """Return the antiresonances of all sensors under a force at one, and their spread, (k, p).
+    def zeros(self, highest: float) -> Iterator[tuple[Antiresonances, FloatArray]]:
+        """Yield the antiresonances of all sensors under a force at each, and their spread, (k, p).
 
         Arguments:
-            force: at which sensor.
             highest: frequency in Hz up to which they are sought; from half the lowest measured one.
         """
         values, sensed = self.state.eigenvalues, self.sensed
@@ -178,16 +177,17 @@ class Outlook:
         at = sp.eye_array(len(sensed), format="csr")
         modes = Modes(values, sensed, signed_hz(values) <= self.zero)
         lines = np.array([0.5 * own.min(), highest])
-        where = at, at[[force]], lines
-        answer = PredictedResponses(modes, self.state.partner, where, np.zeros(len(values)))
-        found = predict_antiresonances(answer)
-        found = found.take((found.frequencies >= lines[0]) & (found.frequencies <= highest))
-        square = np.square(2.0 * np.pi * found.frequencies)
-        compliance = 1.0 / (values - square[:, None])
-        left, right = compliance * sensed[found.response], compliance * sensed[force]
-        pull = self.stiffness_spread @ right.T - (self.mass_spread @ right.T) * square
-        steep = 2.0 * square * (left * right).sum(axis=1) / found.frequencies
-        return found, np.einsum("kN,pNk->kp", left, pull) / steep[:, None]
+        undamped, heavy = np.zeros(len(values)), self.mass_spread.any()
+        answer = PredictedResponses(modes, self.state.partner, (at, at, lines), undamped)
+        for force, found in zip(sensed, zeros_by_force(answer), strict=True):
+            found = found.take((found.frequencies >= lines[0]) & (found.frequencies <= highest))
+            square = np.square(2.0 * np.pi * found.frequencies)
+            compliance = 1.0 / (values - square[:, None])
+            left, right = compliance * sensed[found.response], compliance * force
+            pull = self.stiffness_spread @ right.T
+            pull -= (self.mass_spread @ right.T) * square if heavy else 0.0
+            steep = 2.0 * square * (left * right).sum(axis=1) / found.frequencies
+            yield found, np.einsum("kN,pNk->kp", left, pull) / steep[:, None]
 
     def mass(self) -> Predicted:
         """Return the mass of the structure in kg."""

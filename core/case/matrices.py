@@ -5,7 +5,7 @@ from __future__ import annotations
 import bz2
 import gzip
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from io import BufferedIOBase
@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-import scipy.io
 import scipy.sparse as sp
 
 from femubench.core.case.checks import check_unique
@@ -79,7 +78,7 @@ _ASYMMETRY = 1e-8  # of the largest entry
 _MATRIX_MARKET = (".mtx", ".mtx.gz", ".mtx.bz2")
 
 
-def read_matrix(file: Path, size: int, readers: Sequence[Reader]) -> SparseArray:
+def read_matrix(file: Path, size: int, readers: Collection[Reader]) -> SparseArray:
     """Return a symmetric matrix of a file.
 
     Arguments:
@@ -92,7 +91,7 @@ def read_matrix(file: Path, size: int, readers: Sequence[Reader]) -> SparseArray
     return check_symmetric(matrix_of(file, readers, size), file, size)
 
 
-def matrix_of(file: Path, readers: Sequence[Reader], size: int | None = None) -> SparseArray:
+def matrix_of(file: Path, readers: Collection[Reader], size: int | None = None) -> SparseArray:
     """Return what a file holds as a matrix, with nothing checked but its size.
 
     Arguments:
@@ -151,7 +150,7 @@ def check_symmetric(matrix: SparseArray, file: Path, size: int) -> SparseArray:
     return sp.csc_array(0.5 * (matrix + matrix.T))
 
 
-def reader_of(file: Path, readers: Sequence[Reader]) -> Reader | None:
+def reader_of(file: Path, readers: Collection[Reader]) -> Reader | None:
     """Return the first reader that knows the suffix of a file."""
     name = file.name.lower()
     return next((r for r in readers if any(name.endswith(s) for s in r.suffixes)), None)
@@ -182,6 +181,8 @@ def reading_with(reader: Reader, file: Path) -> Iterator[None]:
 
 
 def _matrix_market(file: Path, size: int | None) -> SparseArray:
+    import scipy.io
+
     expected = "a Matrix Market file, coordinate or array, real, symmetric or general"
     try:
         with MatrixText(file) as text:
@@ -202,7 +203,7 @@ def _matrix_market(file: Path, size: int | None) -> SparseArray:
         raise InputError(f"cannot be read: {error}", file=file, expected=expected) from None
 
 
-def model_of_matrices(spec: MatricesSpec, files: CaseFiles, readers: Sequence[Reader]) -> Model:
+def model_of_matrices(spec: MatricesSpec, files: CaseFiles, readers: Collection[Reader]) -> Model:
     """Return the model of a case of kind ``matrices``.
 
     Raises:
@@ -220,7 +221,7 @@ def model_of_matrices(spec: MatricesSpec, files: CaseFiles, readers: Sequence[Re
 
 
 def with_groups(
-    model: Model, specs: Sequence[GroupSpec], files: CaseFiles, readers: Sequence[Reader]
+    model: Model, specs: Sequence[GroupSpec], files: CaseFiles, readers: Collection[Reader]
 ) -> Model:
     """Return a model from files with the groups of `[[model.groups]]` in addition to its own.
 

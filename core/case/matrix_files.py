@@ -9,7 +9,6 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-import scipy.io
 import scipy.sparse as sp
 
 from femubench.core.case.faults import BadKey
@@ -36,6 +35,8 @@ def matrix_market(matrix: SparseArray) -> bytes:
     Arguments:
         matrix: sparse or dense, (n, n).
     """
+    import scipy.io
+
     stream = BytesIO()
     # The shortest text that reads back to the same number is the writer's default.
     scipy.io.mmwrite(stream, sp.coo_array(matrix), symmetry="symmetric")

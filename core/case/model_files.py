@@ -6,7 +6,7 @@ import bz2
 import gzip
 import os
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -57,7 +57,7 @@ class ModelFiles:
     dofs: Path | None = None
 
 
-def read_model(paths: ModelFiles, readers: Sequence[Reader], unit: LengthUnit = "m") -> Model:
+def read_model(paths: ModelFiles, readers: Collection[Reader], unit: LengthUnit = "m") -> Model:
     """Return the model that files hold, in SI, with a label and a place for every row.
 
     Arguments:
@@ -72,7 +72,7 @@ def read_model(paths: ModelFiles, readers: Sequence[Reader], unit: LengthUnit = 
     return in_si(read_as_it_is(paths, readers), unit)
 
 
-def read_as_it_is(paths: ModelFiles, readers: Sequence[Reader]) -> Model:
+def read_as_it_is(paths: ModelFiles, readers: Collection[Reader]) -> Model:
     """Return the model that files hold, in their units; raises InputError as in `read_model`."""
     model = _read(paths, readers)
     if not isinstance(model.geometry, MatrixGeometry):
@@ -87,7 +87,7 @@ def read_as_it_is(paths: ModelFiles, readers: Sequence[Reader]) -> Model:
     return _labelled(found, paths, readers)
 
 
-def further_files(path: Path, readers: Sequence[Reader]) -> tuple[Path, ...]:
+def further_files(path: Path, readers: Collection[Reader]) -> tuple[Path, ...]:
     """Return the files that are opened in addition to a model's own, e.g. those that it includes.
 
     Raises:
@@ -100,7 +100,7 @@ def further_files(path: Path, readers: Sequence[Reader]) -> tuple[Path, ...]:
         return tuple(Path(further) for further in reader.model_files(path))
 
 
-def remarks_of(spec: FileSpec, files: CaseFiles, readers: Sequence[Reader]) -> tuple[str, ...]:
+def remarks_of(spec: FileSpec, files: CaseFiles, readers: Collection[Reader]) -> tuple[str, ...]:
     """Return what the reader of a model took otherwise than it stands in the file.
 
     Raises:
@@ -114,7 +114,7 @@ def remarks_of(spec: FileSpec, files: CaseFiles, readers: Sequence[Reader]) -> t
         return tuple(f"{spec.file}: {remark}" for remark in reader.read_remarks(path))
 
 
-def model_of_file(spec: FileSpec, files: CaseFiles, readers: Sequence[Reader]) -> Model:
+def model_of_file(spec: FileSpec, files: CaseFiles, readers: Collection[Reader]) -> Model:
     """Return the model of a case of kind ``file``.
 
     Raises:
@@ -136,7 +136,7 @@ def model_of_file(spec: FileSpec, files: CaseFiles, readers: Sequence[Reader]) -
     return in_si(model, spec.unit)
 
 
-def _read(paths: ModelFiles, readers: Sequence[Reader]) -> Model:
+def _read(paths: ModelFiles, readers: Collection[Reader]) -> Model:
     """Return what the readers read, in the units of the files, maybe without labels or places."""
     reader = _reader(paths.model, readers)
     if paths.mass is not None:
@@ -161,7 +161,7 @@ def _read(paths: ModelFiles, readers: Sequence[Reader]) -> Model:
         return _a_model(reader.read_model(paths.model), paths.model)
 
 
-def _reader(file: Path, readers: Sequence[Reader]) -> Any:  # noqa: ANN401 - of optional members
+def _reader(file: Path, readers: Collection[Reader]) -> Any:  # noqa: ANN401 - of optional members
     """Return the reader of a file, None for one of Matrix Market and for an unknown kind."""
     return None if is_matrix_market(file) else reader_of(file, readers)
 
@@ -174,7 +174,7 @@ def _a_model(found: object, file: Path) -> Model:
     return found
 
 
-def _labelled(model: Model, paths: ModelFiles, readers: Sequence[Reader]) -> Model:
+def _labelled(model: Model, paths: ModelFiles, readers: Collection[Reader]) -> Model:
     """Return the model with the labels and places that another file gives."""
     geometry = model.geometry
     assert isinstance(geometry, MatrixGeometry)
@@ -197,7 +197,7 @@ def _labelled(model: Model, paths: ModelFiles, readers: Sequence[Reader]) -> Mod
     return replace(model, dofs=geometry.dofs, geometry=geometry)
 
 
-def _nodes_of(file: Path, readers: Sequence[Reader]) -> dict[str, Sequence[float]]:
+def _nodes_of(file: Path, readers: Collection[Reader]) -> dict[str, Sequence[float]]:
     reader = _reader(file, readers)
     if not hasattr(reader, "read_nodes"):
         known = [s for r in readers if hasattr(r, "read_nodes") for s in r.suffixes]
@@ -222,7 +222,11 @@ def _placed(
 
 
 def write_model(
-    model: Model, folder: Path, like: ModelFiles, readers: Sequence[Reader], unit: LengthUnit = "m"
+    model: Model,
+    folder: Path,
+    like: ModelFiles,
+    readers: Collection[Reader],
+    unit: LengthUnit = "m",
 ) -> None:
     """Write a model in the format of the files that it came from, under the same names.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
@@ -81,7 +81,7 @@ _MOST_CHANGED = 50_000_000  # every change is built once while the case is read
 def read_case(
     folder: str | PathLike[str],
     name: str | None = None,
-    readers: Sequence[Reader] = (),
+    readers: Collection[Reader] = (),
     *,
     installed: bool = False,
     reduced: bool = True,
@@ -145,7 +145,7 @@ class _Building:
 
     files: CaseFiles
     spec: CaseSpec
-    readers: Sequence[Reader]
+    readers: Collection[Reader]
     readings: dict[Path, Measurement] = field(default_factory=dict)
     notes: dict[str, None] = field(default_factory=dict)
     matches: tuple[Match, ...] = ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -41,7 +41,7 @@ Responses = FrequencyResponses | TimeSignals
 
 def read_responses(
     file: Path,
-    readers: Sequence[Reader] = (),
+    readers: Collection[Reader] = (),
     known: Sensors | None = None,
     names: Mapping[str, str] | None = None,
 ) -> Responses:

@@ -7,11 +7,9 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from io import StringIO
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import tomlkit
-from tomlkit.items import Item, Table
 
 from femubench.core.case.frame_keys import Keys
 from femubench.core.case.frame_tables import KEYS, columns_of
@@ -20,6 +18,9 @@ from femubench.core.case.schema import LARGEST, SMALLEST
 from femubench.core.case.tables import RESERVED
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.measurement import Measurement
+
+if TYPE_CHECKING:
+    from tomlkit.items import Item, Table
 
 SHAPE_STD = 0.015
 
@@ -134,6 +135,8 @@ def toml_bytes(keys: Keys, comment: Sequence[str]) -> bytes:
     Arguments:
         keys: plain data, tables and lists of tables at the top and in ``model``.
     """
+    import tomlkit
+
     document = tomlkit.document()
     for line in comment:
         clean = "".join(c if c.isprintable() else " " for c in line)
@@ -148,6 +151,8 @@ def toml_bytes(keys: Keys, comment: Sequence[str]) -> bytes:
 
 
 def _nested(value: Any, depth: int) -> Item:  # noqa: ANN401 - plain data
+    import tomlkit
+
     if depth and isinstance(value, dict):
         return _table(value, depth - 1)
     if depth and isinstance(value, list) and value and isinstance(value[0], dict):
@@ -161,6 +166,8 @@ def _nested(value: Any, depth: int) -> Item:  # noqa: ANN401 - plain data
 
 
 def _table(keys: Keys, depth: int) -> Table:
+    import tomlkit
+
     table = tomlkit.table()
     for key, value in keys.items():
         table.add(key, _nested(value, depth))

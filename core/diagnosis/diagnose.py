@@ -247,7 +247,7 @@ def _proof(
         unseen = unseen_of(case, examination, best, model)
     crossed = None
     if any(len(part.before) for part in unseen):
-        found = find_held(case, examination, effort)
+        found = find_held(case, examination, effort, unseen)
         holds = found is not None
         if found is not None and found is not best:
             best, model = found, extend_by(case.model, found)

@@ -422,7 +422,10 @@ def holds(
 
 
 def find_held(
-    case: Case, examination: Examination, effort: Effort | None = None
+    case: Case,
+    examination: Examination,
+    effort: Effort | None = None,
+    known: Sequence[Unseen] = (),
 ) -> Explanation | None:
     """Return what unseen data bear out of all that the used data cannot tell from the best guess.
 
@@ -434,13 +437,14 @@ def find_held(
         case: what holds the unseen data.
         examination: of the used ones.
         effort: counts the explanations that are judged.
+        known: what `unseen_of` says of the best guess, where that is known.
     """
     effort = effort or Effort()
     posterior, best = examination.posterior, examination.best
     name = posterior.key(best)
     others = inseparable(posterior)[0][1:] if name else ()
     with effort.piece("unseen"):
-        first = _judged(case, examination, best)
+        first = _judged(case, examination, best, known)
     kinds = (fitted_otherwise, elsewhere) if name and not first[0] else ()
     places = [e for of in kinds for e in of(posterior, best)][: settings.largest_group]
     effort.expect("unseen", len(others) + len(places))
@@ -467,12 +471,14 @@ def find_held(
     return None
 
 
-def _judged(case: Case, examination: Examination, found: Explanation) -> tuple[bool, float]:
+def _judged(
+    case: Case, examination: Examination, found: Explanation, known: Sequence[Unseen] = ()
+) -> tuple[bool, float]:
     """Tell whether unseen data bear an explanation out, and its ln Bayes factor on them."""
     if found is examination.best:
         model = extend_by(case.model, found)
     else:  # asked for once: it and its modes need not last
         model = _extended(case.model, found, found.fit.state.x)
-    unseen = unseen_of(case, examination, found, model)
+    unseen = known or unseen_of(case, examination, found, model)
     log_bayes = sum(part.log_bayes for part in unseen)
     return holds(case, examination, found, model, unseen), log_bayes

@@ -152,9 +152,8 @@ def _groups(scenarios: Mapping[str, Scenario]) -> dict[str, list[str]]:
 def _case(plugins: Plugins, name: str) -> Case:
     from femubench.core.case.reader import read_case
 
-    readers = tuple(plugins.readers.values())
     folder = scenarios_of(plugins.scenarios)[name].folder(name)
-    return read_case(folder, name, readers, installed=True)
+    return read_case(folder, name, plugins.readers.values(), installed=True)
 
 
 cases: Catalogue[Case] = Catalogue("case", lambda p: scenarios_of(p.scenarios), _case)
@@ -190,7 +189,7 @@ def read_cases(
     # Words are known to be right before what reads cases is loaded.
     from femubench.core.case.reader import read_case
 
-    readers = tuple(plugins.readers.values())
+    readers = plugins.readers.values()  # each is loaded where a file asks for it
     # A name is that of a scenario, whose folder came with a plugin.
     found = [
         read_case(item[1], item[0], readers, installed=item[0] is not None)

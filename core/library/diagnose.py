@@ -10,7 +10,6 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from femubench.core.case.case import LARGEST_TOLERANCE, Case
-from femubench.core.case.writing import write_case
 from femubench.core.diagnosis.diagnose import diagnose as search
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_to_json
@@ -146,6 +145,8 @@ def write_extended(found: Diagnosis, folder: Path) -> None:
     Raises:
         FemubenchError: when it cannot be written as a case.
     """
+    from femubench.core.case.writing import write_case
+
     case = found.subject
     assert isinstance(case, Case)
     make_folder(folder.parent)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
 
 from femubench.core.fem.slopes import MatrixSlopes
-from femubench.core.modal.frf import FrequencyResponses, dynamic_stiffness, receptance
+from femubench.core.modal.frf import FrequencyResponses, dynamic_stiffness, losses
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.receptances import PredictedResponses, paired_slopes
 from femubench.core.typing import BoolArray, FloatArray, IntArray
@@ -19,8 +20,7 @@ _REACH = 1.15  # ratio of frequencies within which they lie
 _SHARP = 0.01  # of the frequency: one whose deviation is larger says nothing
 _STEEP = 5.0  # deviations: with less of a slope through zero a channel may hold noise alone
 _HIDDEN = 0.01, 2.0  # of a resonance, and dampings of it, within which it hides the zero
-_GRID, _STEPS, _BEYOND = 2000, 4, 1.5
-_STEP = 1e-5  # relative, of a difference by frequency
+_GRID, _STEPS, _BEYOND = 2000, 3, 1.5
 
 
 @dataclass(frozen=True)
@@ -176,38 +176,55 @@ def _shown(
 
 def predict_antiresonances(answer: PredictedResponses) -> Antiresonances:
     """Return the zeros of a model's receptances about the lines, with its damping."""
-    modes, (response, force, lines) = answer.modes, answer.at
+    parts = list(zeros_by_force(answer))
+    names = (field.name for field in fields(Antiresonances))
+    return Antiresonances(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
+
+
+def zeros_by_force(answer: PredictedResponses) -> Iterator[Antiresonances]:
+    """Yield the same under one force after the other."""
+    modes, lines = answer.modes, answer.at[2]
     hertz = np.sqrt(np.abs(modes.eigenvalues)) / (2.0 * np.pi)
     grid = np.geomspace(lines[0] / _BEYOND, lines[-1] * _BEYOND, _GRID)
     inner = (hertz > grid[0]) & (hertz < grid[-1])
-    # A line at the very frequency of a mode is none of the grid's by chance alone.
-    values = receptance(modes, response, force, grid, 0.0).real
-    values *= np.prod(1.0 - np.square(grid[:, None] / hertz[inner]), axis=1)[:, None, None]
-    at, o, e = np.nonzero(values[1:] * values[:-1] < 0.0)
-    one, two = values[at, o, e], values[at + 1, o, e]
-    zero = grid[at] + (grid[at + 1] - grid[at]) * one / (one - two)
-    # The product vanishes at a resonance that a sensor does not see, and no receptance does.
-    true = (np.abs(zero[:, None] / hertz[inner] - 1.0) > _HIDDEN[0]).all(axis=1)
-    zero, o, e = zero[true], o[true], e[true]
-    for _ in range(_STEPS):  # Newton's, to where the damping takes it
-        value, slope = _real_and_slope(answer, zero, o, e)
-        zero = zero - np.clip(value / slope, -_HIDDEN[0] * zero, _HIDDEN[0] * zero)
     own = hertz[np.maximum(answer.partner, 0)]
     own = np.where(answer.partner >= 0, own, np.nan)
-    found = np.column_stack([zero, o, e, np.zeros(len(zero))])
-    return _shown(found, hertz[inner], answer.ratios[inner], own)
+    # Undamped, so real. A line at the very frequency of a mode is none of the grid's by chance.
+    dynamic = modes.eigenvalues - np.square(2.0 * np.pi * grid)[:, None]
+    smooth = np.prod(1.0 - np.square(grid[:, None] / hertz[inner]), axis=1)[:, None] / dynamic
+    out, into = answer.read
+    for e, force in enumerate(into):
+        values = smooth @ (out * force).T
+        at, o = np.nonzero(values[1:] * values[:-1] < 0.0)
+        one, two = values[at, o], values[at + 1, o]
+        zero = grid[at] + (grid[at + 1] - grid[at]) * one / (one - two)
+        # The product vanishes at a resonance that a sensor does not see, and no receptance does.
+        true = (np.abs(zero[:, None] / hertz[inner] - 1.0) > _HIDDEN[0]).all(axis=1)
+        zero, pairs = zero[true], out[o[true]] * force
+        for _ in range(_STEPS):  # Newton's, to where the damping takes it
+            value, slope = _real_and_slope(answer, zero, pairs)
+            zero = zero - np.clip(value / slope, -_HIDDEN[0] * zero, _HIDDEN[0] * zero)
+        place = np.full(len(zero), e), np.zeros(len(zero))
+        found = np.column_stack([zero, o[true], *place])
+        yield _shown(found, hertz[inner], answer.ratios[inner], own)
 
 
 def _real_and_slope(
-    answer: PredictedResponses, hertz: FloatArray, o: IntArray, e: IntArray
+    answer: PredictedResponses, hertz: FloatArray, pairs: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the real part of receptances, each at a frequency of its own, and its slope, (k,)."""
-    out, into = answer.read
-    ends = hertz * np.array([[1.0], [1.0 - _STEP], [1.0 + _STEP]])
-    dynamic = dynamic_stiffness(answer.modes.eigenvalues, ends.ravel(), answer.damping)
-    dynamic = dynamic.reshape(3, *out[o].shape)
-    one, low, high = (out[o] * into[e] / dynamic).sum(axis=2).real
-    return one, (high - low) / (2.0 * _STEP * hertz)
+    """Return the real part of receptances, each at a frequency of its own, and its slope, (k,).
+
+    Arguments:
+        pairs: shapes at the response times those at the force of each, (k, m).
+    """
+    omega, values = 2.0 * np.pi * hertz[:, None], answer.modes.eigenvalues
+    lost, growing = losses(values, answer.damping)
+    dynamic, turn = values - np.square(omega), -2.0 * omega
+    if lost.any() or growing.any():
+        dynamic, turn = dynamic + 1j * (lost + omega * growing), turn + 1j * growing
+    terms = pairs / dynamic
+    slope = -2.0 * np.pi * (terms * (turn / dynamic)).sum(axis=1).real
+    return terms.sum(axis=1).real, slope
 
 
 def antiresonance_slopes(
@@ -217,8 +234,8 @@ def antiresonance_slopes(
 
     On a zero of Re H(f, x) it is -Re(dH/dx) / Re(dH/df).
     """
-    o, e = found.response, found.force
     out, into = answer.read
-    own = paired_slopes(answer.modes, out[o], into[e], found.frequencies, slopes, answer.damping)
-    _, by_frequency = _real_and_slope(answer, found.frequencies, o, e)
+    one, other = out[found.response], into[found.force]
+    own = paired_slopes(answer.modes, one, other, found.frequencies, slopes, answer.damping)
+    _, by_frequency = _real_and_slope(answer, found.frequencies, one * other)
     return np.asarray(-own.real / by_frequency[:, None])

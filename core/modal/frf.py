@@ -227,11 +227,18 @@ def dynamic_stiffness(
     Of the damping of a model it is lambda (1 + i eta) - w^2 + i w (alpha + beta lambda).
     """
     omega = 2.0 * np.pi * np.asarray(frequencies)[:, None]
-    if isinstance(damping, Damping):
-        lost = damping.eta * eigenvalues + omega * (damping.alpha + damping.beta * eigenvalues)
-    else:
-        lost = 2.0 * np.nan_to_num(damping) * np.sqrt(np.abs(eigenvalues)) * omega
-    dynamic = eigenvalues - omega**2 + 1j * lost
+    lost, growing = losses(eigenvalues, damping)
+    dynamic = eigenvalues - omega**2 + 1j * (lost + omega * growing)
     if not dynamic.all():
         raise ModelError("the receptance is infinite at a frequency of an undamped mode")
     return np.asarray(dynamic)
+
+
+def losses(
+    eigenvalues: FloatArray, damping: FloatArray | float | Damping
+) -> tuple[FloatArray, FloatArray]:
+    """Return the imaginary dynamic stiffness of modes: the part that stays, and that over w."""
+    if isinstance(damping, Damping):
+        return damping.eta * eigenvalues, damping.alpha + damping.beta * eigenvalues
+    growing = 2.0 * np.nan_to_num(damping) * np.sqrt(np.abs(eigenvalues))
+    return np.zeros_like(growing), growing

@@ -12,6 +12,7 @@ import sys
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
@@ -210,8 +211,14 @@ def list_faults(*plugins: str) -> tuple[Fault, ...]:
     return tuple(_registered("faults", plugins))
 
 
+@cache
+def _own_plugins() -> Plugins:
+    """Return what comes with femubench, loaded once."""
+    return load_plugins(third_parties=False)
+
+
 def _registered(kind: str, plugins: Sequence[str]) -> Iterator[Any]:
-    found = load_plugins(third_parties=bool(plugins))
+    found = load_plugins() if plugins else _own_plugins()
     choose_names("plugin", plugins, (plugin.plugin for plugin in found.loaded))
     offers: Offers = getattr(found, kind)
     for plugin in found.loaded:
