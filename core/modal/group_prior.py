@@ -13,6 +13,7 @@ from femubench.core.modal.eigen import cache_by_model
 from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.typing import FloatArray, SparseArray
 
+INTERFACE = "interface:"
 QUARTILE = 0.6744897501960817  # of the standard normal distribution
 
 
@@ -106,10 +107,14 @@ class GroupPriors:
     def kind(self, name: str) -> str:
         """Return the kind of a group, a key of `KINDS`: what the case states, else what is found.
 
+        ``interface:A|B``, where two parts meet, is a joint.
+
         Examples:
             >>> modal.GroupPriors(model).kind("deck")
             'part'
         """
+        if name.startswith(INTERFACE):
+            return "joint"
         return self.model.group_kinds.get(name, "support" if name in self.supports else "part")
 
 
