@@ -28,7 +28,7 @@ from femubench.core.fem.frame import (
     Support as Support,
 )
 from femubench.core.fem.group_factors import Groups as Groups
-from femubench.core.fem.model import LowRank as LowRank, Powers as Powers
+from femubench.core.fem.model import LowRank as LowRank
 from femubench.core.fem.parameters import Property as Property
 from femubench.core.fem.preload import GeometricStiffness as GeometricStiffness
 from femubench.core.fem.sections import Section as Section

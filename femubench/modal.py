@@ -12,7 +12,6 @@ from femubench.core.modal.frf import (
     receptance as receptance,
 )
 from femubench.core.modal.group_prior import GroupPriors as GroupPriors
-from femubench.core.modal.interfaces import Interfaces as Interfaces
 from femubench.core.modal.many_changes import modes_of_changes as modes_of_changes
 from femubench.core.modal.pairing import pair_measured as pair_measured, pair_modes as pair_modes
 from femubench.core.modal.rigid import rigid_modes_of as rigid_modes_of

@@ -10,10 +10,10 @@ import scipy.sparse as sp
 from femubench.core.fem.model import Model
 from femubench.core.fem.slopes import Matrix
 from femubench.core.modal.eigen import cache_by_model
+from femubench.core.modal.interfaces import INTERFACE, Interfaces
 from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.typing import FloatArray, SparseArray
 
-INTERFACE = "interface:"
 QUARTILE = 0.6744897501960817  # of the standard normal distribution
 
 
@@ -72,6 +72,17 @@ class GroupPriors:
             frozenset()
         """
         return _supports(self.model)
+
+    @property
+    def interfaces(self) -> Interfaces:
+        """Return where groups meet that have tolerances: no joints, nothing that holds to ground.
+
+        Examples:
+            >>> modal.GroupPriors(model).interfaces.places
+            ()
+        """
+        sure = (name for name in self.model.groups if self.std(name) < 2.0 * STRUCTURE_STD)
+        return Interfaces(self.model, tuple(sure))
 
     def std(self, name: str, matrix: Matrix = "stiffness") -> float:
         """Return the standard deviation of ln(factor) of a group.

@@ -121,7 +121,7 @@ def reduce_groups(
         whole = _Reduced(span, model, exact, shift)
     except la.LinAlgError:
         raise ModelError("the stiffness is not definite in coordinates of its groups") from None
-    meet = Interfaces(model)
+    meet = GroupPriors(model).interfaces
     for place in meet.places:
         whole.blocks[_POWERS, place] = _soften(whole, span, meet, place)
     for place, given in model.powers.items():
@@ -182,7 +182,7 @@ def reduce_groups(
 
 def _soften(whole: _Reduced, span: _Substructures, meet: Interfaces, place: str) -> _PartialMatrix:
     """Return what the softer part of an interface resists by it, in the coordinates."""
-    at = whole.blocks["stiffness", meet.side(place)[0]].at
+    at = whole.blocks["stiffness", meet.sides[place][0]].at
     return _PartialMatrix(at, meet.powers(place, lambda force: span.forces(force)[at])[1][0])
 
 
@@ -287,8 +287,7 @@ class _Substructures:
         self.shapes = sp.csr_array((found.data, places), shape=(self.size, found.shape[1]))
         self.insides: list[_Interior] = []
         inertia = sp.csr_array(model.mass)
-        meet = Interfaces(model)
-        sides = [meet.side(place) for place in meet.places]
+        sides = GroupPriors(model).interfaces.sides.values()
         for i in range(len(parts)):
             rows = np.flatnonzero(~border & (owner == i))
             if len(rows):
@@ -297,7 +296,7 @@ class _Substructures:
                 loose = [self.shapes[own].indices for side, own in sides if side == name]
                 self._eliminate(
                     whole[rows], inertia[rows], rows, known, highest / softest,
-                    np.unique(np.concatenate(loose)) if loose else np.zeros(0, dtype=int),
+                    np.concatenate([rows[:0], *loose]),
                 )  # fmt: skip
 
     @property

@@ -26,9 +26,9 @@ import scipy.sparse as sp
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model, Powers
 from femubench.core.modal.eigen import cache_by_model
-from femubench.core.modal.group_prior import INTERFACE, STRUCTURE_STD, GroupPriors
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
+INTERFACE = "interface:"
 _MOST = 1500  # rows that two parts share; wider faces are none
 _LOOSE = 1e-10  # of the stiffness there: what resists no motion
 
@@ -39,32 +39,26 @@ class Interfaces:
 
     Arguments:
         model: any model; of a frame, or without groups, there are none.
+        parts: names of its groups between which there may be some.
     """
 
     PREFIX: ClassVar[str] = INTERFACE
 
     model: Model
+    parts: tuple[str, ...]
+
+    @property
+    def sides(self) -> dict[str, tuple[str, IntArray]]:
+        """Return the softer of two parts and the rows that both have, (p,), by interface.
+
+        In a basis, where all groups have all coordinates, there are none to be found.
+        """
+        return _sides(self.model, self.parts)
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Return the interfaces between parts that are no joints and hold nothing to ground.
-
-        Examples:
-            >>> modal.Interfaces(model).places
-            ()
-        """
-        known = tuple(place for place in self.model.powers if place.startswith(INTERFACE))
-        return known or tuple(_shared(self.model))
-
-    def side(self, place: str) -> tuple[str, IntArray]:
-        """Return the group that is softer there, and the rows that it shares, (p,).
-
-        Raises:
-            ModelError: when there is no such interface.
-        """
-        if place not in _shared(self.model):
-            raise ModelError(f"no two parts meet at {place!r}")
-        return _shared(self.model)[place]
+        """Return all interfaces; where the model is in a basis, those that it was given."""
+        return tuple(p for p in self.model.powers if p.startswith(INTERFACE)) or tuple(self.sides)
 
     def powers(self, place: str, onto: Callable[[SparseArray], FloatArray] | None = None) -> Powers:
         """Return stiffness and mass that come with powers of f - 1.
@@ -79,46 +73,37 @@ class Interfaces:
         """
         if onto is None and place in self.model.powers:
             return self.model.powers[place]
-        name, rows = self.side(place)
-        stiff = sp.csr_array(sp.csc_array(self.model.groups[name])[:, rows])
-        heavy = sp.csr_array(stiff.shape)
-        if name in self.model.mass_groups:
-            heavy = sp.csr_array(sp.csc_array(self.model.mass_groups[name])[:, rows])
+        if place not in self.sides:
+            raise ModelError(f"no two parts meet at {place!r}")
+        name, rows = self.sides[place]
+        whole = self.model.groups[name]
+        stiff, heavy = (
+            sp.csr_array(sp.csc_array(part)[:, rows])
+            for part in (whole, self.model.mass_groups.get(name, 0.0 * whole))
+        )
         near = np.flatnonzero(np.diff(stiff.indptr) + np.diff(heavy.indptr))
         pulled, carried = (
             part[near].toarray() if onto is None else onto(part) for part in (stiff, heavy)
         )
-        inside, inertia = stiff[rows].toarray(), heavy[rows].toarray()
-        size = np.sqrt(inside.diagonal())
+        inside, size = stiff[rows].toarray(), np.sqrt(whole.diagonal()[rows])
         inverse = la.pinvh(inside / np.outer(size, size), rtol=_LOOSE) / np.outer(size, size)
         follow = pulled @ inverse
-        cross = carried @ follow.T
-        found = {
-            1: (pulled @ follow.T, cross + cross.T),
-            2: (np.zeros(cross.shape), follow @ inertia @ follow.T),
-        }
+        cross, moved = carried @ follow.T, follow @ heavy[rows].toarray() @ follow.T
+        found = {1: (pulled @ follow.T, cross + cross.T), 2: (0.0 * moved, moved)}
         if onto is not None:
             return found
-        pick = sp.csr_array(
-            (np.ones(len(near)), (near, range(len(near)))), (heavy.shape[0], len(near))
-        )
+        pick = sp.csr_array(sp.eye_array(len(whole.indptr) - 1, format="csc")[:, near])
         return {
-            power: tuple(sp.csc_array(pick @ sp.csr_array(part) @ pick.T) for part in pair)
-            for power, pair in found.items()
+            power: (sp.csc_array(pick @ k @ pick.T), sp.csc_array(pick @ m @ pick.T))
+            for power, (k, m) in ((p, map(sp.csr_array, pair)) for p, pair in found.items())
         }
 
 
 @cache_by_model
-def _shared(model: Model) -> dict[str, tuple[str, IntArray]]:
-    """Return the softer of two parts and the rows that both have, by interface.
-
-    In a basis, where all groups have all coordinates, there are none to be found.
-    """
-    std = GroupPriors(model).std
-    sure = {n: k for n, k in model.groups.items() if std(n) < 2.0 * STRUCTURE_STD}
-    size = {name: part.diagonal() for name, part in sure.items()}
+def _sides(model: Model, parts: tuple[str, ...]) -> dict[str, tuple[str, IntArray]]:
+    size = {name: model.groups[name].diagonal() for name in parts}
     found = {}
-    for pair in combinations(size, 2):
+    for pair in combinations(parts, 2):
         rows = np.flatnonzero((size[pair[0]] > 0.0) & (size[pair[1]] > 0.0))
         least = min(np.count_nonzero(size[name]) for name in pair)
         if 0 < len(rows) <= _MOST and 2 * len(rows) < least:

@@ -12,7 +12,6 @@ from femubench.core.case.case import Case
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.frame import Frame, Joint, Member, MemberSet, Place
-from femubench.core.fem.group_factors import GROUP
 from femubench.core.fem.model import Model
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import SparseArray
@@ -210,10 +209,7 @@ def _in_another_order(model: Model, geometry: MatrixGeometry, names: Disguise) -
         stiffness=turned(model.stiffness),
         groups={groups[name]: turned(part) for name, part in model.groups.items()},
         mass_groups={groups[name]: turned(part) for name, part in model.mass_groups.items()},
-        powers={
-            f"{GROUP}{groups[place.removeprefix(GROUP)]}" if place.startswith(GROUP) else place: own
-            for place, own in model.map_powers(turned, turned).items()
-        },
+        powers={},  # no disguise has plates
         group_priors={groups[name]: prior for name, prior in model.group_priors.items()},
         group_kinds={groups[name]: kind for name, kind in model.group_kinds.items()},
         dofs=moved,

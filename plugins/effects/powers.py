@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -11,8 +10,8 @@ import numpy as np
 
 from femubench import Model, NotApplicable
 from femubench.effect import Change, FrameEffect, Parameter, Size, Term
-from femubench.fem import FloatArray, Frame, Groups, Powers
-from femubench.modal import GroupPriors, Interfaces
+from femubench.fem import FloatArray, Frame, Groups
+from femubench.modal import GroupPriors
 
 
 class PowersEffect(FrameEffect):
@@ -24,41 +23,34 @@ class PowersEffect(FrameEffect):
 
     nominal: ClassVar[float]
 
-    @abstractmethod
-    def powers(self, model: Model, place: str) -> Powers:
-        """Return stiffness and mass at a place by the power that they come with."""
-
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Raise NotApplicable: a frame has no groups."""
         raise NotApplicable(f"{self.name} needs matrices in groups")
 
     def extend_matrices(self, model: Model, place: str, values: Sequence[float]) -> Model:
         """Return the model with its matrices changed, and the group's own where it has one."""
-        powers, name = self.powers(model, place), place.removeprefix(Groups.PREFIX)
-        value = self.nominal + values[0]
-        grown = {p: value**p - self.nominal**p for p in powers}
+        powers = GroupPriors(model).interfaces.powers(place)
+        grown, name = self._grown(values, list(powers)), place.removeprefix(Groups.PREFIX)
         found: dict[str, Any] = {}
         for i, (whole, own) in enumerate((("stiffness", "groups"), ("mass", "mass_groups"))):
-            change = sum(grown[p] * pair[i] for p, pair in powers.items())
+            change = sum(g * pair[i] for g, pair in zip(grown, powers.values(), strict=True))
             groups = getattr(model, own)
             found[whole] = getattr(model, whole) + change
             found[own] = groups | {name: groups[name] + change} if name in groups else groups
-        if self.nominal:
-            now = {p: (value**p * k, value**p * m) for p, (k, m) in powers.items()}
-            found["powers"] = {**model.powers, place: now}
         return replace(model, **found)
 
     def change(self, model: Model, place: str) -> Change:
         """Return the matrices, each with its power."""
-        powers = self.powers(model, place)
+        powers = GroupPriors(model).interfaces.powers(place)
         pairs = ((Term.of("stiffness", k), Term.of("mass", m)) for k, m in powers.values())
+        each = [power for power in powers for _ in range(2)]
         terms = tuple(term for pair in pairs for term in pair)
+        return Change(terms, lambda values: self._grown(values, each))
 
-        def coefficients(values: FloatArray) -> FloatArray:
-            value = self.nominal + values[:, :1]
-            return np.hstack([value**p - self.nominal**p for p in powers for _ in range(2)])
-
-        return Change(terms, coefficients)
+    def _grown(self, values: FloatArray | Sequence[float], powers: Sequence[int]) -> FloatArray:
+        """Return what powers of the value grow by, (k,), or by rows of values (g, 1), (g, k)."""
+        value, each = self.nominal + np.asarray(values), np.array(powers)
+        return np.asarray(value**each - self.nominal**each)
 
 
 class PlateThickness(PowersEffect):
@@ -71,16 +63,13 @@ class PlateThickness(PowersEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the groups of plates alone."""
-        return tuple(p for p in model.powers if not p.startswith(Interfaces.PREFIX))
+        meet = GroupPriors(model).interfaces
+        return tuple(place for place in model.powers if not place.startswith(meet.PREFIX))
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the relative change, of which the mass of a rolled sheet scatters as much."""
         std = GroupPriors(model).std(place.removeprefix(Groups.PREFIX), "mass")
         return (Parameter("change of thickness", "", std, lower=-0.9, wording="change"),)
-
-    def powers(self, model: Model, place: str) -> Powers:
-        """Return what comes with powers of the thickness over that drawn."""
-        return model.powers[place]
 
 
 class InterfaceSoftness(PowersEffect):
@@ -96,13 +85,9 @@ class InterfaceSoftness(PowersEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the pairs of parts that share nodes."""
-        return Interfaces(model).places
+        return GroupPriors(model).interfaces.places
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the change of what the softer part resists by the interface, never above zero."""
         given = GroupPriors(model).std(place), 0.0, -np.inf, 0.0
         return (Parameter("change of stiffness", "", *given, scaling="factor", wording="change"),)
-
-    def powers(self, model: Model, place: str) -> Powers:
-        """Return what comes with powers of the change."""
-        return Interfaces(model).powers(place)

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench import InputError, Model
-from femubench.fem import FloatArray, Groups, MatrixGeometry, Powers, SparseArray, matrix_model
+from femubench.fem import FloatArray, Groups, MatrixGeometry, SparseArray, matrix_model
 from femubench.modal import GroupPriors
 from femubench.plugins.readers import nodes, shells, solid_elements
 from femubench.plugins.readers.attachments import NodeMotions, rigid
@@ -22,6 +22,7 @@ from femubench.plugins.readers.nodes import Point
 from femubench.plugins.readers.outline import find_outline
 from femubench.plugins.readers.reading import DIRECTIONS, needs
 
+Powers = Mapping[int, tuple[SparseArray, SparseArray]]
 JOINT_SHARE = 0.02  # of the mass: a smaller set of elements is a weld, a bolt or glue
 _BETTER = {**solid_elements.BETTER, **shells.BETTER}
 _TIED = 100.0  # times what holds the nodes of a coupling as a body: how its reference node is
