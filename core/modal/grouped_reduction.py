@@ -165,6 +165,9 @@ def reduce_groups(
         part = replace(model, stiffness=model.groups.get(group, model.stiffness))
         key, free = ("stiffness", group), rigid_modes_of(part)[kept]
         small[key] = _loose(small[key], free)
+        if not group:
+            for at in meet.places:
+                powers[at] = {p: (_loose(k, free), m) for p, (k, m) in powers[at].items()}
         place = f"{GROUP}{group}"
         pairs = model.powers.get(place, {})
         if pairs:  # the stiffness of the first is the rest of the group, also by rounding
