@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,10 +11,12 @@ import scipy.sparse as sp
 from femubench.core.case.case import Case
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import ModelError
+from femubench.core.fem.group_factors import Groups
 from femubench.core.fem.model import Dofs, Model
 from femubench.core.modal.eigen import ALL_MODES_LIMIT, DENSE_LIMIT
 from femubench.core.modal.group_prior import GroupPriors
 from femubench.core.modal.grouped_reduction import GroupedReduction, reduce_groups
+from femubench.core.modal.interfaces import INTERFACE
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 _INNER = "~"  # the node of coordinates that lie nowhere
@@ -97,6 +100,7 @@ def _small_model(model: Model, found: GroupedReduction) -> Model:
         group_kinds={**dict.fromkeys(GroupPriors(model).supports, "support"), **model.group_kinds},
         groups=sparse(found.groups),
         mass_groups=sparse(found.mass_groups),
+        powers=replace(model, powers=found.powers).map_powers(sp.csc_array, sp.csc_array),
     )
 
 
@@ -122,21 +126,31 @@ def expand_model(case: Case, updated: Model) -> Model:
     assert isinstance(whole.geometry, MatrixGeometry)
     outer = np.flatnonzero(~small.dofs.internal)
     rows = np.array([whole.geometry.rows[key] for key in geometry.rows if key[0] != _INNER])
-    found = {}
-    for matrix, kind in (("stiffness", "groups"), ("mass", "mass_groups")):
+    # What comes with the first power of a thickness is the rest of its group.
+    keys = [(place, power) for place, own in small.powers.items() for power in own
+            if power > 1 or place.startswith(INTERFACE)]  # fmt: skip
+    found: dict[str, Any] = {"powers": {}}
+    for i, (matrix, kind) in enumerate((("stiffness", "groups"), ("mass", "mass_groups"))):
         before, parts = getattr(small, matrix), getattr(small, kind)
-        bases = [part.toarray() for part in (before, *parts.values())]
+        powers = [small.powers[place][power][i] for place, power in keys]
+        bases = [part.toarray() for part in (before, *parts.values(), *powers)]
         change = getattr(updated, matrix).toarray() - bases[0]
         factors, rest = _factors(bases, change, outer)
         total, own = getattr(whole, matrix), getattr(whole, kind)
         grown = (1.0 + factors[0]) * total
-        for factor, name in zip(factors[1:], parts, strict=True):
+        for factor, name in zip(factors[1:], parts, strict=False):
             grown = grown + factor * own[name]
+        scale = 1.0 + factors[0] + factors[1:]
+        found[kind] = {name: f * own[name] for f, name in zip(scale, parts, strict=False)}
+        for factor, (place, power) in zip(factors[1 + len(parts) :], keys, strict=True):
+            if abs(factor) > _SAME:
+                of = whole.powers.get(place) or GroupPriors(whole).interfaces.powers(place)
+                more, name = factor * of[power][i], place.removeprefix(Groups.PREFIX)
+                grown = grown + more
+                found[kind] |= {name: found[kind][name] + more} if name in parts else {}
         added = sp.coo_array(rest)
         at = (rows[added.row], rows[added.col])
         found[matrix] = sp.csc_array(grown + sp.coo_array((added.data, at), shape=total.shape))
-        scale = 1.0 + factors[0] + factors[1:]
-        found[kind] = {name: f * own[name] for f, name in zip(scale, parts, strict=True)}
     return replace(whole, **found)
 
 

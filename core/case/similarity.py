@@ -170,6 +170,9 @@ def similar_matrices(model: Model, geometry: MatrixGeometry, by: Similarity) -> 
         stiffness_change=None,
         groups=parts(model.groups, stiffness),
         mass_groups=parts(model.mass_groups, mass),
+        powers=model.map_powers(
+            lambda part: scale_matrix(part, stiffness), lambda part: scale_matrix(part, mass)
+        ),
         dofs=dofs,
         geometry=replace(geometry, dofs=dofs, outlines=outlines),
     )

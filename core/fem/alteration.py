@@ -277,6 +277,7 @@ def _hold(model: Model, supports: Sequence[Support]) -> Model:
         free=False,
         groups={name: _block(part, kept) for name, part in model.groups.items()},
         mass_groups={name: _block(part, kept) for name, part in model.mass_groups.items()},
+        powers=model.map_powers(*[lambda part: _block(part, kept)] * 2),
     )
 
 

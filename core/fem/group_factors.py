@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from operator import matmul
+from operator import matmul, mul
 from typing import ClassVar
 
 import numpy as np
@@ -92,7 +92,11 @@ class Groups:
             groups |= {name: factor * groups[name] for name in names}
             if change is not None and _ALL in places:
                 change = replace(change, core=factor * change.core)
-            model = replace(model, **{matrix: whole, f"{matrix}_change": change, own: groups})
+            scales = (factor, 1.0) if matrix == "stiffness" else (1.0, factor)
+            grown = model.map_powers(*(partial(mul, scale) for scale in scales))
+            powers = {p: grown[p] if {p, _ALL} & {*places} else k for p, k in model.powers.items()}
+            changed = {matrix: whole, f"{matrix}_change": change, own: groups, "powers": powers}
+            model = replace(model, **changed)
         return model
 
 

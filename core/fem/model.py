@@ -21,6 +21,8 @@ from femubench.core.fem.sensors import Sensors, unit_motions
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
+# Stiffness and mass, (n, n) each, by the power of a value that they come with.
+Powers = Mapping[int, tuple[SparseArray, SparseArray]]
 _NEGLIGIBLE = 1e-14  # of the largest eigenvalue of a change
 
 
@@ -146,6 +148,8 @@ class Model(Shown):
         group_kinds: by name of a group, what it is: a word of `modal.group_prior.KINDS`.
         finer: of a model from files, gives the whole of it and the same with better elements, whose
             rows begin with those of the whole; None where nobody knows better ones.
+        powers: by a place, what comes with powers of a value there: of `group:NAME` (`all` where it
+            is the only part) the thickness of its plates over that drawn.
     """
 
     mass: SparseArray
@@ -162,6 +166,7 @@ class Model(Shown):
     group_priors: Mapping[str, float] = field(default_factory=dict)
     group_kinds: Mapping[str, str] = field(default_factory=dict)
     finer: Callable[[], tuple[Model, Model]] | None = None
+    powers: Mapping[str, Powers] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return its fields alone: what was made of this very model stays with it."""
@@ -179,6 +184,15 @@ class Model(Shown):
         free, damping = structure.frame.free, structure.frame.damping
         model = cls(mass, stiffness, dofs_of(structure), structure, structure)
         return replace(model, free=free, damping=damping)
+
+    def map_powers(
+        self, stiffness: Callable[[Any], Any], mass: Callable[[Any], Any]
+    ) -> dict[str, Powers]:
+        """Return what comes with powers of values, each matrix of it changed by a function."""
+        return {
+            place: {power: (stiffness(k), mass(m)) for power, (k, m) in own.items()}
+            for place, own in self.powers.items()
+        }
 
     def rows(self) -> list[tuple[str, str]]:
         """Return what it is a model of, its mass and what of it is not in the matrices."""

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from femubench.core.fem.model import Model
 from femubench.core.fem.slopes import Matrix
 from femubench.core.modal.eigen import cache_by_model
+from femubench.core.modal.interfaces import INTERFACE, Interfaces
 from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.typing import FloatArray, SparseArray
 
@@ -72,6 +73,17 @@ class GroupPriors:
         """
         return _supports(self.model)
 
+    @property
+    def interfaces(self) -> Interfaces:
+        """Return where groups meet that have tolerances: no joints, nothing that holds to ground.
+
+        Examples:
+            >>> modal.GroupPriors(model).interfaces.places
+            ()
+        """
+        sure = (name for name in self.model.groups if self.std(name) < 2.0 * STRUCTURE_STD)
+        return Interfaces(self.model, tuple(sure))
+
     def std(self, name: str, matrix: Matrix = "stiffness") -> float:
         """Return the standard deviation of ln(factor) of a group.
 
@@ -106,10 +118,14 @@ class GroupPriors:
     def kind(self, name: str) -> str:
         """Return the kind of a group, a key of `KINDS`: what the case states, else what is found.
 
+        ``interface:A|B``, where two parts meet, is a joint.
+
         Examples:
             >>> modal.GroupPriors(model).kind("deck")
             'part'
         """
+        if name.startswith(INTERFACE):
+            return "joint"
         return self.model.group_kinds.get(name, "support" if name in self.supports else "part")
 
 

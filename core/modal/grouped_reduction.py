@@ -32,10 +32,12 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.model import Model
+from femubench.core.fem.group_factors import GROUP
+from femubench.core.fem.model import Model, Powers
 from femubench.core.modal.eigen import DENSE_LIMIT, solve_modes
 from femubench.core.modal.factorisation import factorise_definite
 from femubench.core.modal.group_prior import GroupPriors
+from femubench.core.modal.interfaces import Interfaces
 from femubench.core.modal.rigid import orthonormal, rigid_body_vectors, rigid_modes_of
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
@@ -71,6 +73,7 @@ class GroupedReduction:
         kept: rows of the whole model that are the first coordinates, (b,).
         stiffness, mass: (N, N).
         groups, mass_groups: parts of them by name, (N, N) each.
+        powers: what comes with powers of a thickness or of an interface's softness, by place.
         moved: how far off a frequency is, relative: by what the borders of groups lack of modes,
             and by what there was no room for; the largest of all groups, factors and modes.
     """
@@ -80,6 +83,7 @@ class GroupedReduction:
     mass: FloatArray
     groups: dict[str, FloatArray]
     mass_groups: dict[str, FloatArray]
+    powers: dict[str, Powers]
     moved: float
 
 
@@ -117,8 +121,12 @@ def reduce_groups(
         whole = _Reduced(span, model, exact, shift)
     except la.LinAlgError:
         raise ModelError("the stiffness is not definite in coordinates of its groups") from None
-    groups = {("stiffness", n): m for n, m in model.groups.items()}
-    groups |= {("mass", n): m for n, m in model.mass_groups.items()}
+    meet = GroupPriors(model).interfaces
+    for place in meet.places:
+        whole.blocks[_POWERS, place] = _soften(whole, span, meet, place)
+    for place, given in model.powers.items():
+        bending = sum(k for power, (k, _) in given.items() if power > 1)
+        whole.blocks[_POWERS, place] = span.reduce(bending)
     pieces: list[FloatArray] = []
     settled: dict[tuple[_Name, float], FloatArray] = {}
     for name, block in whole.blocks.items():
@@ -145,23 +153,44 @@ def reduce_groups(
         moved = max(moved, float((np.sqrt(own / reference) - 1.0).max(initial=0.0)))
     body = span.forces(whole.energy(rigid))
     turn = _physical_coordinates(span.shapes[kept] @ vectors, vectors.T @ body)
-    small = {name: turn.T @ part @ turn for name, part in small.items()}
+    small = {n: turn.T @ part @ turn for n, part in small.items() if n[0] != _POWERS}
+    vectors = vectors @ turn
+    powers = {
+        p: meet.powers(p, lambda force: np.asarray(vectors.T @ span.forces(force)))
+        for p in meet.places
+    }
     # Rounding of large entries leaves halves that differ, of which solvers read one or both.
     small = {name: 0.5 * (part + part.T) for name, part in small.items()}
     for group in ("", *model.groups):
         part = replace(model, stiffness=model.groups.get(group, model.stiffness))
-        key = ("stiffness", group)
-        small[key] = _loose(small[key], rigid_modes_of(part)[kept])
+        key, free = ("stiffness", group), rigid_modes_of(part)[kept]
+        small[key] = _loose(small[key], free)
+        if not group:
+            for at in meet.places:
+                powers[at] = {p: (_loose(k, free), m) for p, (k, m) in powers[at].items()}
+        place = f"{GROUP}{group}"
+        pairs = model.powers.get(place, {})
+        if pairs:  # the stiffness of the first is the rest of the group, also by rounding
+            masses = {p: span.reduce(m).within(vectors) for p, (_, m) in pairs.items()}
+            bent = {p: _loose(span.reduce(pairs[p][0]).within(vectors), free) for p in pairs}
+            bent[1] = small[key] - sum(part for p, part in bent.items() if p > 1)
+            powers[place] = {p: (bent[p], masses[p]) for p in pairs}
     stiffness, mass = (
         {name: small[kind, name] for name in own}
         for kind, own in (("stiffness", model.groups), ("mass", model.mass_groups))
     )
     moved += whole.lacking
-    return GroupedReduction(kept, small[_K], small[_M], stiffness, mass, moved)
+    return GroupedReduction(kept, small[_K], small[_M], stiffness, mass, powers, moved)
+
+
+def _soften(whole: _Reduced, span: _Substructures, meet: Interfaces, place: str) -> _PartialMatrix:
+    """Return what the softer part of an interface resists by it, in the coordinates."""
+    at = whole.blocks["stiffness", meet.sides[place][0]].at
+    return _PartialMatrix(at, meet.powers(place, lambda force: span.forces(force)[at])[1][0])
 
 
 _Name = tuple[str, str]
-_K, _M = ("stiffness", ""), ("mass", "")
+_K, _M, _POWERS = ("stiffness", ""), ("mass", ""), "powers"
 
 
 def _factors(model: Model, name: str) -> tuple[float, ...]:
@@ -261,11 +290,17 @@ class _Substructures:
         self.shapes = sp.csr_array((found.data, places), shape=(self.size, found.shape[1]))
         self.insides: list[_Interior] = []
         inertia = sp.csr_array(model.mass)
+        sides = GroupPriors(model).interfaces.sides.values()
         for i in range(len(parts)):
             rows = np.flatnonzero(~border & (owner == i))
             if len(rows):
                 softest = soft[i][0] if i < len(names) else 1.0
-                self._eliminate(whole[rows], inertia[rows], rows, known, highest / softest)
+                name = names[i] if i < len(names) else ""
+                loose = [self.shapes[own].indices for side, own in sides if side == name]
+                self._eliminate(
+                    whole[rows], inertia[rows], rows, known, highest / softest,
+                    np.concatenate([rows[:0], *loose]),
+                )  # fmt: skip
 
     @property
     def count(self) -> int:
@@ -274,9 +309,12 @@ class _Substructures:
 
     def _eliminate(
         self, across: SparseArray, inertia: SparseArray, rows: IntArray, known: FloatArray,
-        highest: float,
+        highest: float, loose: IntArray,
     ) -> None:  # fmt: skip
-        """Add what the inside of a part does when its border moves, and when it is held."""
+        """Add what the inside of a part does when its border moves, and when it is held.
+
+        What it does with coordinates of the border that are `loose` it also does by itself.
+        """
         inside = sp.csc_array(across[:, rows])
         solver = factorise_definite(inside)
         pulled = sp.csc_array(across @ self.shapes)  # shapes are zero inside
@@ -284,6 +322,8 @@ class _Substructures:
         static = -solver.solve(pulled[:, at].toarray())
         modes = _held_modes(solver.solve, inside, sp.csc_array(inertia[:, rows]), highest)
         beyond = solver.solve(across @ known)  # what the border does not make it do at once
+        apart = static[:, np.isin(at, loose)]
+        beyond = np.hstack([beyond, apart / np.sqrt(np.einsum("ij,ij->j", apart, inside @ apart))])
         beyond -= modes @ (modes.T @ (inside @ beyond))
         values, turn = la.eigh(beyond.T @ (inside @ beyond))
         strong = values > _STRONG**2
@@ -309,9 +349,10 @@ class _Substructures:
             self.insides[i] = _Interior(part.rows, np.append(part.at, new), motions)
         self.shapes = sp.hstack([self.shapes, sp.csr_array(on_border)], format="csr")
 
-    def forces(self, force: FloatArray) -> FloatArray:
+    def forces(self, force: FloatArray | SparseArray) -> FloatArray:
         """Return what forces on the whole model do along the coordinates, (N, m)."""
-        found = np.asarray(self.shapes.T @ force)
+        found = self.shapes.T @ force
+        found = found.toarray() if sp.issparse(found) else np.asarray(found)
         for part in self.insides:
             found[part.at] += part.motions.T @ force[part.rows]
         return found

@@ -25,6 +25,8 @@ CLASSES = {
     "member-mass": "material:MemberMass",
     "group-mass": "material:GroupMass",
     "group-material": "material:GroupMaterial",
+    "plate-thickness": "powers:PlateThickness",
+    "interface-softness": "powers:InterfaceSoftness",
     "wall-thickness": "wall_thickness:WallThickness",
     "local-stiffness-loss": "local_stiffness_loss:LocalStiffnessLoss",
     "axial-preload": "axial_preload:AxialPreload",

@@ -47,6 +47,7 @@ class SolidDeck:
         couplings: name and surface of distributing couplings, by reference node.
         held: node and direction of supports.
         attached: springs, masses and rigid elements at nodes.
+        coated: sets whose density has mass in it that does not grow with the thickness.
     """
 
     path: Path
@@ -62,6 +63,7 @@ class SolidDeck:
     couplings: dict[int, tuple[str, str]] = field(default_factory=dict)
     held: set[tuple[int, int]] = field(default_factory=set)
     attached: Attachments = field(default_factory=Attachments)
+    coated: set[str] = field(default_factory=set)
 
     def solids(self) -> list[int]:
         """Return the elements that are no point masses."""

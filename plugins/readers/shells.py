@@ -292,6 +292,25 @@ class Thickened:
             return None
         return next(lines[0].arms)
 
+    def swell(self, row: Mapping[int, int], factor: float) -> SparseArray:
+        """Return what makes lines of nodes so many times as long, and turn as before, (N, N).
+
+        It acts on places as on displacements. What the middle moves by itself grows with the square
+        of the factor, as it bulges where a plate bends.
+
+        Arguments:
+            row: of every node of solids.
+        """
+        found = sp.eye_array(len(row), format="lil")
+        for line in (line for lines in self.lines.values() for line in lines):
+            below, middle, above = (row.get(node) for node in line.nodes)
+            for own, other in ((below, above), (above, below)):
+                found[own, own], found[own, other] = (1.0 + factor) / 2.0, (1.0 - factor) / 2.0
+            if middle is not None:
+                found[middle, middle] = factor**2
+                found[middle, below] = found[middle, above] = (1.0 - factor**2) / 2.0
+        return sp.csr_array(found)
+
     def follow(self, node: int, held: Set[tuple[int, int]]) -> Iterator[tuple[int, FloatArray]]:
         """Return the nodes of solids, and how they move with a motion that a node is given, (3, 6).
 

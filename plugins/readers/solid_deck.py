@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench import InputError, Model
-from femubench.fem import FloatArray, MatrixGeometry, SparseArray, matrix_model
+from femubench.fem import FloatArray, Groups, MatrixGeometry, SparseArray, matrix_model
 from femubench.modal import GroupPriors
 from femubench.plugins.readers import nodes, shells, solid_elements
 from femubench.plugins.readers.attachments import NodeMotions, rigid
@@ -22,10 +22,12 @@ from femubench.plugins.readers.nodes import Point
 from femubench.plugins.readers.outline import find_outline
 from femubench.plugins.readers.reading import DIRECTIONS, needs
 
+Powers = Mapping[int, tuple[SparseArray, SparseArray]]
 JOINT_SHARE = 0.02  # of the mass: a smaller set of elements is a weld, a bolt or glue
 _BETTER = {**solid_elements.BETTER, **shells.BETTER}
 _TIED = 100.0  # times what holds the nodes of a coupling as a body: how its reference node is
 _SAME = 1e-9  # of the largest entry: what rounding leaves of a factor
+_POWERS, _THICKNESSES = (1, 3, 5), np.array([1.0, 0.75, 1.3])  # over that drawn
 _SOLVED = 10_000  # degrees of freedom up to which better elements are tried: four times as many
 
 
@@ -136,17 +138,27 @@ def _model_of(
     found, moved = hung.found, hung.moved
     names = {n: name for n, (name, _) in deck.couplings.items()}
     groups, heavy = deck.groups(), {}
+    solids = replace(deck, elements=solid.elements)
+    coated = {n for name in deck.coated for n in deck.sets[name]}
+    swells = [solid.swell(row, factor) for factor in _THICKNESSES[1:] if solid.lines]
+    plates: dict[str, Powers] = {}
     parts: dict[str, SparseArray] = {}
     masses: dict[str, SparseArray] = {}
     mass = sp.csc_array(_point_masses(deck, found) + hung.mass(deck.attached.masses))
     for name, numbers in (groups or {REST: list(material)}).items():
-        stiffness, inertia = _assemble(
-            replace(deck, elements=solid.elements), numbers, row, xyz, material
-        )
+        stiffness, inertia = _assemble(solids, numbers, row, xyz, material)
         parts[name] = hung.reduced(stiffness)
         masses[name] = hung.reduced(inertia)
         mass += masses[name]
         heavy[name] = float(inertia.sum())
+        if all(deck.elements[n][0] in shells.SHELLS and n not in coated for n in numbers):
+            pairs = [(parts[name], masses[name])]
+            for swell in swells:
+                every = sp.kron(swell, sp.eye_array(3), format="csr")
+                thick = _assemble(solids, numbers, row, swell @ xyz, material)
+                k, m = (hung.reduced(every.T @ part @ every) for part in thick)
+                pairs.append((k, m))
+            plates[name] = _find_powers(pairs)
     at = {(motion.node, motion.direction): i for i, motion in enumerate(found)}
     axes = np.array([motion.axes for motion in found])
     for n, (_, surface) in deck.couplings.items():
@@ -169,6 +181,10 @@ def _model_of(
         parts, masses = (
             {name: part[left][:, left] for name, part in own.items()} for own in (parts, masses)
         )
+        plates = {
+            name: {p: (k[left][:, left], m[left][:, left]) for p, (k, m) in own.items()}
+            for name, own in plates.items()
+        }
         found, axes = [found[i] for i in left], axes[left]
     labels = [names.get(motion.node, str(motion.node)) for motion in found]
     parts = {name: part for name, part in parts.items() if part.count_nonzero()}
@@ -180,6 +196,9 @@ def _model_of(
         np.array([motion.xyz for motion in found]),
         parts if len(parts) > 1 else {},
     )
+    prefix = Groups.PREFIX
+    powers = {f"{prefix}{n}" if len(parts) > 1 else "all": own for n, own in plates.items()}
+    model = replace(model, powers=powers)
     dofs = replace(model.dofs, axes=axes)
     if solid.lines:
         geometry = MatrixGeometry(tuple(dict.fromkeys(labels)), dofs)
@@ -195,6 +214,26 @@ def _model_of(
     grounds = GroupPriors(model).supports - heavy.keys()
     kinds = dict.fromkeys(small - grounds, "joint")
     return replace(model, mass_groups=masses if len(masses) > 1 else {}, group_kinds=kinds)
+
+
+def _find_powers(pairs: Sequence[tuple[SparseArray, SparseArray]]) -> Powers:
+    """Return stiffness and mass that come with powers of the thickness of plates.
+
+    Membrane and shear come with the thickness, bending with its cube, as the strains of a plate are
+    even or odd across it. The fifth power is of nodes in the middle, and of what is curved.
+
+    Arguments:
+        pairs: stiffness and mass at `_THICKNESSES`.
+    """
+    shares = np.linalg.inv(np.power.outer(_THICKNESSES, _POWERS))
+    found: dict[int, tuple[SparseArray, SparseArray]] = {}
+    for power, share in zip(_POWERS, shares, strict=True):
+        stiffness, mass = (
+            sp.csc_array(sum(s * part for s, part in zip(share, parts, strict=True)))
+            for parts in zip(*pairs, strict=True)
+        )
+        found[power] = stiffness, mass
+    return found
 
 
 def _tie(

@@ -165,7 +165,9 @@ class BulkPlates(BulkData):
                     raise card.error(card.text(i), f"{usual:.5g}, that of a whole plate", key)
             if card.real(11, "MID4", 0.0):
                 raise card.error(card.text(11), "blank: bending apart from membrane", "MID4")
-            density += at_least_0(card, 8, "NSM") / thickness
+            if coat := at_least_0(card, 8, "NSM"):
+                density += coat / thickness
+                self.solid.coated.add(name)
         if not density > 0.0:
             raise material.error("no mass", f"RHO > 0{', or NSM of the plate' * of_plates}", "RHO")
         self.solid.sets[name], self.solid.named[name] = {}, name

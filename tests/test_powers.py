@@ -1,0 +1,266 @@
+"""Thickness of plates and softness of interfaces: matrices that come with powers of a value."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from diagnosis_problems import case_of
+from test_bulk_plates import bulk, converted
+from test_chain import (
+    FLATS,
+    SHEETS,
+    Boxes,
+    diagnose_files,
+    write_deck,
+    write_responses,
+    write_shells,
+)
+from test_shells import ARC, FLAT, angle, shell_deck
+from test_solid_decks import read
+
+import femubench
+from femubench import Case, Model, Sensors, fem
+from femubench.core.case.reducing import expand_model, reduce_case
+from femubench.core.case.similarity import Similarity, similar_matrices
+from femubench.core.fem.alteration import Alteration, alter_model
+from femubench.core.modal.frequency_changes import elastic_modes
+from femubench.effect import FrameEffect
+from femubench.fem import FloatArray, MatrixGeometry, Place, Support
+from femubench.modal import GroupPriors
+from femubench.plugins.effects.powers import InterfaceSoftness, PlateThickness
+from tests.simulated import modes_at
+
+THICK, SOFT = PlateThickness(), InterfaceSoftness()
+SEAM = "interface:far|near"
+
+
+def hertz(model: Model, count: int = 8) -> FloatArray:
+    return np.asarray(elastic_modes(model, count).natural_frequencies)
+
+
+@pytest.mark.parametrize("kind", ["S3", "S4", "S6", "S8", "S8R"])
+@pytest.mark.parametrize(
+    ("path", "held"),
+    [(FLAT, (1, 2, 3)), (angle(0.9), ()), (ARC, (1, 2, 3, 4, 5, 6))],
+    ids=["hinged", "knot", "arc"],
+)
+@pytest.mark.parametrize("change", [-0.2, 0.2])
+def test_a_thickness_is_that_of_a_deck_with_it(
+    kind: str, path: FloatArray, held: Sequence[int], change: float, tmp_path: Path
+) -> None:
+    nominal = read(tmp_path, shell_deck(kind, path, held, (0.003, 0.004)))
+    assert set(THICK.places(nominal)) == {"group:near", "group:far"}
+    found = THICK.extend(nominal, "group:far", [change])
+    truth = read(tmp_path, shell_deck(kind, path, held, (0.003, 0.004 * (1.0 + change))))
+    np.testing.assert_allclose(hertz(found), hertz(truth), rtol=1e-6)
+    assert found.total_mass == pytest.approx(truth.total_mass, rel=1e-9)
+
+
+def whole_sheet(thickness: float) -> str:
+    """Return a deck of one group, with a point mass."""
+    deck = shell_deck("S4", FLAT, (), (thickness, thickness), mass=0.3)
+    return deck.replace("ELSET=far", "ELSET=near")
+
+
+def test_the_only_part_is_all_of_the_plates_and_a_point_mass_stays(tmp_path: Path) -> None:
+    nominal = read(tmp_path, whole_sheet(0.004))
+    assert THICK.places(nominal) == ("all",)
+    found, truth = THICK.extend(nominal, "all", [0.2]), read(tmp_path, whole_sheet(0.0048))
+    np.testing.assert_allclose(hertz(found), hertz(truth), rtol=1e-6)
+    assert found.total_mass == pytest.approx(truth.total_mass, rel=1e-9)
+
+
+def test_a_coat_does_not_grow_with_the_plate(tmp_path: Path) -> None:
+    text = converted(tmp_path, shell_deck("S4", FLAT, thickness=(0.004, 0.006)))
+    assert set(THICK.places(bulk(tmp_path, text))) == {"group:PSHELL 1", "group:PSHELL 2"}
+    coated = text.replace("PSHELL,2,1,0.006,1,,1", "PSHELL,2,1,0.006,1,,1,,5.0")
+    assert THICK.places(bulk(tmp_path, coated)) == ("group:PSHELL 1",)
+
+
+@pytest.fixture
+def bent(tmp_path: Path) -> Model:
+    """Return two flats of shells that meet at an angle, free."""
+    return read(tmp_path, shell_deck("S4", angle(0.9, 8), thickness=(0.004, 0.003), across=6))
+
+
+@pytest.mark.parametrize(
+    ("effect", "place", "value"), [(THICK, "group:far", -0.2), (SOFT, SEAM, -0.99)]
+)
+def test_terms_are_what_the_model_changes_by(
+    bent: Model, effect: FrameEffect, place: str, value: float
+) -> None:
+    assert place in effect.places(bent)
+    other, change = effect.extend(bent, place, [value]), effect.change(bent, place)
+    factors, unit = change.coefficients(np.array([[value]]))[0], np.eye(bent.size)
+    for kind in ("stiffness", "mass"):
+        terms = zip(factors, change.terms, strict=True)
+        total = sum(f * term.operator.apply(unit) for f, term in terms if term.matrix == kind)
+        gap = (getattr(other, kind) - getattr(bent, kind)).toarray() - total
+        assert abs(gap).max() < 1e-12 * abs(getattr(bent, kind)).max()
+    if effect is THICK:  # what is updated before or after that is the group as it is then
+        rows = fem.Property("k", "E", (place,)), fem.Property("m", "density", (place,))
+        after = fem.Groups(other).with_factors(rows, [1.1, 1.2])
+        before = effect.extend(fem.Groups(bent).with_factors(rows, [1.1, 1.2]), place, [value])
+        assert abs(after.mass - before.mass).max() < 1e-12 * abs(after.mass).max()
+        assert abs(after.stiffness - before.stiffness).max() < 1e-12 * abs(after.stiffness).max()
+
+
+def split(model: Model, left: float) -> Model:
+    """Return the two flats apart, with springs at the seam of which so much is left in series."""
+    softer, rows = GroupPriors(model).interfaces.sides[SEAM]
+    n, p = model.size, len(rows)
+    own = np.arange(n)
+    own[rows] = n + np.arange(p)
+    move = sp.csr_array((np.ones(n), (own, np.arange(n))), shape=(n + p, n))
+    stay = sp.eye_array(n + p, n, format="csr")
+    apart = sp.csr_array(move - stay)[:, rows]
+    inside = sp.csr_array(model.groups[softer])[rows][:, rows]
+    part, heavy = model.groups[softer], model.mass_groups[softer]
+    springs = left / (1.0 - left) * (apart @ inside @ apart.T)
+    stiffness = stay @ (model.stiffness - part) @ stay.T + move @ part @ move.T + springs
+    mass = stay @ (model.mass - heavy) @ stay.T + move @ heavy @ move.T
+    nodes = [*map(str, model.dofs.node), *(f"{model.dofs.node[r]}'" for r in rows)]
+    axes = np.vstack([model.dofs.motions, model.dofs.motions[rows]])
+    xyz = np.vstack([model.dofs.xyz, model.dofs.xyz[rows]])
+    along = [*model.dofs.direction, *(model.dofs.direction[r] for r in rows)]
+    found = fem.matrix_model(sp.csc_array(mass), sp.csc_array(stiffness), nodes, along, xyz)
+    return replace(found, dofs=replace(found.dofs, axes=axes))
+
+
+@pytest.mark.parametrize("left", [0.5, 0.03, 1e-3])
+def test_an_interface_moves_as_two_parts_on_springs(bent: Model, left: float) -> None:
+    assert GroupPriors(bent).interfaces.places == (SEAM,)
+    found, exact = hertz(SOFT.extend(bent, SEAM, [left - 1.0])), hertz(split(bent, left))
+    np.testing.assert_allclose(found[:6], exact[:6], rtol=1e-3)
+    assert (hertz(bent) > found).any()
+
+
+def test_joints_that_are_drawn_and_bases_have_no_interfaces(bent: Model) -> None:
+    drawn = replace(bent, group_kinds={"near": "joint"})
+    assert SOFT.places(drawn) == ()
+    dense = {n: sp.csc_array(np.ones((bent.size,) * 2)) for n in bent.groups}
+    assert SOFT.places(replace(bent, groups=dense)) == ()
+    (parameter,) = SOFT.parameters(bent, SEAM)
+    assert parameter.range[1] == 0.0
+    assert parameter.value(parameter.range[0]) < -0.999
+
+
+def test_powers_follow_their_rows(bent: Model) -> None:
+    """In other units, in another order and with some held the effect does the same."""
+    changed = hertz(THICK.extend(bent, "group:far", [0.3]))
+    by = Similarity(2.0, 3.0, 0.5)
+    assert isinstance(bent.geometry, MatrixGeometry)
+    similar = similar_matrices(bent, bent.geometry, by)
+    np.testing.assert_allclose(
+        hertz(THICK.extend(similar, "group:far", [0.3])), by.frequency * changed, rtol=1e-7
+    )
+    feet = tuple(Support(Place(joint=node), ("x", "y", "z")) for node in ("1", "14", "27"))
+    held, thick = (
+        alter_model(model, Alteration(supports=feet))
+        for model in (bent, THICK.extend(bent, "group:far", [0.3]))
+    )
+    assert held.size < bent.size
+    np.testing.assert_allclose(
+        hertz(THICK.extend(held, "group:far", [0.3])), hertz(thick), rtol=1e-9
+    )
+
+
+@pytest.fixture(scope="module")
+def folded(tmp_path_factory: pytest.TempPathFactory) -> Model:
+    """Return the shells of the chain: base, upright and rib of one sheet."""
+    file = write_shells(tmp_path_factory.mktemp("folded") / "model.inp")
+    return femubench.read_model(file, unit="mm")
+
+
+def made(model: Model) -> Case:
+    """Return a case with a test of ten nodes of the base and the upright."""
+    assert isinstance(model.geometry, MatrixGeometry)
+    names = [str(n) for n in range(1, 600, 60)]
+    xyz = np.array([model.geometry.places[name] for name in names])
+    sensors = Sensors(tuple(names), xyz, ("z",) * len(names))
+    return case_of(model, modes_at(model, sensors, 8), 6)
+
+
+@pytest.mark.parametrize(
+    ("effect", "place", "values"),
+    [
+        (THICK, "group:UPRIGHT", (-0.2, 0.2)),
+        (SOFT, "interface:UPRIGHT|BASE", (-0.999, -0.97, -0.5)),
+        (SOFT, "interface:RIB|BASE", (-0.999, -0.5)),
+    ],
+)
+def test_a_basis_holds_what_powers_do(
+    folded: Model, effect: FrameEffect, place: str, values: Sequence[float]
+) -> None:
+    small = reduce_case(made(folded))
+    assert small.whole is folded
+    assert place in effect.places(small.model)
+    for value in values:
+        own = effect.extend(small.model, place, [value])
+        whole = effect.extend(folded, place, [value])
+        np.testing.assert_allclose(hertz(own, 12), hertz(whole, 12), rtol=1e-3)
+    back = expand_model(small, own)
+    for kind in ("stiffness", "mass"):
+        gap = abs(getattr(back, kind) - getattr(whole, kind)).max()
+        assert gap < 1e-6 * abs(getattr(whole, kind)).max()
+
+
+def test_a_thinner_sheet_is_told_from_another_material(tmp_path: Path) -> None:
+    """A hat on a strip bends as a beam by its membranes, and its flats as plates."""
+    profile = 0.06 * np.array(
+        [(0, 0), (0.25, 0), (0.5, 0), (0.75, 0), (1, 0), (1, 0.25), (1, 0.5), (1.25, 0.5),
+         (1.5, 0.5)]
+    )  # fmt: skip
+    nominal, truth = (
+        read(tmp_path, shell_deck("S4", profile, (), (0.001, t), across=8)) for t in (1e-3, 8e-4)
+    )
+    nominal = replace(nominal, finer=None)  # the truth has the same mesh
+    assert isinstance(nominal.geometry, MatrixGeometry)
+    names = [str(n) for n in range(1, 82, 4)]
+    xyz = np.repeat([nominal.geometry.places[name] for name in names], 2, axis=0)
+    sensors = Sensors(tuple(n + d for n in names for d in "xz"), xyz, ("x", "z") * len(names))
+    test, rng = modes_at(truth, sensors, 12), np.random.default_rng(1)
+    hz = test.frequencies * (1.0 + 1e-3 * rng.standard_normal(12))
+    shapes = test.shapes + 0.015 * rng.standard_normal(test.shapes.shape)
+    found = femubench.diagnose(case_of(nominal, replace(test, frequencies=hz, shapes=shapes), 9))
+    assert found.verdict == "named"
+    assert [(c.effect, c.place) for c in found.causes] == [("plate-thickness", "group:far")]
+    (size,) = found.causes[0].parameters
+    assert size.value == pytest.approx(-0.2, abs=0.01)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("boxes", "soft", "verdict", "cause"),
+    [
+        (SHEETS | {"UPRIGHT": ((-1.5, 0, 1.5), (0.75, 200, 150)),
+                   "RIB": ((0.75, 98.5, 1.5), (100, 101.5, 50))}, 1.0,
+         "ambiguous", ("plate-thickness", "group:UPRIGHT")),
+        ({"BASE": SHEETS["BASE"], "WELD": ((-1.5, 0, 1.5), (1.5, 200, 4.5)),
+          "UPRIGHT": ((-1.5, 0, 4.5), (1.5, 200, 150)), "PLATE": SHEETS["RIB"]}, 0.02,
+         "named", ("interface-softness", "interface:UPRIGHT|BASE")),
+    ],
+    ids=["thinner", "soft-seam"],
+)  # fmt: skip
+def test_what_is_wrong_with_sheets_leads_from_files_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, boxes: Boxes, soft: float, verdict: str,
+    cause: tuple[str, str],
+) -> None:  # fmt: skip
+    """The truth is of bricks in another mesh, its seam a row of soft ones.
+
+    A flat plate alone bends as one of another material: both names stay, the thickness first.
+    """
+    monkeypatch.chdir(tmp_path)
+    write_shells(Path("model.inp"))
+    truth = write_deck(Path("truth.inp"), "C3D20R", 12.0, soft, boxes)
+    write_responses(Path("test.uff"), truth, FLATS)
+    said, places = diagnose_files("model.inp", "test.uff")
+    assert (said, {*places}) == (verdict, {cause[1]})
+    found = json.loads(Path("found.json").read_text())
+    assert found["causes"][0]["effect"] == cause[0]
