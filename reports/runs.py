@@ -226,8 +226,27 @@ def _board(run: RunData, title: str = "") -> Iterator[Passage]:
     yield Passage("", [lead(run), Items(legend)])
     if said := finding(run, rows):
         yield Passage("", [" ".join(said)])
+    if drawn := list(_drawings(standings)):
+        yield Passage("Drawings" if title else "", drawn)
     if twins := list(_twins(run)):
         yield Passage("Twins" if title else "", twins)
+
+
+def _drawings(standings: Standings) -> Iterator[Table]:
+    """Yield gain and error from a further drawing next to those from the first one."""
+    keys = ("gain", 3), ("error_percent", 2)
+    for drawing, figures in standings.drawings.items():
+        heads = [
+            Column(f"{_FIGURES[key].title}\n{which}", 8, digits=digits)
+            for key, digits in keys
+            for which in ("first", plain(drawing))
+        ]
+        rows = [
+            [row["strategy"], *(own[key] for key, _ in keys for own in figures[row["strategy"]])]
+            for row in standings.rows
+        ]
+        said = "On the cases that have both; first: from the drawing of case.toml."
+        yield Table([Column("strategy", 16, left=True), *heads], rows, said)
 
 
 def _twins(run: RunData) -> Iterator[Block]:

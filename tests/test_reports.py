@@ -23,6 +23,7 @@ from femubench.reports import femubench_reporters
 from femubench.reports.csvs import CsvReporter
 from femubench.reports.jsons import JsonReporter
 from femubench.reports.markdown import escape
+from femubench.reports.page.data import page_data
 from femubench.reports.runs import MarkdownReporter, TerminalReporter
 from femubench.reports.summary import finding, shortfalls
 from femubench.results import JobResult, PairedMode, Rule, RunData
@@ -175,6 +176,24 @@ class TestMarkdown:
         shown = r"a\|b &lt;script&gt;\*x\*&lt;/script&gt; \[l\](u) \`c\` \| new"
         assert escape(evil) == shown
         assert with_header(text, "case", "strategy", "seeds")[0][:2] == [shown, shown]
+
+
+def test_gains_from_two_drawings_stand_next_to_each_other() -> None:
+    """Over the cases that have both, each as on a board of its own."""
+    on = (("beam", 0.1), ("beam:solid", 0.5), ("arch", 1.2))
+    jobs = [result("good", factor, case=case) for case, factor in on]
+    run = run_of(*jobs, structures={"beam:solid": "beam"})
+    first, solid = (list_rows(run_of(job))[0] for job in jobs[:2])
+    pairs = {key: [first[key], solid[key]] for key in ("gain", "error_percent")}
+    assert pairs["gain"][0] > pairs["gain"][1] + 0.1
+    (row,) = with_header(MarkdownReporter().render(run), "strategy", "gain first", "gain solid")
+    digits = {"gain": 3, "error_percent": 2}
+    assert row == ["good", *(f"{v:.{digits[key]}f}" for key, both in pairs.items() for v in both)]
+    (strategy,) = page_data(run)["strategies"]
+    assert {k: pytest.approx(v) for k, v in strategy["drawings"]["solid"].items()} == pairs
+    alone = run_of(*jobs[:1], *jobs[2:])
+    assert "gain first" not in MarkdownReporter().render(alone)
+    assert page_data(alone)["strategies"][0]["drawings"] == {}
 
 
 class TestCsv:

@@ -22,7 +22,7 @@ from scipy.optimize import minimize
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.discrepancy import Discrepancy
-from femubench.core.fit.modal_basis import Space, rigid_first, scatter_terms
+from femubench.core.fit.modal_basis import Space, place_parts, rigid_first, scatter_terms
 from femubench.core.fit.modal_fit import Problem, State, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.zero_rows import ZeroRows
@@ -331,6 +331,8 @@ class Inadequacy:
         earlier: sensitivities of the reference to each, (r, p_k).
         change: by how much an explanation moves each datum, in deviations, (n,); a share of that
             is its own error. Empty where there is none.
+        partners: by number of the mode, which one of the model that of the reference is.
+        alike: which share of a class both states have in common, (n_classes,); empty for all.
     """
 
     names: tuple[str, ...]
@@ -343,6 +345,8 @@ class Inadequacy:
     log_prior: float
     earlier: tuple[FloatArray, ...]
     change: FloatArray = field(default_factory=lambda: np.zeros(0))
+    partners: Mapping[int, int] = field(default_factory=dict)
+    alike: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def of(
@@ -387,10 +391,28 @@ class Inadequacy:
                 present[k], cross[k] = rows @ rows.T, earlier @ rows.T
         return replace(self, present=present, cross=cross)
 
+    def share_shapes(self, state: State) -> Inadequacy:
+        """Return the model error where what is wrong with a shape stays with the mode as drawn.
+
+        Where a mode of the data is another one than that of its number in the reference, both are
+        wrong by themselves.
+
+        Arguments:
+            state: the explanation.
+        """
+        pairs = zip(state.problem.data.measurement.numbers, state.partner, strict=True)
+        same = {
+            f"shapes {number}": min(abs(state.vectors[self.partners[number], mode]), 1.0)
+            for number, mode in pairs
+            if number in self.partners
+        }
+        return replace(self, alike=np.array([same.get(name, 1.0) for name in self.names]))
+
     def add_own_error(self, nothing: State, state: State) -> Inadequacy:
         """Return the model error where part of what an explanation changes is its own error.
 
         An effect at a place is an idealisation, and the beams that carry it to the sensors are.
+        Stiffness and mass that cancel in a frequency are in error each by itself.
 
         Arguments:
             nothing: the model as drawn.
@@ -399,7 +421,9 @@ class Inadequacy:
         data = state.problem.data
         moved = np.abs(nothing.raw - state.raw)
         mode, _ = data.shape_rows
-        rows = len(data.measurement) + np.arange(len(mode))
+        count = len(data.measurement)
+        moved[:count] = np.hypot(moved[:count], _cancelled(state))
+        rows = count + np.arange(len(mode))
         for j in np.unique(mode):
             own = rows[mode == j]
             moved[own] = np.sqrt(np.mean(np.square(moved[own])))
@@ -434,7 +458,8 @@ class Inadequacy:
         joint = np.zeros((len(self.names), r + n, r + n))
         joint[:, :r, :r], joint[:, r:, r:] = self.reference, self.present
         apart = joint.copy()
-        joint[:, :r, r:], joint[:, r:, :r] = self.cross, np.swapaxes(self.cross, 1, 2)
+        cross = self.cross * self.alike[:, None, None] if len(self.alike) else self.cross
+        joint[:, :r, r:], joint[:, r:, :r] = cross, np.swapaxes(cross, 1, 2)
         flat = joint.shape[1] ** 2
         return joint.reshape(-1, flat), apart.reshape(-1, flat)
 
@@ -593,6 +618,26 @@ class Inadequacy:
         noise = condition_noise(total, self.residual, weight, beam=False)
         # Source: Grünwald (2012), the safe Bayesian; Miller & Dunson (2019), coarsened posteriors.
         return replace(noise, scales=found.v, trust=settings.trust_in_model_error)
+
+
+def _cancelled(state: State) -> FloatArray:
+    """Return what stiffness and mass of a cause cancel of each other in frequencies, (m,).
+
+    In deviations: with changes a and b of opposite sign hypot(a + b, this) is hypot(a, b).
+    """
+    m, near = state.problem.data.measurement, state.vectors[:, state.partner]
+    values = state.eigenvalues[state.partner]
+    total = np.zeros(len(values))
+    for part, index, columns in place_parts(len(state.problem.space), state.parts):
+        factors = part.hypothesis.factors(state.x[None, columns])[0]
+        changes = (part.matrix(factors, mass=kind) for kind in (False, True))
+        stiff, heavy = (
+            0.0 if own is None else np.einsum("im,im->m", near[index], own @ near[index])
+            for own in changes
+        )
+        total += np.maximum(stiff * heavy * values, 0.0)
+    moving = np.where(values > 0.0, values, np.inf)
+    return np.asarray(np.sqrt(0.5 * total) / moving * m.frequencies / m.frequency_std)
 
 
 def _scale(v: FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
+from femubench.core.case.drawn import DRAWN
 from femubench.core.garbage import pause_collection
 from femubench.core.schema.results import BLOCKS, JobResult, Nominal, RunData, origins_of
 from femubench.core.score.bounded_gain import ModelErrors
@@ -161,6 +162,11 @@ class GainTable:
         """Return the gain of a strategy on every structure, mean over the seeds, (structures,)."""
         return mean_known(np.moveaxis(self.by_structure(self.values[name])[:, :, 0], 1, 0))
 
+    def means(self, values: FloatArray, cases: Iterable[str] | None = None) -> dict[str, float]:
+        """Return the mean of `FIGURES` over structures and seeds; arguments as `by_structure`."""
+        by_seed = np.moveaxis(self.by_structure(values, cases), 1, 0)
+        return dict(zip(FIGURES, mean_known(mean_known(by_seed)).tolist(), strict=True))
+
     @property
     def interval(self) -> str:
         """Return what intervals are over: ``structures``, ``seeds`` or nothing."""
@@ -233,6 +239,29 @@ class Standings:
             [(-0.67, 2), (0.6, 1)]
         """
         return rank_results(self.run.ranked, self.run.meta)
+
+    @property
+    def drawings(self) -> dict[str, dict[str, tuple[dict[str, float], dict[str, float]]]]:
+        """Return by further drawing and strategy the figures from the first drawing and from it.
+
+        Over the cases of the run that have both; each against the textbook model of its own.
+
+        Examples:
+            >>> results.Standings.of(run).drawings
+            {}
+        """
+        own, pairs = self.own, defaultdict[str, dict[str, str]](dict)
+        for case in own.cases:
+            first, _, drawing = case.rpartition(DRAWN)
+            if first in own.cases:
+                pairs[drawing][first] = case
+        return {
+            drawing: {
+                name: (own.means(values, both), own.means(values, both.values()))
+                for name, values in own.values.items()
+            }
+            for drawing, both in pairs.items()
+        }
 
     def is_test(self, case: str) -> bool:
         """Tell whether a case was measured: what has no class is somebody's own structure."""
@@ -383,8 +412,6 @@ def _row(
     gains = by_structure[:, :, 0]
     over = {"structures": gains.mean(axis=1), "seeds": gains.mean(axis=0), "": gains[:1, 0]}
     low, high = interval_of_mean(over[table.interval]) if table.interval else (math.nan, math.nan)
-    means = mean_known(mean_known(np.moveaxis(by_structure, 1, 0)))
-    figures = dict(zip(FIGURES, means.tolist(), strict=True))
     error = by_structure[:, :, FIGURES.index("error_percent")].mean(axis=1)
     known = [100.0 * table.scale.textbook[case].error for case in table.cases]
     textbook = table.by_structure(np.array(known)[:, None, None])[:, 0, 0]
@@ -406,7 +433,7 @@ def _row(
     return {
         "strategy": strategy,
         "yardstick": (run.meta.get("yardsticks") or {}).get(strategy, ""),
-        **figures,
+        **table.means(values),
         "gain_low": low,
         "gain_high": high,
         "textbook_percent": float(mean_known(textbook)),

@@ -34,6 +34,7 @@ BLOCKS = ("used", "higher", "modified")
 MOST_DETAILS = 5_700_000
 MOST_DOWNLOADS = 1_000_000
 _LONGEST_REASON = 500
+_COMPARED = ("gain", "error_percent")  # from one drawing and from another
 _FILES: tuple[tuple[str, str, CsvReporter | JsonReporter], ...] = (
     ("Jobs (CSV)", "text/csv", CsvReporter()),
     ("Results (JSON)", "application/json", JsonReporter()),
@@ -68,7 +69,7 @@ def page_data(run: RunData, exhibits: ExhibitSource | None = None) -> dict[str, 
         else "the modes that were given",
         "yardstick": run.meta.get("yardstick"),
         "as_drawn": list_drawn_frequencies(run),
-        "strategies": _strategies(run),
+        "strategies": _strategies(standings),
     }
     downloads, too_large, room = [], [], MOST_DOWNLOADS
     for title, kind, reporter in _FILES:
@@ -128,8 +129,9 @@ def _cleaned(figures: _Named) -> dict[str, Any]:
     return {name: clean(value) for name, value in figures.items()}
 
 
-def _strategies(run: RunData) -> list[dict[str, Any]]:
-    """Return the strategies with what they cite, their version, and what twins and repeats say."""
+def _strategies(standings: Standings) -> list[dict[str, Any]]:
+    """Return the strategies: what they cite, their version, what twins, drawings, repeats say."""
+    run, drawings = standings.run, standings.drawings
     citations, twins = run.meta.get("citations") or {}, twins_by_strategy(run)
     differing, bare = unsteady(run), unconfined(run)
     said = [(found.strategy, found.provenance.get("strategy")) for found in reversed(run.results)]
@@ -141,6 +143,10 @@ def _strategies(run: RunData) -> list[dict[str, Any]]:
             "version": versions.get(name, ""),
             "yardstick": (run.meta.get("yardsticks") or {}).get(name, ""),
             "twins": twins.get(name),
+            "drawings": {
+                drawing: {key: [clean(own[key]) for own in found[name]] for key in _COMPARED}
+                for drawing, found in drawings.items()
+            },
             "unsteady": name in differing,
             "unconfined": name in bare,
         }

@@ -27,6 +27,9 @@
     gain("gain_tests", "On tests", "gain on tests alone, without computed truths"),
     data.strategies.some(({ twins }) => twins) && { key: "twins", title: "On twins", right: true, down: true, cell: (row) => cell(twinsOf(row)?.gain, (v) => (twinsOf(row) ? `${share(v)} (${share(twinsOf(row).original_gain)})` : number(v))),
       hint: "gain on similar structures under other names, drawn when the run began; next to it, in brackets, on the cases that have such twins; the lower one counts" },
+    ...Object.keys(data.strategies[0]?.drawings ?? {}).flatMap((drawing) => [["gain", `Gain, ${drawing}`, share], ["error_percent", `Off, ${drawing}, %`, small]].map(([what, title, say]) => ({
+      key: `${what} ${drawing}`, title, right: true, down: what === "gain", hint: `from the drawing ${drawing}; in brackets, from that of case.toml, on the cases that have both`,
+      cell: (row) => { const [first, own] = data.strategies[row.index].drawings[drawing][what]; return cell(own, (v) => `${say(v)} (${say(first)})`); } }))),
     known("band_percent") && figure("band_percent", "In band, %", "error of modified modes in the given band, where the given frequencies nearly are the answer", small),
     known("shape_error") && figure("shape_error", "1 - MAC", "of the unseen modes, mean", share),
     figure("false_modes", "False modes", "modes that a test would see and did not, mean over the structures", small),
