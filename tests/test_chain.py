@@ -196,14 +196,18 @@ def diagnose_files(model: str, test: str) -> tuple[str, list[str]]:
 
 @pytest.mark.nightly
 @pytest.mark.parametrize(
-    ("rib", "verdict", "places"), [(1.0, "none", []), (0.5, "named", ["group:RIB"])]
+    ("rib", "verdict", "places"), [(1.0, "none", []), (0.5, "ambiguous", ["group:RIB"])]
 )
 def test_a_soft_rib_is_found_by_a_model_of_shells(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rib: float, verdict: str, places: list[str]
 ) -> None:
-    """The truth is of bricks, with the corners that the middle planes of shells do not have."""
+    """The truth is of bricks, with the corners that the middle planes of shells do not have.
+
+    So small a part weighs too little for these data to tell another metal from lost stiffness.
+    """
     monkeypatch.chdir(tmp_path)
     write_shells(Path("model.inp"))
     truth = write_deck(Path("truth.inp"), "C3D20R", 12.0, rib, SHEETS)
     write_responses(Path("test.uff"), truth, FLATS)
-    assert diagnose_files("model.inp", "test.uff") == (verdict, places)
+    found, where = diagnose_files("model.inp", "test.uff")
+    assert (found, sorted({*where})) == (verdict, places)

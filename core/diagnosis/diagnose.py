@@ -31,6 +31,7 @@ from femubench.core.diagnosis.tables import (
     error_scales,
     evidence_rows,
     find_tied_places,
+    has_causes,
     list_causes,
     notes_left_out,
     odds_rows,
@@ -281,6 +282,8 @@ def _written(
     examination = inquiry.examination
     repaired, loose = fault_causes(inquiry.repaired), fault_causes(inquiry.loose)
     best, posterior = proof.leader, examination.posterior
+    if decision.shared and not has_causes(examination, best, decision.shared):
+        decision = replace(decision, verdict="ambiguous", shared=())
     group = [best, *(posterior.best(key) for key in decision.group[1:])] if decision.group else []
     shown = group if decision.verdict == "ambiguous" else group[:1]
     regions = Regions(examination, shown)

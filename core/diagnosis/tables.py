@@ -15,7 +15,7 @@ from femubench.core.display import count_noun
 from femubench.core.errors import ModelError
 from femubench.core.fit.modal_fit import State, state_at
 from femubench.core.inference.examine import Examination
-from femubench.core.inference.posterior import Explanation, Posterior, fits_better
+from femubench.core.inference.posterior import Explanation, Key, Posterior, fits_better
 from femubench.core.inference.search import Found
 from femubench.core.inference.settings import settings
 from femubench.core.roles import EffectParameter
@@ -183,6 +183,15 @@ def list_causes(
             )
         )
     return found
+
+
+def has_causes(examination: Examination, explanation: Explanation, names: Key) -> bool:
+    """Tell whether an explanation has one of these causes as more than a passenger."""
+    state = explanation.fit.state
+    passengers = find_passengers(state, find_spread(examination.posterior, explanation))
+    parts = zip(state.parts, passengers, strict=True)
+    own = {part.hypothesis.name for part, idle in parts if not idle}
+    return not own.isdisjoint(names) or not {*explanation.base.names}.isdisjoint(names)
 
 
 def find_passengers(state: State, spread: FloatArray) -> list[bool]:
