@@ -99,7 +99,7 @@ def search(monkeypatch: pytest.MonkeyPatch) -> Search:
     """Put a stand-in where the search and the writer of cases are imported from."""
     stand_in = Search()
     monkeypatch.setattr(library, "search", stand_in.diagnose)
-    monkeypatch.setattr(library, "write_case", stand_in.write_case)
+    monkeypatch.setattr("femubench.core.case.writing.write_case", stand_in.write_case)
     return stand_in
 
 

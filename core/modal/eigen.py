@@ -113,15 +113,16 @@ def dense_matrices(model: Model) -> tuple[FloatArray, FloatArray]:
 def natural_shift(mass: FloatArray, stiffness: FloatArray) -> float:
     """Return a positive eigenvalue scale from the diagonals in rad^2/s^2.
 
-    No more than a hundredth of the least k/m, which bounds the lowest eigenvalue (Rayleigh): where
-    most dofs hardly have mass, the median takes the digits of what is left once it is subtracted.
+    The least k/m, which bounds the lowest eigenvalue (Rayleigh), where it lies between 1e-11 and
+    1e-6 of the median. That alone would swamp low eigenvalues where most dofs hardly have mass;
+    less would lose the highest ones.
     """
     m, k = np.diagonal(mass), np.diagonal(stiffness)
     carrying = (m > 0.0) & (k > 0.0)
     if not carrying.any():
         raise ModelError("no degree of freedom has both mass and stiffness")
     scale = k[carrying] / m[carrying]
-    return float(min(1e-6 * np.median(scale), 1e-2 * np.min(scale)))
+    return float(np.clip(scale.min(), *(np.array([1e-11, 1e-6]) * np.median(scale))))
 
 
 def solve_dense(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -424,6 +424,8 @@ def _quiet() -> Iterator[None]:
     before = [logger.level for logger in loggers]
     for logger in loggers:
         logger.setLevel(logging.CRITICAL)
+    # What an interrupt keeps from being awaited is collected later than here.
+    warnings.filterwarnings("ignore", "coroutine .* was never awaited", RuntimeWarning)
     try:
         with dask.config.set(_UNWATCHED), warnings.catch_warnings():
             # Versions are compared here, where a difference is an error.
