@@ -14,7 +14,7 @@ import femubench
 from femubench import Case, InputError, Measurement, Model, Sensors, read_case, solve_modes
 from femubench.core.case.writing import write_case
 from femubench.core.fem.model_parameters import matrix_slopes, with_values
-from femubench.core.fit.modal_fit import State, fit, state_at
+from femubench.core.fit.modal_fit import fit, state_at
 from femubench.core.inference.coordinates import modes_for
 from femubench.core.inference.examine import model_error_of, with_scales
 from femubench.core.inference.model_error import error_slopes, general_slopes
@@ -309,24 +309,6 @@ def test_what_is_drawn_wrong_acts_on_the_modes_with_the_cause_in_them() -> None:
     size = np.sqrt(own.diagonal())
     share = (noise.factor @ noise.factor.T - own) / np.outer(size, size)
     np.testing.assert_allclose(share, 0.0, atol=1e-6)
-
-
-def test_stiffness_and_mass_that_cancel_are_in_error_each_by_itself() -> None:
-    """Of another metal both energies of a part are wrong, where its frequencies stay."""
-    model = replace(MODEL, mass_groups={"left": MODEL.mass_groups["half"]})
-    problem = problem_of(model, measured(MODEL, 3), (GroupMaterial(),))
-    part = part_at(problem, "group-material", "group:left")
-
-    def at(mass: float, stiffness: float) -> State:
-        values = mass, (1.0 + stiffness) / (1.0 + mass) - 1.0
-        own = zip(part.hypothesis.parameters, values, strict=True)
-        return state_at(problem, (part,), np.array([q.coordinate(v) for q, v in own]))
-
-    nothing, step = state_at(problem, (), np.zeros(0)), 1e-4
-    heavy, stiff = (nothing.raw - at(*own).raw for own in ((step, 0.0), (0.0, step)))
-    error = model_error_of(problem, None, 1.0, 0.0).add_own_error(nothing, at(step, step))
-    assert abs(heavy + stiff)[1] < 0.9 * np.hypot(heavy, stiff)[1]
-    np.testing.assert_allclose(error.change[:3], np.hypot(heavy, stiff)[:3], rtol=1e-2)
 
 
 def test_groups_read_back_as_they_were_written(tmp_path: Path) -> None:

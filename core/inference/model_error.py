@@ -22,7 +22,7 @@ from scipy.optimize import minimize
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.discrepancy import Discrepancy
-from femubench.core.fit.modal_basis import Space, place_parts, rigid_first, scatter_terms
+from femubench.core.fit.modal_basis import Space, rigid_first, scatter_terms
 from femubench.core.fit.modal_fit import Problem, State, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.zero_rows import ZeroRows
@@ -412,7 +412,6 @@ class Inadequacy:
         """Return the model error where part of what an explanation changes is its own error.
 
         An effect at a place is an idealisation, and the beams that carry it to the sensors are.
-        Stiffness and mass that cancel in a frequency are in error each by itself.
 
         Arguments:
             nothing: the model as drawn.
@@ -421,9 +420,7 @@ class Inadequacy:
         data = state.problem.data
         moved = np.abs(nothing.raw - state.raw)
         mode, _ = data.shape_rows
-        count = len(data.measurement)
-        moved[:count] = np.hypot(moved[:count], _cancelled(state))
-        rows = count + np.arange(len(mode))
+        rows = len(data.measurement) + np.arange(len(mode))
         for j in np.unique(mode):
             own = rows[mode == j]
             moved[own] = np.sqrt(np.mean(np.square(moved[own])))
@@ -618,26 +615,6 @@ class Inadequacy:
         noise = condition_noise(total, self.residual, weight, beam=False)
         # Source: Grünwald (2012), the safe Bayesian; Miller & Dunson (2019), coarsened posteriors.
         return replace(noise, scales=found.v, trust=settings.trust_in_model_error)
-
-
-def _cancelled(state: State) -> FloatArray:
-    """Return what stiffness and mass of a cause cancel of each other in frequencies, (m,).
-
-    In deviations: with changes a and b of opposite sign hypot(a + b, this) is hypot(a, b).
-    """
-    m, near = state.problem.data.measurement, state.vectors[:, state.partner]
-    values = state.eigenvalues[state.partner]
-    total = np.zeros(len(values))
-    for part, index, columns in place_parts(len(state.problem.space), state.parts):
-        factors = part.hypothesis.factors(state.x[None, columns])[0]
-        changes = (part.matrix(factors, mass=kind) for kind in (False, True))
-        stiff, heavy = (
-            0.0 if own is None else np.einsum("im,im->m", near[index], own @ near[index])
-            for own in changes
-        )
-        total += np.maximum(stiff * heavy * values, 0.0)
-    moving = np.where(values > 0.0, values, np.inf)
-    return np.asarray(np.sqrt(0.5 * total) / moving * m.frequencies / m.frequency_std)
 
 
 def _scale(v: FloatArray) -> FloatArray:
