@@ -153,25 +153,6 @@ def test_what_a_model_error_makes_of_a_change_is_shared(
     assert seen[1][1] > seen[0][1] + 3.0
 
 
-def test_what_is_wrong_with_a_shape_stays_with_the_mode_as_drawn(
-    problem: Problem, slopes: dict[str, FloatArray]
-) -> None:
-    """Two modes that have nothing but a number in common are wrong each by itself."""
-    nothing, rng = state_at(problem, (), NOTHING), np.random.default_rng(5)
-    before, raw = rng.standard_normal((2, len(nothing.raw)))
-    seen = slopes["shapes 2"].any(axis=1)
-    before[seen], raw[seen] = 6.0 * before[seen], 6.0 * raw[seen]
-    same = dict(zip(TEST.numbers, nothing.partner.tolist(), strict=True))
-    other = same | {2: int(max(nothing.partner)) + 1}
-    shares = []
-    for partners in (same, other):
-        model = Inadequacy.of(slopes, slopes, before, WIDTHS, 0.02, 0.0)
-        model = replace(model, partners=partners).share_shapes(nothing)
-        shares.append(model.unshared_share(model.fit(replace(nothing, raw=raw)).v))
-    assert shares[0] > 0.2
-    assert shares[1] < 0.05
-
-
 def test_everything_stiffer_raises_all_frequencies_alike(
     problem: Problem, slopes: dict[str, FloatArray]
 ) -> None:

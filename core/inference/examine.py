@@ -369,7 +369,7 @@ def with_scales(
     if state.parts:
         if len(error.residual) or _moves_error(state):
             error = error.moved(slopes_with(state))
-        error = error.share_shapes(state).add_own_error(nothing, state)
+        error = error.add_own_error(nothing, state)
     problem = replace(state.problem, noise=error.noise(error.fit(state, near)))
     found: Fit | None
     if state.parts:
@@ -415,11 +415,7 @@ def model_error_of(
     residual = np.zeros(0) if before is None else before.raw
     widths = {name: width * value for name, value in class_widths().items()}
     unshared = settings.width_between_states
-    error = Inadequacy.of(present, reference, residual, widths, unshared, log_prior)
-    if before is None:
-        return error
-    partners = zip(before.problem.data.measurement.numbers, before.partner.tolist(), strict=True)
-    return replace(error, partners=dict(partners)).share_shapes(state_at(problem, (), np.zeros(0)))
+    return Inadequacy.of(present, reference, residual, widths, unshared, log_prior)
 
 
 def beam_noise(slopes: FloatArray, before: State | None, tolerance: float, weight: float) -> Noise:

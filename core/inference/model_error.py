@@ -331,8 +331,6 @@ class Inadequacy:
         earlier: sensitivities of the reference to each, (r, p_k).
         change: by how much an explanation moves each datum, in deviations, (n,); a share of that
             is its own error. Empty where there is none.
-        partners: by number of the mode, which one of the model that of the reference is.
-        alike: which share of a class both states have in common, (n_classes,); empty for all.
     """
 
     names: tuple[str, ...]
@@ -345,8 +343,6 @@ class Inadequacy:
     log_prior: float
     earlier: tuple[FloatArray, ...]
     change: FloatArray = field(default_factory=lambda: np.zeros(0))
-    partners: Mapping[int, int] = field(default_factory=dict)
-    alike: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def of(
@@ -390,23 +386,6 @@ class Inadequacy:
             if rows is not None and rows.shape[1] == earlier.shape[1]:
                 present[k], cross[k] = rows @ rows.T, earlier @ rows.T
         return replace(self, present=present, cross=cross)
-
-    def share_shapes(self, state: State) -> Inadequacy:
-        """Return the model error where what is wrong with a shape stays with the mode as drawn.
-
-        Where a mode of the data is another one than that of its number in the reference, both are
-        wrong by themselves.
-
-        Arguments:
-            state: the explanation.
-        """
-        pairs = zip(state.problem.data.measurement.numbers, state.partner, strict=True)
-        same = {
-            f"shapes {number}": min(abs(state.vectors[self.partners[number], mode]), 1.0)
-            for number, mode in pairs
-            if number in self.partners
-        }
-        return replace(self, alike=np.array([same.get(name, 1.0) for name in self.names]))
 
     def add_own_error(self, nothing: State, state: State) -> Inadequacy:
         """Return the model error where part of what an explanation changes is its own error.
@@ -455,8 +434,7 @@ class Inadequacy:
         joint = np.zeros((len(self.names), r + n, r + n))
         joint[:, :r, :r], joint[:, r:, r:] = self.reference, self.present
         apart = joint.copy()
-        cross = self.cross * self.alike[:, None, None] if len(self.alike) else self.cross
-        joint[:, :r, r:], joint[:, r:, :r] = cross, np.swapaxes(cross, 1, 2)
+        joint[:, :r, r:], joint[:, r:, :r] = self.cross, np.swapaxes(self.cross, 1, 2)
         flat = joint.shape[1] ** 2
         return joint.reshape(-1, flat), apart.reshape(-1, flat)
 

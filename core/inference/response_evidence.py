@@ -169,7 +169,6 @@ class JointEvidence:
             widths = {kind(n): float(w) for n, w in zip(error.names, error.widths, strict=True)}
             shared = error.unshared, error.log_prior
             whole = Inadequacy.of(slopes[-1], earlier, known, widths, *shared)
-            whole = replace(whole, partners=error.partners)
         rows = [
             np.hstack([own.get(name, own["general"][:, :0]) for name in _SCATTER]) for own in slopes
         ]
@@ -190,7 +189,6 @@ class JointEvidence:
         scales, whole = state.problem.noise.scales, self.whole
         if scales is None or self.error is None or whole is None:
             return np.asarray(self.noise + self.scatter @ self.scatter.T)
-        whole = whole.share_shapes(state)
         if self.error.own_share(scales) > 0.0:
             own = self.error.add_own_error(self.present.state, state).change
             whole = replace(whole, change=np.append(own, np.abs(moved)))
