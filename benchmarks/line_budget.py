@@ -17,7 +17,7 @@ PACKAGE = ("core", "plugins", "reports", "papers", "scenarios", "femubench")
 ALL = "package"  # the rooms of PACKAGE together
 # What the rooms have now: they may shrink, and the package is to come to 73 000 lines.
 BUDGETS = {
-    ALL: 90_458,
+    ALL: 90_407,
     "core": 1_025,
     "core/advise": 833,
     "core/case": 7_468,
@@ -32,7 +32,7 @@ BUDGETS = {
     "core/fem": 5_575,
     "core/fit": 1_857,
     "core/identify": 1_717,
-    "core/inference": 3_983,
+    "core/inference": 3_932,
     "core/library": 2_875,
     "core/look": 1_172,
     "core/modal": 4_485,
@@ -51,7 +51,7 @@ BUDGETS = {
     "papers": 3_249,
     "scenarios": 750,
     "femubench": 320,
-    "tests": 50_179,
+    "tests": 50_142,
     "truths": 14_338,
     "benchmarks": 7_908,
 }
