@@ -17,7 +17,7 @@ from femubench.core.case.modes import NO_SENSORS
 from femubench.core.challenge.structures import structure_named
 from femubench.core.challenge.truth import finer
 from femubench.core.change.hypothesis import Hypothesis, by_themselves
-from femubench.core.diagnosis import proof
+from femubench.core.diagnosis import proof, tables
 from femubench.core.diagnosis.scatter import scatter_rows
 from femubench.core.diagnosis.verdict import (
     Decision,
@@ -286,6 +286,19 @@ def test_what_unseen_data_refute_at_its_textbook_value_is_tried_as_fitted(
     for borne in (fitted, None):
         monkeypatch.setattr(proof, "_judged", lambda case, seen, e, b=borne: (e is b, 0.0))
         assert proof.find_held(None, seen) is borne  # type: ignore[arg-type]
+
+
+def test_what_only_passes_along_in_the_best_is_nothing_that_all_share(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    best = explained(("a", "b"), 0.9, book=("shear",))
+    best.fit.state.parts = [SimpleNamespace(hypothesis=SimpleNamespace(name=n)) for n in "ab"]
+    seen: Any = SimpleNamespace(posterior=posterior(best))
+    monkeypatch.setattr(tables, "find_spread", lambda posterior, leader: np.zeros(2))
+    monkeypatch.setattr(tables, "find_passengers", lambda state, spread: [False, True])
+    assert tables.has_causes(seen, best, ("a",))
+    assert tables.has_causes(seen, best, ("shear", "b"))
+    assert not tables.has_causes(seen, best, ("b",))
 
 
 def test_a_group_covers_nearly_all_that_is_not_nothing() -> None:

@@ -11,7 +11,7 @@ import pytest
 from samples import one_of_each
 from small_suite import write_suite
 
-from femubench import InputError, diagnose, read_case
+from femubench import InputError, read_case
 from femubench.core.challenge.truth_file import KnownCase, TrueCause, is_held, read_truth
 from truths.posing import DEFECTS, OPENSEES, SHEAR, SHEAR_STRUCTURES, STRUCTURES, SUITE, pose
 from truths.truth_text import truth_text
@@ -155,13 +155,3 @@ def test_a_truth_is_a_case(folder: Path, tmp_path: Path) -> None:
     assert list(present.columns) == list(healthy.columns)
     assert len(present) == len(healthy) == len(case.used) + len(case.held_out)
     assert not np.allclose(present["frequency"], healthy["frequency"], rtol=1e-9)
-
-
-@pytest.mark.nightly
-def test_what_is_named_has_a_name(tmp_path: Path) -> None:
-    """A cause that explanations share and that only passes along in the best is no name."""
-    case = tmp_path / "case"
-    pose(DEFECTS / "table-feet-water-1", case, reference=True)
-    found = diagnose(read_case(case / "solid.toml"))
-    assert found.verdict == "ambiguous"
-    assert {cause.place for cause in found.causes} >= {"group:leg-B"}
