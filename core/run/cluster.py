@@ -425,7 +425,7 @@ def _quiet() -> Iterator[None]:
     for logger in loggers:
         logger.setLevel(logging.CRITICAL)
     # What an interrupt keeps from being awaited is collected later than here.
-    warnings.filterwarnings("ignore", "coroutine .* was never awaited", RuntimeWarning)
+    warnings.filterwarnings("ignore", ".* never awaited", RuntimeWarning, "distributed")
     try:
         with dask.config.set(_UNWATCHED), warnings.catch_warnings():
             # Versions are compared here, where a difference is an error.
