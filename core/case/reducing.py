@@ -16,7 +16,7 @@ from femubench.core.fem.model import Dofs, Model
 from femubench.core.modal.eigen import ALL_MODES_LIMIT, DENSE_LIMIT
 from femubench.core.modal.group_prior import GroupPriors
 from femubench.core.modal.grouped_reduction import GroupedReduction, reduce_groups
-from femubench.core.modal.interfaces import INTERFACE
+from femubench.core.modal.interfaces import Interfaces
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 _INNER = "~"  # the node of coordinates that lie nowhere
@@ -128,7 +128,7 @@ def expand_model(case: Case, updated: Model) -> Model:
     rows = np.array([whole.geometry.rows[key] for key in geometry.rows if key[0] != _INNER])
     # What comes with the first power of a thickness is the rest of its group.
     keys = [(place, power) for place, own in small.powers.items() for power in own
-            if power > 1 or place.startswith(INTERFACE)]  # fmt: skip
+            if power > 1 or place.startswith(Interfaces.PREFIX)]  # fmt: skip
     found: dict[str, Any] = {"powers": {}}
     for i, (matrix, kind) in enumerate((("stiffness", "groups"), ("mass", "mass_groups"))):
         before, parts = getattr(small, matrix), getattr(small, kind)

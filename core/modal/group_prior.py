@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from femubench.core.fem.model import Model
 from femubench.core.fem.slopes import Matrix
 from femubench.core.modal.eigen import cache_by_model
-from femubench.core.modal.interfaces import INTERFACE, Interfaces
+from femubench.core.modal.interfaces import Interfaces
 from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.typing import FloatArray, SparseArray
 
@@ -124,7 +124,7 @@ class GroupPriors:
             >>> modal.GroupPriors(model).kind("deck")
             'part'
         """
-        if name.startswith(INTERFACE):
+        if name.startswith(Interfaces.PREFIX):
             return "joint"
         return self.model.group_kinds.get(name, "support" if name in self.supports else "part")
 

@@ -28,7 +28,6 @@ from femubench.core.fem.model import Model, Powers
 from femubench.core.modal.eigen import cache_by_model
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
-INTERFACE = "interface:"
 _MOST = 1500  # rows that two parts share; wider faces are none
 _LOOSE = 1e-10  # of the stiffness there: what resists no motion
 
@@ -42,7 +41,7 @@ class Interfaces:
         parts: names of its groups between which there may be some.
     """
 
-    PREFIX: ClassVar[str] = INTERFACE
+    PREFIX: ClassVar[str] = "interface:"
 
     model: Model
     parts: tuple[str, ...]
@@ -58,7 +57,7 @@ class Interfaces:
     @property
     def places(self) -> tuple[str, ...]:
         """Return all interfaces; where the model is in a basis, those that it was given."""
-        return tuple(p for p in self.model.powers if p.startswith(INTERFACE)) or tuple(self.sides)
+        return tuple(p for p in self.model.powers if p.startswith(self.PREFIX)) or tuple(self.sides)
 
     def powers(self, place: str, onto: Callable[[SparseArray], FloatArray] | None = None) -> Powers:
         """Return stiffness and mass that come with powers of f - 1.
@@ -108,5 +107,5 @@ def _sides(model: Model, parts: tuple[str, ...]) -> dict[str, tuple[str, IntArra
         least = min(np.count_nonzero(size[name]) for name in pair)
         if 0 < len(rows) <= _MOST and 2 * len(rows) < least:
             softer = min(pair, key=lambda name: float(size[name][rows].sum()))
-            found[f"{INTERFACE}{'|'.join(pair)}"] = softer, rows
+            found[f"{Interfaces.PREFIX}{'|'.join(pair)}"] = softer, rows
     return found
