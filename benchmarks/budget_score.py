@@ -23,7 +23,7 @@ from sweep_data import PAGE, as_markdown, filled
 
 import femubench
 from femubench.core.diagnosis.budget import budget_of_modes
-from femubench.core.diagnosis.budget_advice import open_variance
+from femubench.core.diagnosis.budget_advice import weigh_unused
 from femubench.core.plugin.loader import list_effects
 from femubench.core.score.responses import rms
 from truths.lacks_file import LACKS, Lacks, read_lacks
@@ -152,8 +152,8 @@ class BudgetScore:
 
     @cached_property
     def advised(self) -> int:
-        """Return the row of the held-out mode that is known least, which is advised first."""
-        return int(open_variance(self.budget).argmax())
+        """Return the row of the held-out mode that says most of all, which is advised first."""
+        return int(weigh_unused(self.budget).argmax())
 
     @cached_property
     def left_with(self) -> dict[int, Array]:

@@ -29,8 +29,8 @@ def advise(
 ) -> None:
     """Measure the modes that are advised, with held-out ones as the laboratory.
 
-    CASE is as for bench diagnose. In every round the held-out mode that the budget of the drawing
-    knows least is used too. Errors of the modes that are still held out are rms, in %.
+    CASE is as for bench diagnose. In every round the held-out mode that says most of all of them,
+    by the budget of the drawing, is used too. Errors of those still held out are rms, in %.
     """
     from dataclasses import asdict
 

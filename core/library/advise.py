@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from femubench.core.diagnosis.budget_advice import loosest_mode
+from femubench.core.diagnosis.budget_advice import next_mode
 from femubench.core.errors import InputError
 from femubench.core.library.cases import CaseLike, one_case
 from femubench.core.library.diagnose import diagnosis_of
@@ -62,7 +62,7 @@ def play_advice(
         if budget is None:
             expected = "a frame, or matrices in groups, without `[reference]`"
             raise InputError("has no budget of its drawing", file=read.folder, expected=expected)
-        mode = None if found.verdict == "named" or not left else loosest_mode(budget)
+        mode = None if found.verdict == "named" or not left else next_mode(budget)
         others = [one for one in budget.modes if one.mode in read.held_out]
         off, rest, std = (rms([getattr(m, n) for m in others]) if others else None for n in _ERRORS)
         yield AdviceRound(
