@@ -76,7 +76,8 @@ def write_deck(
         for spans in product(*inside):
             first, last = np.array(spans, dtype=float).T
             number += 1
-            ends = [tuple(map(float, first + s * (last - first))) for s in KINDS[kind].places]
+            at = [first + s * (last - first) for s in KINDS[kind].places]
+            ends = [tuple(map(float, place.round(9))) for place in at]
             cells = [number, *(nodes.setdefault(p, len(nodes) + 1) for p in ends)]
             rows = [cells[i : i + 11] for i in range(0, len(cells), 11)]
             sets.append(",\n".join(", ".join(map(str, row)) for row in rows))
