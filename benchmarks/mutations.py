@@ -28,7 +28,7 @@ core/fem/beam.py :: beam_elements textbook
     a, b = 6.0 * L, 4.0 + phi => a, b = 6.0 * L, 4.0 - phi
     t3 = 35 * phi**2 + 63 * phi + 27 => t3 = 35 * phi**2 + 63 * phi + 26
     transform[:, 1, 5], transform[:, 2, 4] = first, -first => transform[:, 1, 5] = first
-    bar * (p.GJ / L) => bar * (p.GJ / p.length)
+    bar * (self.GJ / L) => bar * (self.GJ / self.length)
 core/fem/assembly.py :: assembly
     > 1e-13 * scale => > 1e-3 * scale
 core/fem/attaching.py :: attachments frame_extensions
@@ -72,7 +72,7 @@ core/inference/model_error.py :: model_error
     scales=found.v, trust= => scales=found.v, trust=1.0**
     weight @ raw[known] => 0.0 * weight @ raw[known]
 core/inference/posterior.py :: diagnosis_search diagnosis_verdict
-    + trust * self.fit.log_evidence => + self.fit.log_evidence
+    + trust * self.log_evidence => + self.log_evidence
     self.missed * log( => 0.2 * self.missed * log(
     min(gains) > log( => min(gains) > -9.0 + 0.0 * log(
     - 0.5 * self.chi2 => - self.chi2
@@ -103,7 +103,7 @@ core/score/predictive.py :: uncertainty
     2.0 * density - 1.0 / np.sqrt(np.pi) => 2.0 * density - 1.0 / np.pi
 core/score/twin_gain.py :: twins
     frozenset({"timeout", "crashed"}) => frozenset({"crashed"})
-    CLEAR, KNOWN = 0.1, 2.0 => CLEAR, KNOWN = 0.001, 2.0
+    CLEAR, KNOWN = 0.1, 3.0 => CLEAR, KNOWN = 0.001, 3.0
 core/run/store.py :: harness_store resume
     or record.status in DONE or known => or True or known
 core/run/model_checks.py :: harness_jobs
@@ -188,9 +188,10 @@ def main() -> None:
     asked = parser.parse_args()
     chosen = [m for m in mutations() if asked.only in f"{m} {' '.join(m.tests)}"]
     if asked.list:
+        stale = [m for m in chosen if m.place(asked.root) is None]
         for m in chosen:
-            print(f"{'' if m.place(asked.root) else 'STALE '}{m}  [{' '.join(m.tests)}]")
-        return
+            print(f"{'STALE ' if m in stale else ''}{m}  [{' '.join(m.tests)}]")
+        raise SystemExit(1 if stale else 0)
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder) / "tree"
         shutil.copytree(asked.root, root, symlinks=True, ignore=LEFT_OUT)
