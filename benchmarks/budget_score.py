@@ -34,10 +34,10 @@ MARK, ADVICE = "budget-score", "budget-advice"
 CLEAR = 1.645  # deviations of a 90 % interval
 OWN = 0.25  # of its size, by which definitions of a truth differ (five, twenty, 200 times as stiff)
 LEAST = 0.05  # % of frequency; smaller in truth and budget says nothing
+GROUNDED = ("springs to ground", "extent of springs")
 KINDS = {
     **dict.fromkeys(
-        ("support", "joint-stiffness", "joint stiffness", "arms of joints", "springs to ground"),
-        "joint",
+        ("support", "joint-stiffness", "joint stiffness", "arms of joints", *GROUNDED), "joint"
     ),
     **dict.fromkeys(("joint-mass", "joint mass", "overlap of members", "added-mass"), "mass"),
     "rotary inertia of masses": "mass",
@@ -87,7 +87,7 @@ class BudgetScore:
         place, own = place.removeprefix("type:"), KINDS.get(kind, kind)
         if own == "joint":
             held = {types.get(str(one.at)) for one in (*frame.supports, *frame.springs)}
-            grounded = kind == "springs to ground" or (kind, place) == ("support", "all")
+            grounded = kind in GROUNDED or (kind, place) == ("support", "all")
             if grounded or types.get(place, place) in held:
                 return "foot", "all"
         return own, types.get(place, place) if own in ("joint", "mass") else "all"

@@ -314,6 +314,50 @@ def test_drawn_springs_and_masses_are_open_and_go_into_the_frame() -> None:
     np.testing.assert_allclose(own, grown, atol=1e-9 * np.abs(grown).max())
 
 
+@pytest.mark.parametrize("name", ["trailer", "a-frame", "gantry"])
+@pytest.mark.parametrize("kind", ["plates", "extent of springs"])
+def test_what_is_not_drawn_goes_into_the_frame_as_into_the_fit(name: str, kind: str) -> None:
+    model = cases[f"suite/{name}"].model
+    structure, entries = model.frame_structure, list_entries(model)
+    own = [entry for entry in entries if entry.kind == kind]
+    assert bool(own) == ((name, kind) != ("gantry", "extent of springs"))
+    for one in own:
+        x = np.array([0.4 * (entry is one) for entry in entries for _ in entry.names])
+        grown = Model.of(structure.rebuilt(extend_frame(structure.frame, entries, x)))
+        for matrix in ("mass", "stiffness"):
+            pairs = zip(one.terms, one.grow(np.array([[0.4]]))[0], strict=True)
+            expected = sum(
+                factor * sparse_matrix(term.operator, model.size).toarray()
+                for term, factor in pairs
+                if term.matrix == matrix
+            )
+            change = (getattr(grown, matrix) - getattr(model, matrix)).toarray()
+            largest = np.abs(change).max()
+            np.testing.assert_allclose(change, expected, atol=1e-9 * largest)
+
+
+def test_pieces_at_all_corners_weigh_and_stiffen_there_and_count_as_both() -> None:
+    case = cases["suite/box-frame"]
+    book = budget_of(case, list_effects())
+    assert book is not None
+    structure, entries = book.start.frame_structure, list_entries(book.start)
+    x = np.array([1.0 * (e.kind == "plates") for e in entries for _ in e.names])
+    pieces = Model.of(structure.rebuilt(extend_frame(structure.frame, entries, x)))
+    found = budget_of(measured_as(case, pieces), list_effects())
+    assert found is not None
+    percent = {n.name: np.array(n.percent) for n in found.lines if n.source != "handbook"}
+    assert "plates" not in percent
+    assert percent["joint stiffness"][:6].min() > 10.0
+    assert percent["joint mass"][:6].max() < -1.0
+    masses: dict[str, float] = {}
+    for mass in found.extended.frame_structure.frame.masses:
+        masses[str(mass.at)] = masses.get(str(mass.at), 0.0) + mass.mass
+    true = (pieces.total_mass - book.start.total_mass) / 8.0
+    assert len(masses) == 8
+    assert min(masses.values()) > 0.5 * true
+    assert max(masses.values()) < true
+
+
 def test_a_spring_that_is_softer_than_drawn_is_found() -> None:
     drawn = cases["suite/trailer"]
     structure, entries = drawn.model.frame_structure, list_entries(drawn.model)

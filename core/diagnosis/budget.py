@@ -135,7 +135,7 @@ def budget_of_modes(
     wide = _pose(model, every, every, hypotheses)
     state = state_at(wide, wide.space.projections, x)
     slopes, found = frequency_slopes(state), log_frequencies(state)
-    fresh = _share_out(entries, state, slopes, covariance)
+    fresh = _share_out(entries, state, covariance)
     # A used mode was fitted with all that its lines idealise, another was not.
     shares = np.array([line.percent for line in fresh]) / 100.0
     ideal = np.square(settings.own_error_of_change * shares).sum(axis=0)
@@ -256,15 +256,23 @@ def log_frequencies(state: State) -> FloatArray:
 
 def frequency_slopes(state: State, modes: IntArray | None = None) -> FloatArray:
     """Return d ln f / d x of the partner of every measured mode, or of other modes, (m, k)."""
-    modes = state.partner if modes is None else modes
+    stiff, mass = _slopes_apart(state, state.partner if modes is None else modes)
+    return stiff + mass
+
+
+def _slopes_apart(state: State, modes: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return what of them is by the stiffness, and by the mass."""
     values, near = state.eigenvalues[modes], state.vectors[:, modes]
-    forces, _ = state.problem.space.forces(state.parts, state.x, near, values)
-    return np.asarray(np.einsum("nm,nmk->mk", near, forces) / (2.0 * values[:, None]))
+
+    def along(eigenvalues: FloatArray) -> FloatArray:
+        forces, _ = state.problem.space.forces(state.parts, state.x, near, eigenvalues)
+        return np.asarray(np.einsum("nm,nmk->mk", near, forces) / (2.0 * values[:, None]))
+
+    stiff = along(np.zeros(len(values)))
+    return stiff, along(values) - stiff
 
 
-def _share_out(
-    entries: Sequence[Entry], state: State, slopes: FloatArray, covariance: FloatArray
-) -> list[BudgetLine]:
+def _share_out(entries: Sequence[Entry], state: State, covariance: FloatArray) -> list[BudgetLine]:
     """Return the lines of what was fitted, which add up to all that it changes.
 
     Each entry has the integral of its slope on the straight way from the drawing (Aumann & Shapley
@@ -272,24 +280,31 @@ def _share_out(
     """
     x, problem, parts = state.x, state.problem, state.parts
     start, half = (state_at(problem, parts, t * x) for t in (0.0, 0.5))
-    first, middle = frequency_slopes(start), frequency_slopes(half)
-    each = (first + 4.0 * middle + slopes) / 6.0 * x
+    # By the stiffness, and behind it by the mass, of every coordinate.
+    first, middle, slopes = (
+        np.hstack(_slopes_apart(one, one.partner)) for one in (start, half, state)
+    )
+    each = (first + 4.0 * middle + slopes) / 6.0 * np.tile(x, 2)
     missing = log_frequencies(state) - log_frequencies(start) - each.sum(axis=1)
     total = np.abs(each).sum(axis=1)
     each += np.abs(each) * (missing / np.where(total > 0.0, total, 1.0))[:, None]
-    lines: dict[tuple[str, str], list[tuple[Entry, slice]]] = {}
+    lines: dict[tuple[str, str], list[tuple[Entry, slice, IntArray]]] = {}
     for entry, one in with_slices(entries):
-        lines.setdefault((entry.place, entry.kind), []).append((entry, one))
+        for kind, columns in zip(entry.lines, np.arange(2 * len(x)).reshape(2, -1), strict=True):
+            lines.setdefault((entry.place, kind), []).append((entry, one, columns[one]))
+    both = np.tile(covariance, (2, 2))
     found = []
     for (place, kind), owners in lines.items():
-        own = np.concatenate([np.arange(len(x))[one] for _, one in owners])
-        spread = slopes[:, own] @ covariance[np.ix_(own, own)] @ slopes[:, own].T
-        unseen = tuple(n for e, one in owners for n in e.list_unseen(covariance[one, one]))
+        own = np.concatenate([columns for *_, columns in owners])
+        spread = slopes[:, own] @ both[np.ix_(own, own)] @ slopes[:, own].T
+        names = {name for entry, *_ in owners for name in entry.names}
+        blind = (n for e, one, _ in owners for n in e.list_unseen(covariance[one, one]))
+        unseen = tuple(dict.fromkeys(blind))
         share = each[:, own].sum(axis=1)
         # A zone, or a point mass, is an idealisation of what is there.
         spread = spread + np.outer(share, share) * settings.own_error_of_change**2
         line = _line(place, kind, share, spread)
-        moved = len(unseen) < len(own) or abs(line.rms_percent) > line.rms_std
+        moved = len(unseen) < len(names) or abs(line.rms_percent) > line.rms_std
         source = "data" if moved else "drawing"
         found.append(structs.replace(line, source=source, unseen=unseen))
     return found

@@ -23,7 +23,16 @@ from femubench.core.change.parameter import Parameter
 from femubench.core.change.terms import ElementOperator, Term
 from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.fem.beam import BEND_XY, BEND_XZ, TWIST
-from femubench.core.fem.frame import ACTIVE, MADE, Factor, Frame, GroundSpring, Place, PointMass
+from femubench.core.fem.frame import (
+    ACTIVE,
+    MADE,
+    Factor,
+    Frame,
+    GroundSpring,
+    Member,
+    Place,
+    PointMass,
+)
 from femubench.core.fem.group_factors import Groups
 from femubench.core.fem.joints import JointZones
 from femubench.core.fem.model import Model
@@ -37,8 +46,9 @@ from femubench.core.roles import Effect
 from femubench.core.typing import FloatArray, IntArray
 
 _JOINTS, _SPRINGS, _LUMPS = "joint stiffness", "springs to ground", "rotary inertia of masses"
-_MASSES = "joint mass"
-TAILED = (_JOINTS, _SPRINGS, _LUMPS, _MASSES)  # of most a drawing lacks little, of a few much
+_MASSES, _PADS, _PLATES = "joint mass", "extent of springs", "plates"
+# Of most a drawing lacks little, of a few much.
+TAILED = (_JOINTS, _SPRINGS, _LUMPS, _MASSES, _PADS, _PLATES)
 _WHOLES = ("E", "GJ", "density")  # of everything
 # Of every axis of a joint zone the displacements of an element, and what a factor multiplies.
 _AXES = {"rx": (TWIST, "GJ"), "ry": (BEND_XZ, "bending ry"), "rz": (BEND_XY, "bending rz")}
@@ -51,10 +61,10 @@ class Entry:
     Arguments:
         place, kind: of the line of the budget that it belongs to.
         names: of the numbers, (q,).
-        terms: what each changes.
-        root: of their prior covariance, of ln(factor) or in kg, (q, q).
-        quantities: the factor of a frame that each is; of masses none.
-        at: elements with these factors, ``all``, or joints with the mass.
+        terms: what each changes, (t,): of plates stiffness and mass.
+        root: of their prior covariance, of ln(factor), of a share or in kg, (q, q).
+        quantities: the factor of a frame that each is; none of what is put on.
+        at: elements with these factors, ``all``, or joints with the mass; of plates both.
     """
 
     place: str
@@ -65,10 +75,19 @@ class Entry:
     quantities: tuple[str, ...]
     at: tuple[str, ...]
 
-    def grow(self, x: FloatArray) -> FloatArray:
-        """Return the factors of the terms at coordinates, (g, q) both."""
+    def values(self, x: FloatArray) -> FloatArray:
+        """Return the numbers at coordinates, (g, q) both."""
         moved = x @ self.root.T
         return np.asarray(np.expm1(moved) if self.quantities else moved)
+
+    def grow(self, x: FloatArray) -> FloatArray:
+        """Return the factors of the terms at coordinates, (g, t)."""
+        return np.tile(self.values(x), len(self.terms) // len(self.names))
+
+    @property
+    def lines(self) -> tuple[str, str]:
+        """Return the classes that its stiffness and its mass belong to."""
+        return (_JOINTS, _MASSES) if self.kind == _PLATES else (self.kind, self.kind)
 
     @property
     def hypothesis(self) -> Hypothesis:
@@ -103,18 +122,28 @@ def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame
 
     Changes of the matrices add up, as in the fit, where factors of a frame multiply.
     """
-    everywhere, held, inertia = dict[str, float](), dict[str, float](), dict[str, float]()
+    everywhere, held = dict[str, float](), dict[str, float]()
+    inertia, pads = dict[str, float](), dict[str, float]()
     zones, added = defaultdict[tuple[str, str], float](float), list[PointMass]()
     for entry, own in with_slices(entries):
-        values = entry.grow(x[None, own])[0].tolist()
+        values = entry.values(x[None, own])[0].tolist()
         if entry.kind == _JOINTS:
             for quantity, value in zip(entry.quantities, values, strict=True):
                 for label in entry.at:
                     zones[quantity, label] += value
         elif entry.kind == _SPRINGS:
             held |= {name: 1.0 + value for name, value in zip(entry.names, values, strict=True)}
+        elif entry.kind == _PLATES:
+            for at in entry.at if values[0] else ():
+                if at in frame.joint_index:
+                    added.append(PointMass(Place(joint=at), values[0] * _weigh_ends(frame, at)))
+                else:
+                    for axis in _axes_of(frame):
+                        zones[_AXES[axis][1], at] += values[0]
         elif entry.kind == _LUMPS:
             inertia[entry.place] = values[0]
+        elif entry.kind == _PADS:
+            pads[entry.place] = values[0]
         elif entry.quantities:
             everywhere[entry.quantities[0]] = values[0]
         else:
@@ -132,6 +161,12 @@ def extend_frame(frame: Frame, entries: Sequence[Entry], x: FloatArray) -> Frame
     bodies = [(mass, inertia.get(_family(frame, mass.at), 0.0)) for mass in frame.masses]
     masses = [part for mass, share in bodies for part in _spread(mass, share)]
     springs = [replace(s, stiffness=s.stiffness * held.get(_along(s), 1.0)) for s in frame.springs]
+    springs += [
+        replace(spring, stiffness=share * spring.stiffness)
+        for place, share in pads.items()
+        for spring in _turning(frame, place)
+        if share
+    ]
     return replace(frame, factors=wanted, masses=(*masses, *added), springs=tuple(springs))
 
 
@@ -151,7 +186,7 @@ def list_entries(model: Model) -> list[Entry]:
         rows = np.unique(np.concatenate([zones.zone(end)[0] for end in ends]))
         labels = tuple(zones.labels[row] for row in rows.tolist())
         terms = {}
-        for axis in (axis for axis in ACTIVE[frame.plane] if axis in _AXES):
+        for axis in _axes_of(frame):
             blocks = _within(stiff[rows], _AXES[axis][0])
             if blocks.any():
                 terms[axis] = Term("stiffness", ElementOperator(structure, rows, blocks))
@@ -164,6 +199,7 @@ def list_entries(model: Model) -> list[Entry]:
             names = tuple(axis if role == "end" else f"{role} {axis}" for axis in terms)
             factors = tuple(_AXES[axis][1] for axis in terms)
             found.append(Entry(place, _JOINTS, names, tuple(terms.values()), root, factors, labels))
+    found += _list_plates(structure, zones, stiff)
     every = np.arange(len(structure.properties))
     *wholes, mass = settings.budget_known[:4]
     parts = stiff, _within(stiff, TWIST), heavy
@@ -187,6 +223,49 @@ def _within(matrices: FloatArray, own: IntArray) -> FloatArray:
     """Return matrices of elements, (k, 12, 12), with what some displacements have alone."""
     inside = np.isin(np.arange(matrices.shape[1]), own)
     return matrices * np.outer(inside, inside)
+
+
+def _axes_of(frame: Frame) -> list[str]:
+    return [axis for axis in ACTIVE[frame.plane] if axis in _AXES]
+
+
+def _list_plates(structure: Structure, zones: JointZones, stiff: FloatArray) -> list[Entry]:
+    """Return plates and pieces at joints: by one number they stiffen what meets and weigh on it."""
+    found, ends = list[Entry](), defaultdict[str, list[str]](list)
+    frame, axes = structure.frame, _axes_of(structure.frame)
+    for (place, role), own in zones.ends.items():
+        if role != "foot":
+            ends[place] += own
+    for place, own in ends.items():
+        rows = np.unique(np.concatenate([zones.zone(end)[0] for end in own]))
+        turned = np.sum([_within(stiff[rows], _AXES[axis][0]) for axis in axes], axis=0)
+        joints = dict.fromkeys(end.rpartition("@")[2] for end in own)
+        masses = [PointMass(Place(joint=name), _weigh_ends(frame, name)) for name in joints]
+        terms = (
+            Term("stiffness", ElementOperator(structure, rows, turned)),
+            Term.of("mass", structure.assemble_attachments(masses, ())[0]),
+        )
+        at = (*(zones.labels[row] for row in rows.tolist()), *joints)
+        if turned.any():
+            found.append(Entry(place, _PLATES, (_PLATES,), terms, np.eye(1), (), at))
+    return found
+
+
+def _weigh_ends(frame: Frame, joint: str) -> float:
+    """Return the mass in kg of plates at a joint that make the ends of members twice as stiff.
+
+    Over once the depth of each, of an equal rectangle, they lie at its faces, where a third of what
+    the member weighs does it.
+    """
+    members = [frame.members[frame.member_index[name]] for name in frame.ends_at(joint)]
+    weights = [m.material.rho * m.section.A * _gyration(m) for m in members]
+    return float(np.sqrt(12.0) / 3.0 * sum(weights))
+
+
+def _gyration(member: Member) -> float:
+    """Return the larger radius of gyration of a section in m."""
+    section = member.section
+    return float(np.sqrt(max(section.Iy, section.Iz) / section.A))
 
 
 def _list_groups(model: Model) -> list[Entry]:
@@ -220,6 +299,9 @@ def _attached(structure: Structure) -> list[Entry]:
         np.fill_diagonal(together, 1.0)
         root = settings.budget_known[4] * np.linalg.cholesky(together)
         found.append(Entry(place, _SPRINGS, tuple(groups), terms, root, (_SPRINGS,) * count, ()))
+        if pads := _turning(frame, place):
+            term = Term.of("stiffness", structure.assemble_attachments((), pads)[1])
+            found.append(_alone(place, _PADS, term, 1.0, (), (place,)))
     lumps: dict[str, list[PointMass]] = {}
     for mass in frame.masses:
         lumps.setdefault(_family(frame, mass.at), []).append(mass)
@@ -234,6 +316,21 @@ def _attached(structure: Structure) -> list[Entry]:
 def _family(frame: Frame, at: Place) -> str:
     """Return the type of the joint where something is attached, or the member."""
     return str(at.member) if at.joint is None else frame.joint(at.joint).family
+
+
+def _turning(frame: Frame, place: str) -> list[GroundSpring]:
+    """Return what drawn springs hold of rotations, were they spread as wide as what they hold."""
+    found = []
+    own = [spring for spring in frame.springs if _family(frame, spring.at) == place]
+    for at in dict.fromkeys(spring.at for spring in own):
+        across = {_along(s).rpartition(" ")[2]: s.stiffness for s in own if s.at == at}
+        held = {*across, *(d for s in frame.supports if s.at == at for d in s.fixed)}
+        names = [at.member] if at.member else frame.ends_at(str(at.joint))
+        wide = max((_gyration(frame.members[frame.member_index[n]]) for n in names), default=0.0)
+        for axis in (axis for axis in _axes_of(frame) if axis not in held):
+            turned = wide**2 * sum(k for d, k in across.items() if d in set("xyz") - {axis[1]})
+            found += [GroundSpring(at, axis, turned)] if turned else []
+    return found
 
 
 def _along(spring: GroundSpring) -> str:

@@ -96,7 +96,7 @@ def _estimates(budget: Budget) -> Iterator[ParameterEstimate]:
     x, loose, done = budget.state.x, budget.loose, 0
     for entry in budget.entries:
         own = slice(done, done := done + len(entry.names))
-        values = entry.grow(x[None, own])[0]
+        values = entry.values(x[None, own])[0]
         stds = np.sqrt(np.diag(entry.root @ loose[own, own] @ entry.root.T))
         if entry.quantities:  # of ln(factor)
             stds = stds * (1.0 + values)
