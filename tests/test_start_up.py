@@ -124,6 +124,12 @@ def names(requirements: list[str]) -> set[str]:
 
 
 @pytest.mark.slow(10)
+def test_every_page_of_the_package_is_there_without_an_import_of_its_own() -> None:
+    pages = sorted(file.stem for file in (ROOT / "femubench").glob("[!_]*.py"))
+    code = f"import femubench as f; print([getattr(f, p).__name__ for p in {pages}])"
+    assert run_python("-c", code).stdout.strip() == str([f"femubench.{page}" for page in pages])
+
+
 def test_dependencies_are_what_is_imported() -> None:
     found = {entry for path in FILES for entry in third_party(path)}
     extras = PROJECT["optional-dependencies"]

@@ -11,7 +11,7 @@ from typing import Any
 
 
 def open_door(page: str, file: str) -> tuple[list[str], Callable[[str], Any], Callable[[], Any]]:
-    """Return what a page lists, gives and shows: what it imports for type checkers.
+    """Return what a page lists, gives and shows: what it imports for type checkers, and its pages.
 
     Arguments:
         page: a module.
@@ -27,11 +27,16 @@ def open_door(page: str, file: str) -> tuple[list[str], Callable[[str], Any], Ca
         for alias in node.names
     }
 
+    package = Path(file).stem == "__init__"
+    pages = {one.stem for one in Path(file).parent.glob("[!_]*.py")} if package else set()
+
     def give(name: str) -> Any:  # noqa: ANN401 - one door for every name
+        if name in pages:
+            return import_module(f"{page}.{name}")
         if name not in home:
             raise AttributeError(f"module {page!r} has no attribute {name!r}")
         found = getattr(import_module(home[name]), name)
         setattr(sys.modules[page], name, found)
         return found
 
-    return sorted(home), give, lambda: sorted({*vars(sys.modules[page]), *home})
+    return sorted(home), give, lambda: sorted({*vars(sys.modules[page]), *home, *pages})
