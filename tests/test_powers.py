@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.linalg as la
 import scipy.sparse as sp
 from diagnosis_problems import case_of
 from test_bulk_plates import bulk, converted
@@ -30,6 +31,7 @@ from femubench.core.case.reducing import expand_model, reduce_case
 from femubench.core.case.similarity import Similarity, similar_matrices
 from femubench.core.fem.alteration import Alteration, alter_model
 from femubench.core.modal.frequency_changes import elastic_modes
+from femubench.core.modal.grouped_reduction import reduce_groups
 from femubench.effect import FrameEffect
 from femubench.fem import FloatArray, MatrixGeometry, Place, Support
 from femubench.modal import GroupPriors
@@ -209,6 +211,46 @@ def test_a_basis_holds_what_powers_do(
     for kind in ("stiffness", "mass"):
         gap = abs(getattr(back, kind) - getattr(whole, kind)).max()
         assert gap < 1e-6 * abs(getattr(whole, kind)).max()
+
+
+SUITE = Path(__file__).parents[1] / "scenarios" / "suite"
+
+
+def bar() -> Model:
+    """Return the solids of a tapered cantilever: four bars and what clamps them, as parts."""
+    return femubench.read_model(SUITE / "tapered-cantilever" / "solid.inp", unit="m")
+
+
+@pytest.mark.slow(20)
+@pytest.mark.parametrize(
+    ("name", "factors"), [("folded", (0.3, 0.1, 1e-2, 1e-3)), ("bar", (0.1, 1e-3))]
+)
+def test_thirty_frequencies_of_a_basis_hold_with_an_interface_a_thousandth(
+    name: str, factors: Sequence[float], request: pytest.FixtureRequest
+) -> None:
+    model: Model = request.getfixturevalue(name) if name == "folded" else bar()
+    node = model.dofs.node
+    kept = np.flatnonzero(np.isin(node, np.linspace(0, node.max(), 10, dtype=int)))
+    found, whole = reduce_groups(model, kept, 30), hertz(model, 30)[:30]
+    assert 200 <= len(found.mass) <= 600
+
+    def excess(stiffness: FloatArray, mass: FloatArray, whole: FloatArray) -> float:
+        values = la.eigh(stiffness, mass, eigvals_only=True, subset_by_index=[0, 39])
+        elastic = values[values > 1e-3 * (2.0 * np.pi * whole[0]) ** 2][:30]
+        return float(np.abs(np.sqrt(elastic) / (2.0 * np.pi * whole) - 1.0).max())
+
+    assert excess(found.stiffness, found.mass, whole) < 1e-5
+    most = 0.0
+    for place, pairs in found.powers.items():
+        for left in factors if place.startswith("interface") else ():
+            stiffness, mass = (
+                whole + sum((left - 1.0) ** power * pair[i] for power, pair in pairs.items())
+                for i, whole in enumerate((found.stiffness, found.mass))
+            )
+            exact = hertz(SOFT.extend(model, place, [left - 1.0]), 30)[:30]
+            most = max(most, excess(stiffness, mass, exact[:30]))
+    assert most < 1e-3
+    assert 0.4 * most < found.moved < 1e-3  # an estimate from below, by the softest and by others
 
 
 def test_a_thinner_sheet_is_told_from_another_material(tmp_path: Path) -> None:

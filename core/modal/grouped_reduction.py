@@ -9,7 +9,9 @@ how it vibrates with its border held, is therefore the same for every factor. So
 group goes first, and the borders keep their softest motions: some thousand coordinates, in which a
 group is a dense block of those that it touches. There the model is solved with each group softened
 and stiffened for itself: all that a factor adds to the modes are answers to forces on the group.
-The motions that carry most energy of all these modes stay, next to the modes of the whole model.
+Few motions of borders hold what a soft interface makes of modes: the forces that such modes leave
+around it say what is missing, and give it. The motions that carry most energy of all these modes
+stay, next to the modes of the whole model.
 
 The kept degrees of freedom stay coordinates, so that sensors, masses and springs act on the
 reduced model as on the whole one. No rigid motion moves the other coordinates.
@@ -22,14 +24,14 @@ in which parameters stay affine.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackError, LinearOperator, cg, eigsh
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.group_factors import GROUP
@@ -37,13 +39,14 @@ from femubench.core.fem.model import Model, Powers
 from femubench.core.modal.eigen import DENSE_LIMIT, solve_modes
 from femubench.core.modal.factorisation import factorise_definite
 from femubench.core.modal.group_prior import GroupPriors
-from femubench.core.modal.interfaces import Interfaces
+from femubench.core.modal.interfaces import Interfaces, loose_inverse
 from femubench.core.modal.rigid import orthonormal, rigid_body_vectors, rigid_modes_of
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 # What a joint or a clamp, of which little is known, may turn out to be; and any other part.
 JOINT_FACTORS = (1e-3, 0.03, 3.0)
 PART_FACTORS = (0.3, 3.0)
+INTERFACE_FACTORS = (1e-3, 0.03, 0.3)  # drawn as one piece, it is never stiffer
 _UNKNOWN = 1.0  # deviation of the logarithm of a group from which on it is one of the former
 _SHIFT = 0.5  # of the first elastic eigenvalue, below zero
 _FLOATING = 1e-11  # of the largest k/m: a shift that makes what floats definite
@@ -53,7 +56,7 @@ _APART = 1e-10  # of the energy of a mode: what the coordinates may lack of it
 _DEPENDENT = 1e-13  # square of the sine below which a vector lies in the span of the others
 _BORDERS = 2400  # coordinates of all borders
 _BORDER = (12, 48)  # and of one, least and most
-_PATCH = (16, 10_000)  # rows around a border: times its own, and at most
+_PATCH, _SEAM, _MOST_NEAR = 16, 8, 10_000  # rows around a border, an interface: times its own
 _FAINT = 1e-5  # of the strongest motion of a border
 _HELD = 3.0  # times the highest eigenvalue: modes of a group whose border is held
 _MOST_HELD = 64
@@ -62,6 +65,8 @@ _STRONG = 1e-3  # of the energy of a mode, its root, from which on an inside has
 _SHARE = 1e-4  # of the energy of an answer to forces on a group that the group itself has
 _WEAK = 1e-6  # of the energy of a mode, below which a group adds no motion
 _SOFT = 0.1  # times its stiffness: a joint when motions are weighed
+_STEPS = 32  # of conjugate gradients
+_MISSED = 0.1  # of the tolerance: energy that a mode lacks near a soft interface, and gets
 _LOST = 1e-3  # of the tolerance: energy of motions that are left out
 
 
@@ -75,7 +80,8 @@ class GroupedReduction:
         groups, mass_groups: parts of them by name, (N, N) each.
         powers: what comes with powers of a thickness or of an interface's softness, by place.
         moved: how far off a frequency is, relative: by what the borders of groups lack of modes,
-            and by what there was no room for; the largest of all groups, factors and modes.
+            by what there was no room for, and by what is missing around a soft interface; the
+            largest of all groups, interfaces, factors and modes.
     """
 
     kept: IntArray
@@ -113,17 +119,21 @@ def reduce_groups(
     elastic = modes.elastic
     shift = _SHIFT * abs(float(elastic.eigenvalues[0]))
     highest = float(elastic.eigenvalues[: count + _SPARE][-1])
-    span = _Substructures(
-        model, kept, rigid, elastic.shapes / np.sqrt(np.abs(elastic.eigenvalues)), highest
-    )
+    known = elastic.shapes / np.sqrt(np.abs(elastic.eigenvalues))
+    span = _Substructures(model, kept, rigid, known, highest)
     exact = np.hstack([rigid, modes.shapes])
+    meet = GroupPriors(model).interfaces
     try:
-        whole = _Reduced(span, model, exact, shift)
+        whole = _Reduced(span, model, exact, exact.shape[1] - len(elastic), shift)
+        # With as many coordinates as borders may have these would take as long as all the rest.
+        wanting = meet.places if span.count < _BORDERS else ()
+        lacked = [_enlarge(whole, meet, place, count, highest, tolerance) for place in wanting]
     except la.LinAlgError:
         raise ModelError("the stiffness is not definite in coordinates of its groups") from None
-    meet = GroupPriors(model).interfaces
+    if lacked:
+        whole.add(np.hstack(lacked))
     for place in meet.places:
-        whole.blocks[_POWERS, place] = _soften(whole, span, meet, place)
+        whole.blocks[_POWERS, place] = _soften(whole, meet, place)
     for place, given in model.powers.items():
         bending = sum(k for power, (k, _) in given.items() if power > 1)
         whole.blocks[_POWERS, place] = span.reduce(bending)
@@ -137,7 +147,8 @@ def reduce_groups(
             what = f"the {name[0]} of group {name[1]!r} leaves no model"
             words = " or ".join(f"{factor:g}" for factor in factors)
             raise ModelError(f"{words} times {what}") from None
-        settled |= {(name, factor): own for factor, own in zip(factors, values, strict=True)}
+        if name[1] not in meet.places:  # whose mass moves with it
+            settled |= {(name, factor): own for factor, own in zip(factors, values, strict=True)}
         pieces.append(motions)
     joints = [n for n in model.groups if _factors(model, n) is JOINT_FACTORS]
     vectors = whole.strongest(pieces, joints, most, _LOST * tolerance)
@@ -180,13 +191,117 @@ def reduce_groups(
         for kind, own in (("stiffness", model.groups), ("mass", model.mass_groups))
     )
     moved += whole.lacking
+    shifted = small[_K] + shift * small[_M]
+    for place in meet.places:
+        patch = _Patch(model, meet, place, shift)
+        basis = span, vectors, shifted, small[_M], powers[place]
+        for left, force in patch.unbalance(*basis, count):
+            moved = max(moved, 0.5 * patch.energy(left, force))
     return GroupedReduction(kept, small[_K], small[_M], stiffness, mass, powers, moved)
 
 
-def _soften(whole: _Reduced, span: _Substructures, meet: Interfaces, place: str) -> _PartialMatrix:
+class _Patch:
+    """The surroundings of an interface, in which modes of a basis with it softened lack something.
+
+    Arguments:
+        model: the whole one.
+        place: one of the interfaces.
+        shift: s of A = K + s M, in rad^2/s^2.
+    """
+
+    def __init__(self, model: Model, meet: Interfaces, place: str, shift: float) -> None:
+        self.meet, self.place, self.shift = meet, place, shift
+        name, side = meet.sides[place]
+        stiffness = sp.csr_array(model.stiffness)
+        self.rows = _neighbourhood(stiffness, side, _SEAM)[-1]
+        self._across = stiffness[self.rows], sp.csr_array(model.mass)[self.rows]
+        whole = self._across[0] + shift * self._across[1]
+        self._reach, self._whole = np.unique(whole.indices), whole[:, self.rows]
+        self._pulled = sp.csc_array(model.groups[name])[:, side][self.rows]
+        self._held = self._pulled[np.searchsorted(self.rows, side)].toarray()
+
+    def unbalance(
+        self, span: _Substructures, vectors: FloatArray, shifted: FloatArray, mass: FloatArray,
+        powers: Powers, count: int,
+    ) -> Iterator[tuple[float, FloatArray]]:  # fmt: skip
+        """Yield what may be left of the interface, and forces that modes of unit energy then leave.
+
+        Arguments:
+            vectors: the basis, in coordinates, (N, k).
+            shifted, mass: in the basis, (k, k).
+            powers: what comes with powers of the softness, in the basis.
+        """
+        for left in INTERFACE_FACTORS:
+            grown = [((left - 1.0) ** p, *pair) for p, pair in powers.items()]
+            heavy = mass + sum(c * m for c, _, m in grown)
+            stiff = shifted + sum(c * (k + self.shift * m) for c, k, m in grown)
+            values, x = _ritz(heavy, stiff, self.shift, count)
+            shapes = span.lift(vectors @ (x / np.sqrt(values)), self._reach)
+            added = self.meet.forces(self.place, left)(shapes)
+            pull, inertia = (
+                part @ shapes + more[self.rows]
+                for part, more in zip(self._across, added, strict=True)
+            )
+            yield left, inertia * values - pull
+
+    def answers(self) -> Callable[[float, FloatArray], FloatArray]:
+        """Return what moves the patch, held outside, by forces, with so much of the interface left.
+
+        Source: Woodbury (1950), for the change of few rows by the interface.
+        """
+        solve = factorise_definite(sp.csc_array(self._whole)).solve
+        follow = solve(self._pulled.toarray())
+
+        def answer(left: float, force: FloatArray) -> FloatArray:
+            moved = solve(force)
+            gap = self._held - (1.0 - left) * (self._pulled.T @ follow)
+            apart = loose_inverse(gap) @ (self._pulled.T @ moved)
+            return np.asarray(moved + (1.0 - left) * (follow @ apart))
+
+        return answer
+
+    def energy(self, left: float, force: FloatArray) -> float:
+        """Return the energy of the patch by those of forces that move it most, nearly and at most.
+
+        Source: Hestenes & Stiefel (1952), J. Res. Nat. Bur. Stand. 49.
+        """
+        size, follow = self._whole.diagonal(), (1.0 - left) * loose_inverse(self._held)
+        worst = force[:, np.argmax(np.einsum("ij,ij->j", force, force / size[:, None]))]
+        softened = LinearOperator(
+            self._whole.shape, dtype=float,
+            matvec=lambda x: self._whole @ x - self._pulled @ (follow @ (self._pulled.T @ x)),
+        )  # fmt: skip
+        found, _ = cg(softened, worst, rtol=0.0, maxiter=_STEPS, M=sp.diags_array(1.0 / size))
+        return float(worst @ found)
+
+
+def _enlarge(
+    whole: _Reduced, meet: Interfaces, place: str, count: int, highest: float, tolerance: float
+) -> FloatArray:
+    """Return what coordinates lack of modes with an interface softened, of unit energy, (n, k)."""
+    span, patch = whole.span, _Patch(whole.model, meet, place, whole.shift)
+    block = _soften(whole, meet, place)
+    added = whole.vary(block, False, INTERFACE_FACTORS, count, highest)[1]
+    vectors = np.hstack([whole.base, added])
+    vectors = orthonormal(vectors, vectors.T @ (whole.shifted @ vectors), _DEPENDENT)
+    powers = meet.powers(place, lambda force: np.asarray(vectors.T @ span.forces(force)))
+    shifted, mass = (vectors.T @ (part @ vectors) for part in (whole.shifted, whole.mass))
+    found, answer = [], patch.answers()
+    for left, force in patch.unbalance(span, vectors, shifted, mass, powers, count):
+        lacked = answer(left, force)
+        energy, turn = la.eigh(lacked.T @ force)
+        strong = energy > _MISSED * tolerance
+        found.append(lacked @ (turn[:, strong] / np.sqrt(energy[strong])))
+    near = np.hstack(found)
+    motions = np.zeros((whole.model.size, near.shape[1]))
+    motions[patch.rows] = near
+    return motions
+
+
+def _soften(whole: _Reduced, meet: Interfaces, place: str) -> _PartialMatrix:
     """Return what the softer part of an interface resists by it, in the coordinates."""
     at = whole.blocks["stiffness", meet.sides[place][0]].at
-    return _PartialMatrix(at, meet.powers(place, lambda force: span.forces(force)[at])[1][0])
+    return _PartialMatrix(at, meet.powers(place, lambda f: whole.span.forces(f)[at])[1][0])
 
 
 _Name = tuple[str, str]
@@ -194,7 +309,9 @@ _K, _M, _POWERS = ("stiffness", ""), ("mass", ""), "powers"
 
 
 def _factors(model: Model, name: str) -> tuple[float, ...]:
-    """Return what a group of the stiffness may turn out to be, the softest first."""
+    """Return what a group of the stiffness or an interface may turn out to be, softest first."""
+    if name.startswith(Interfaces.PREFIX):
+        return INTERFACE_FACTORS
     return PART_FACTORS if GroupPriors(model).std(name) < _UNKNOWN else JOINT_FACTORS
 
 
@@ -332,11 +449,12 @@ class _Substructures:
         self.shapes.resize(self.size, self.count + len(new))
         self.insides.append(_Interior(rows, np.append(at, new), np.hstack([static, modes, more])))
 
-    def lift(self, coordinates: FloatArray) -> FloatArray:
-        """Return the motions of the whole model, (n, m)."""
+    def lift(self, coordinates: FloatArray, near: IntArray | None = None) -> FloatArray:
+        """Return the motions of the whole model; right at least at some rows and in their parts."""
         found = np.asarray(self.shapes @ coordinates)
         for part in self.insides:
-            found[part.rows] = part.motions @ coordinates[part.at]
+            if near is None or np.isin(part.rows, near).any():
+                found[part.rows] = part.motions @ coordinates[part.at]
         return found
 
     def add(self, vectors: FloatArray) -> None:
@@ -417,12 +535,7 @@ def _traces(
     """
     if len(rows) <= most:
         return sp.diags_array(1.0 / size[rows, 0])
-    near = [rows]
-    while len(near) < 3 or len(near[-1]) < min(_PATCH[0] * len(rows), _PATCH[1]):
-        near.append(np.unique(whole[near[-1]].indices))
-        if len(near[-1]) == len(near[-2]):  # nothing lies farther off
-            near.pop()
-            break
+    near = _neighbourhood(whole, rows, _PATCH)
     inner = near[-2] if len(near) > 1 else rows
     outer = np.setdiff1d(near[-1], inner)
     body = la.orth(rigid[rows] * size[rows], rcond=1e-9)
@@ -445,6 +558,17 @@ def _traces(
     shapes, strength, _ = la.svd(np.hstack(pieces), full_matrices=False)
     shapes = shapes[:, strength > _FAINT * strength[0]][:, : most - body.shape[1]]
     return sp.coo_array(np.hstack([body, shapes]) / size[rows])
+
+
+def _neighbourhood(whole: SparseArray, rows: IntArray, times: int) -> list[IntArray]:
+    """Return rows and ever more of those around them, until they are so many times as many."""
+    near = [rows]
+    while len(near) < 3 or len(near[-1]) < min(times * len(rows), _MOST_NEAR):
+        near.append(np.unique(whole[near[-1]].indices))
+        if len(near[-1]) == len(near[-2]):  # nothing lies farther off
+            near.pop()
+            break
+    return near
 
 
 def _held_modes(
@@ -478,10 +602,13 @@ class _Reduced:
     Arguments:
         span: the coordinates, to which those are added that its modes lack.
         exact: rigid motions and modes, (n, m).
+        rigid: number of the former, the first ones, with modes that are none but these.
         shift: s of A = K + s M, in rad^2/s^2.
     """
 
-    def __init__(self, span: _Substructures, model: Model, exact: FloatArray, shift: float) -> None:
+    def __init__(
+        self, span: _Substructures, model: Model, exact: FloatArray, rigid: int, shift: float
+    ) -> None:
         self.model, self.shift = model, shift
         kinds = (
             ("stiffness", model.stiffness, model.groups),
@@ -496,37 +623,43 @@ class _Reduced:
             for block in (*own.values(), span.reduce(_rest_of(whole, list(parts.values())))):
                 block.add_to(total)
             totals.append(total)
-        exact = exact / np.sqrt(np.einsum("ij,ij->j", exact, self.energy(exact)))
-        forces, new = self.energy(exact), exact
-        factor = la.cho_factor(totals[0] + shift * totals[1])
-        for _ in range(2):  # the second time what rounding left
-            new = new - span.lift(la.cho_solve(factor, span.forces(self.energy(new))))
-        gram = new.T @ self.energy(new)
+        self.span, self.stiffness, self.mass = span, *totals
+        self.exact = exact / np.sqrt(np.einsum("ij,ij->j", exact, self.energy(exact)))
+        self.inverse = la.cho_solve(
+            la.cho_factor(self.stiffness + shift * self.mass), np.eye(span.count)
+        )
         # What the coordinates lack of the energy of a mode raises its eigenvalue.
-        self.lacking = 0.5 * float(gram.diagonal().max(initial=0.0))
+        self.lacking = 0.5 * float(self.add(self.exact)[rigid:].max(initial=0.0))
+
+    def add(self, vectors: FloatArray) -> FloatArray:
+        """Take what motions of the whole model have beyond the coordinates; return its energy."""
+        span, new = self.span, vectors
+        for _ in range(2):  # the second time what rounding left
+            new = new - span.lift(self.inverse @ span.forces(self.energy(new)))
+        gram = new.T @ self.energy(new)
         values, turn = la.eigh(0.5 * (gram + gram.T))
         strong = values > _APART
         if strong.any():
             new = new @ (turn[:, strong] / np.sqrt(values[strong]))
             span.add(new)
-            for kind, _, parts in kinds:
-                for name, part in parts.items():
-                    block = self.blocks[kind, name]
-                    self.blocks[kind, name] = block.bordered(span.forces(part @ new))
-            everything = np.arange(len(totals[0]))
-            totals = [
+            model, everything = self.model, np.arange(len(self.mass))
+            parts = {"stiffness": model.groups, "mass": model.mass_groups}
+            for (kind, name), block in self.blocks.items():
+                self.blocks[kind, name] = block.bordered(span.forces(parts[kind][name] @ new))
+            self.stiffness, self.mass = (
                 _PartialMatrix(everything, total).bordered(span.forces(whole @ new)).inside
-                for total, (_, whole, _) in zip(totals, kinds, strict=True)
-            ]
-        self.stiffness, self.mass = totals
-        self.shifted = self.stiffness + shift * self.mass
-        factor = la.cho_factor(self.shifted)
-        self.inverse = la.cho_solve(factor, np.eye(span.count))
-        answers = np.hstack([self.inverse @ span.forces(forces), self.inverse[:, : len(span.kept)]])
+                for total, whole in ((self.stiffness, model.stiffness), (self.mass, model.mass))
+            )
+            # They cost no energy together with the others, and one alone.
+            self.inverse = la.block_diag(self.inverse, np.eye(new.shape[1]))
+        self.shifted = self.stiffness + self.shift * self.mass
+        forces = span.forces(self.energy(self.exact))
+        answers = np.hstack([self.inverse @ forces, self.inverse[:, : len(span.kept)]])
         self.base = orthonormal(answers, answers.T @ self.shifted @ answers, _DEPENDENT)
         # In answers to forces along the coordinates, the mass.
         self._half = self.inverse @ (self.mass @ self.base)
         self._heavy = self.inverse @ self.mass @ self.inverse
+        return np.asarray(gram.diagonal())
 
     def energy(self, vectors: FloatArray) -> FloatArray:
         """Return A times motions of the whole model, (n, m)."""

@@ -84,9 +84,7 @@ class Interfaces:
         pulled, carried = (
             part[near].toarray() if onto is None else onto(part) for part in (stiff, heavy)
         )
-        inside, size = stiff[rows].toarray(), np.sqrt(whole.diagonal()[rows])
-        inverse = la.pinvh(inside / np.outer(size, size), rtol=_LOOSE) / np.outer(size, size)
-        follow = pulled @ inverse
+        follow = pulled @ loose_inverse(stiff[rows].toarray())
         cross, moved = carried @ follow.T, follow @ heavy[rows].toarray() @ follow.T
         found = {1: (pulled @ follow.T, cross + cross.T), 2: (0.0 * moved, moved)}
         if onto is not None:
@@ -96,6 +94,35 @@ class Interfaces:
             power: (sp.csc_array(pick @ k @ pick.T), sp.csc_array(pick @ m @ pick.T))
             for power, (k, m) in ((p, map(sp.csr_array, pair)) for p, pair in found.items())
         }
+
+    def forces(
+        self, place: str, left: float
+    ) -> Callable[[FloatArray], tuple[FloatArray, FloatArray]]:
+        """Return what K x and M x grow by where so much of an interface is left, by motions x.
+
+        Arguments:
+            place: one of `sides`.
+            left: f, 0 to 1.
+        """
+        name, rows = self.sides[place]
+        part = self.model.groups[name]
+        heavy, pulled = self.model.mass_groups.get(name, 0.0 * part), sp.csc_array(part)[:, rows]
+        inverse = (left - 1.0) * loose_inverse(pulled[rows].toarray())
+
+        def added(motions: FloatArray) -> tuple[FloatArray, FloatArray]:
+            apart = np.zeros_like(motions)
+            apart[rows] = inverse @ (pulled.T @ motions)
+            carried = heavy @ (motions + apart)
+            return part @ apart, heavy @ apart + pulled @ (inverse @ carried[rows])
+
+        return added
+
+
+def loose_inverse(stiffness: FloatArray) -> FloatArray:
+    """Return the inverse of a stiffness, zero for motions that it does not resist, (p, p)."""
+    size = np.sqrt(stiffness.diagonal())
+    size = np.outer(size, size)
+    return np.asarray(la.pinvh(stiffness / size, rtol=_LOOSE) / size)
 
 
 @cache_by_model
