@@ -51,9 +51,9 @@ BUDGETS = {
     "papers": 3_249,
     "scenarios": 750,
     "femubench": 320,
-    "tests": 50_195,
+    "tests": 50_196,
     "truths": 14_348,
-    "benchmarks": 7_998,
+    "benchmarks": 8_000,
 }
 ADVICE = (
     "shorten the room: take out what nothing calls, make one of what is there twice; where a "

@@ -82,7 +82,9 @@ def main() -> None:
         run = femubench.rank([f"suite/{name}" for name in DRAWN], STRATEGIES, jobs=1, **words)
         rows_of(run).to_csv(DATA, index=False, lineterminator="\n")
     boards = [rows_of(femubench.read_run(file_of(name))) for name in ("suite", "after")]
-    put("solid-drawings", table_of(pd.read_csv(DATA), pd.concat(boards)), PAGE)
+    text = table_of(pd.read_csv(DATA), pd.concat(boards))
+    put("solid-drawings", text, PAGE)
+    print(text)
 
 
 if __name__ == "__main__":

@@ -40,6 +40,7 @@ SHORT = {
     "response_sweep": "1 --structures gable --budget 0",
     "run_cost": "frame -s unchanged --null-jobs 2",
     "scaling": "'modes of a lattice' 3",
+    "solid_drawings": "",
     "store": "--results 500 --times 0",
     "time_left": "frame",
     "truth_sweep": "run fixed-3-mass-2 --set shear --jobs 1 --results truth.jsonl",

@@ -65,7 +65,7 @@ _STRONG = 1e-3  # of the energy of a mode, its root, from which on an inside has
 _SHARE = 1e-4  # of the energy of an answer to forces on a group that the group itself has
 _WEAK = 1e-6  # of the energy of a mode, below which a group adds no motion
 _SOFT = 0.1  # times its stiffness: a joint when motions are weighed
-_STEPS = 32  # of conjugate gradients
+_STEPS = 128  # of conjugate gradients: more add a hundredth of the energy
 _MISSED = 0.1  # of the tolerance: energy that a mode lacks near a soft interface, and gets
 _LOST = 1e-3  # of the tolerance: energy of motions that are left out
 
