@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from boards import file_of, put
+from sweep_data import as_markdown
 
 import femubench
 from truths.solid_drawing import DECK, DRAWN
@@ -23,7 +24,7 @@ DATA, PAGE = ROOT / "docs" / "data" / "solid-drawings.csv", ROOT / "docs" / "sce
 STRATEGIES = ("unchanged", "global", "bayesian", "bayesian-sampling", "diagnosed")
 STRATEGIES += ("eigensensitivity", "sparse", "cross-model", "baruch")
 ERRORS, PHYSICAL = ["higher", "modified"], STRATEGIES[2:5]
-HEAD = "| structure | nodes | groups | beams | best on beams | solid | best on the solid |"
+COLUMNS = ("structure", "nodes", "groups", "beams", "best on beams", "solid", "best on the solid")
 
 
 def rows_of(run: femubench.Run) -> pd.DataFrame:
@@ -43,14 +44,13 @@ def rows_of(run: femubench.Run) -> pd.DataFrame:
 
 def table_of(solids: pd.DataFrame, beams: pd.DataFrame) -> str:
     """Return the table of the page, and what it comes to."""
-    drawn, best, names = [], [], sorted(set(solids["structure"]))
+    drawn, best, rows, names = [], [], [], sorted(set(solids["structure"]))
     for jobs in (beams, solids):
         own = jobs[jobs["structure"].isin(names)].set_index("structure").sort_index()
         drawn.append(own[own["strategy"] == "unchanged"])
         done = own[own["status"] == "ok"]
         done = done.assign(mean=np.log(done[ERRORS]).mean(axis=1)).sort_values("mean")
         best.append(done[~done.index.duplicated()].sort_index())
-    lines = [HEAD, "|---" * 7 + "|"]
     for name in names:
         deck = (SUITE / name / DECK).read_text(encoding="utf-8")
         nodes = deck.partition("*ELEMENT")[0].count("\n") - 1
@@ -59,7 +59,7 @@ def table_of(solids: pd.DataFrame, beams: pd.DataFrame) -> str:
         for pair in zip(drawn, best, strict=True):
             for table, word in zip(pair, ("", f" `{pair[1].strategy[name]}`"), strict=True):
                 cells.append(f"{table.higher[name]:.1f} / {table.modified[name]:.1f}{word}")
-        lines.append(f"| {' | '.join(cells)} |")
+        rows.append(dict(zip(COLUMNS, cells, strict=True)))
     ratios = [np.exp(np.log(s[ERRORS] / b[ERRORS]).to_numpy().mean()) for b, s in (drawn, best)]
     fine = (solids["status"] == "ok").groupby(solids["strategy"])
     text = (
@@ -69,7 +69,7 @@ def table_of(solids: pd.DataFrame, beams: pd.DataFrame) -> str:
         + ", ".join(f"`{s}` {fine.sum()[s]} of {fine.size()[s]}" for s in PHYSICAL)
         + "."
     )
-    return "\n".join([*lines, "", textwrap.fill(text, 118, break_long_words=False)])
+    return f"{as_markdown(rows)}\n\n{textwrap.fill(text, 118, break_long_words=False)}"
 
 
 def main() -> None:

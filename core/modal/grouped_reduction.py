@@ -231,16 +231,16 @@ class _Patch:
             shifted, mass: in the basis, (k, k).
             powers: what comes with powers of the softness, in the basis.
         """
+        grow = self.meet.forces(self.place)
         for left in INTERFACE_FACTORS:
             grown = [((left - 1.0) ** p, *pair) for p, pair in powers.items()]
             heavy = mass + sum(c * m for c, _, m in grown)
             stiff = shifted + sum(c * (k + self.shift * m) for c, k, m in grown)
             values, x = _ritz(heavy, stiff, self.shift, count)
             shapes = span.lift(vectors @ (x / np.sqrt(values)), self._reach)
-            added = self.meet.forces(self.place, left)(shapes)
             pull, inertia = (
                 part @ shapes + more[self.rows]
-                for part, more in zip(self._across, added, strict=True)
+                for part, more in zip(self._across, grow(left, shapes), strict=True)
             )
             yield left, inertia * values - pull
 

@@ -95,22 +95,19 @@ class Interfaces:
             for power, (k, m) in ((p, map(sp.csr_array, pair)) for p, pair in found.items())
         }
 
-    def forces(
-        self, place: str, left: float
-    ) -> Callable[[FloatArray], tuple[FloatArray, FloatArray]]:
-        """Return what K x and M x grow by where so much of an interface is left, by motions x.
+    def forces(self, place: str) -> Callable[[float, FloatArray], tuple[FloatArray, FloatArray]]:
+        """Return what K x and M x grow by, by f, how much of an interface is left, and motions x.
 
         Arguments:
             place: one of `sides`.
-            left: f, 0 to 1.
         """
         name, rows = self.sides[place]
         part = self.model.groups[name]
         heavy, pulled = self.model.mass_groups.get(name, 0.0 * part), sp.csc_array(part)[:, rows]
-        inverse = (left - 1.0) * loose_inverse(pulled[rows].toarray())
+        whole = loose_inverse(pulled[rows].toarray())
 
-        def added(motions: FloatArray) -> tuple[FloatArray, FloatArray]:
-            apart = np.zeros_like(motions)
+        def added(left: float, motions: FloatArray) -> tuple[FloatArray, FloatArray]:
+            inverse, apart = (left - 1.0) * whole, np.zeros_like(motions)
             apart[rows] = inverse @ (pulled.T @ motions)
             carried = heavy @ (motions + apart)
             return part @ apart, heavy @ apart + pulled @ (inverse @ carried[rows])
