@@ -359,12 +359,14 @@ def _modes(
         own = slice(stop - len(projection.hypothesis.grid), stop)
         known = projection.rows
         rows = np.hstack([known[:, :low], known[:, n:], known[:, low:n] @ response])
+        # Terms are fewer than candidates, and what they do is smaller in the small basis.
+        within = replace(projection, rows=rows, cores=rows.T @ (projection.cores @ rows))
         factors = projection.hypothesis.grid_factors
         for target, start, kind in ((stiffness, base, False), (mass, unit, True)):
-            core = projection.core(factors, mass=kind)
             if kind and not heavy:
                 continue
-            target[own] = start if core is None else start + rows.T @ (core @ rows)
+            change = within.core(factors, mass=kind)
+            target[own] = start if change is None else start + change
     values, vectors = _solve(stiffness, mass if heavy else None, low)
     readings = np.zeros((len(members), len(space.readings), size))
     readings[:, :, :low] = space.readings[:, :low]
