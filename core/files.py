@@ -182,9 +182,9 @@ def check_writable(path: Path) -> None:
     if path.is_dir():
         raise InputError("is a folder", file=path, expected="the name of a file")
     if not path.parent.is_dir():
-        raise InputError("folder does not exist", file=path.parent, expected="an existing folder")
+        raise InputError("its folder does not exist", file=path, expected="an existing folder")
     if not os.access(path.parent, os.W_OK | os.X_OK):
-        raise InputError("folder cannot be written to", file=path.parent)
+        raise InputError("its folder cannot be written to", file=path)
 
 
 def check_can_make(folder: Path) -> None:

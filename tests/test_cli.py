@@ -178,7 +178,7 @@ class TestWrongInput:
             ),
             (["some/where"], "some/where: folder does not exist"),
             (["empty"], "empty/case.toml: missing file"),
-            (["case", "--json", "no/such.json"], "no: folder does not exist"),
+            (["case", "--json", "no/such.json"], "no/such.json: its folder does not exist"),
             (["case", "--report", "report.docx"], "no report format has the suffix '.docx'"),
             (["case", "--json", "x.json", "--report", "x.json"], "is to hold two outputs"),
             (["case", "twin"], "the name 'rod' is also that of case"),

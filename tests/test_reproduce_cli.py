@@ -145,7 +145,7 @@ class TestWrongInput:
             (["zebra"], "no paper 'zebra'; there are frame, hframe"),
             ([""], "no paper ''"),
             (["frame", "hframe"], "unexpected extra argument"),
-            (["--json", "no/such.json"], "no: folder does not exist"),
+            (["--json", "no/such.json"], "no/such.json: its folder does not exist"),
             (["--json", "."], "is a directory"),
             (["--output", "file"], "is a file"),
             (["--output", "file/x"], "file: cannot be written to"),

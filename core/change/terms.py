@@ -12,7 +12,6 @@ from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
-
 _FULL = 0.25  # share of entries from which on products with the dense matrix are faster
 
 

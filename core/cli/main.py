@@ -128,7 +128,10 @@ def _exit_code(call: Callable[[], Any], kwargs: dict[str, Any]) -> int:
         fault.show()
         return WRONG_INPUT
     except click.ClickException as fault:
-        click.echo(f"bench: {' '.join(fault.format_message().split())}", err=True)
+        words = fault.format_message().split()
+        if isinstance(fault, click.NoSuchOption) and not fault.possibilities and fault.ctx:
+            words.append(f"({fault.ctx.command_path} --help lists all)")
+        click.echo(f"bench: {' '.join(words)}", err=True)
         return WRONG_INPUT
     except (click.Abort, KeyboardInterrupt):
         click.echo("bench: interrupted", err=True)

@@ -65,6 +65,7 @@ _STRONG = 1e-3  # of the energy of a mode, its root, from which on an inside has
 _SHARE = 1e-4  # of the energy of an answer to forces on a group that the group itself has
 _WEAK = 1e-6  # of the energy of a mode, below which a group adds no motion
 _SOFT = 0.1  # times its stiffness: a joint when motions are weighed
+_PARTS = 8  # of rows of a matrix of all coordinates, one after the other
 _STEPS = 128  # of conjugate gradients: more add a hundredth of the energy
 _MISSED = 0.1  # of the tolerance: energy that a mode lacks near a soft interface, and gets
 _LOST = 1e-3  # of the tolerance: energy of motions that are left out
@@ -111,20 +112,10 @@ def reduce_groups(
     """
     rigid = rigid_body_vectors(model.dofs)
     kept = _hold_rigid(kept, rigid)
-    nominal = max(count + _SPARE, min(_NOMINAL, most - len(kept) - 2 * rigid.shape[1]))
-    modes = solve_modes(model, nominal + int(rigid.shape[1]))
-    least = len(kept) + len(modes) + rigid.shape[1]
-    if least > most:
-        raise ModelError(f"sensors, attachments and modes take {least} coordinates of {most}")
-    elastic = modes.elastic
-    shift = _SHIFT * abs(float(elastic.eigenvalues[0]))
-    highest = float(elastic.eigenvalues[: count + _SPARE][-1])
-    known = elastic.shapes / np.sqrt(np.abs(elastic.eigenvalues))
-    span = _Substructures(model, kept, rigid, known, highest)
-    exact = np.hstack([rigid, modes.shapes])
     meet = GroupPriors(model).interfaces
     try:
-        whole = _Reduced(span, model, exact, exact.shape[1] - len(elastic), shift)
+        whole, highest = _reduce_to_borders(model, kept, rigid, count, most)
+        span, shift = whole.span, whole.shift
         # With as many coordinates as borders may have these would take as long as all the rest.
         wanting = meet.places if span.count < _BORDERS else ()
         lacked = [_enlarge(whole, meet, place, count, highest, tolerance) for place in wanting]
@@ -198,6 +189,24 @@ def reduce_groups(
         for left, force in patch.unbalance(*basis, count):
             moved = max(moved, 0.5 * patch.energy(left, force))
     return GroupedReduction(kept, small[_K], small[_M], stiffness, mass, powers, moved)
+
+
+def _reduce_to_borders(
+    model: Model, kept: IntArray, rigid: FloatArray, count: int, most: int
+) -> tuple[_Reduced, float]:
+    """Return a model in coordinates of its groups, and the eigenvalue that has to be right last."""
+    nominal = max(count + _SPARE, min(_NOMINAL, most - len(kept) - 2 * rigid.shape[1]))
+    modes = solve_modes(model, nominal + int(rigid.shape[1]))
+    least = len(kept) + len(modes) + rigid.shape[1]
+    if least > most:
+        raise ModelError(f"sensors, attachments and modes take {least} coordinates of {most}")
+    elastic = modes.elastic
+    shift = _SHIFT * abs(float(elastic.eigenvalues[0]))
+    highest = float(elastic.eigenvalues[: count + _SPARE][-1])
+    known = elastic.shapes / np.sqrt(np.abs(elastic.eigenvalues))
+    span = _Substructures(model, kept, rigid, known, highest)
+    exact = np.hstack([rigid, modes.shapes])
+    return _Reduced(span, model, exact, exact.shape[1] - len(elastic), shift), highest
 
 
 class _Patch:
@@ -471,8 +480,11 @@ class _Substructures:
         """Return what forces on the whole model do along the coordinates, (N, m)."""
         found = self.shapes.T @ force
         found = found.toarray() if sp.issparse(found) else np.asarray(found)
+        touched = np.zeros(self.size, dtype=bool)
+        touched[force.nonzero()[0]] = True
         for part in self.insides:
-            found[part.at] += part.motions.T @ force[part.rows]
+            if touched[part.rows].any():
+                found[part.at] += part.motions.T @ force[part.rows]
         return found
 
     def reduce(self, matrix: SparseArray) -> _PartialMatrix:
@@ -615,18 +627,16 @@ class _Reduced:
             ("mass", model.mass, model.mass_groups),
         )
         self.blocks: dict[_Name, _PartialMatrix] = {}
-        totals = []
-        for kind, whole, parts in kinds:
+        self.span = span
+        self.stiffness, self.mass = (np.zeros((span.count,) * 2) for _ in kinds)
+        for total, (kind, whole, parts) in zip((self.stiffness, self.mass), kinds, strict=True):
             own = {(kind, name): span.reduce(part) for name, part in parts.items()}
             self.blocks |= own
-            total = np.zeros((span.count,) * 2)
             for block in (*own.values(), span.reduce(_rest_of(whole, list(parts.values())))):
                 block.add_to(total)
-            totals.append(total)
-        self.span, self.stiffness, self.mass = span, *totals
         self.exact = exact / np.sqrt(np.einsum("ij,ij->j", exact, self.energy(exact)))
         self.inverse = la.cho_solve(
-            la.cho_factor(self.stiffness + shift * self.mass), np.eye(span.count)
+            la.cho_factor(self.shifted, overwrite_a=True), np.eye(span.count), overwrite_b=True
         )
         # What the coordinates lack of the energy of a mode raises its eigenvalue.
         self.lacking = 0.5 * float(self.add(self.exact)[rigid:].max(initial=0.0))
@@ -652,14 +662,20 @@ class _Reduced:
             )
             # They cost no energy together with the others, and one alone.
             self.inverse = la.block_diag(self.inverse, np.eye(new.shape[1]))
-        self.shifted = self.stiffness + self.shift * self.mass
         forces = span.forces(self.energy(self.exact))
         answers = np.hstack([self.inverse @ forces, self.inverse[:, : len(span.kept)]])
         self.base = orthonormal(answers, answers.T @ self.shifted @ answers, _DEPENDENT)
         # In answers to forces along the coordinates, the mass.
         self._half = self.inverse @ (self.mass @ self.base)
-        self._heavy = self.inverse @ self.mass @ self.inverse
+        self._heavy = self.inverse @ self.mass
+        for rows in np.array_split(self._heavy, _PARTS):  # in place: few matrices are as large
+            rows[:] = rows @ self.inverse
         return np.asarray(gram.diagonal())
+
+    @property
+    def shifted(self) -> FloatArray:
+        """Return A in the coordinates, (N, N)."""
+        return np.asarray(self.stiffness + self.shift * self.mass)
 
     def energy(self, vectors: FloatArray) -> FloatArray:
         """Return A times motions of the whole model, (n, m)."""
@@ -712,13 +728,15 @@ class _Reduced:
     ) -> FloatArray:
         """Return the base and the motions of most energy, orthonormal in A, (N, k).
 
+        Nothing can be varied or added after it.
+
         Arguments:
             pieces: motions of the energy that modes have in them.
             joints: groups in which energy weighs less, as when they are soft.
             most: k at most.
             lost: energy below which a motion is left out.
         """
-        weight = self.shifted.copy()
+        weight = self.shifted
         for name in joints:
             self.blocks["stiffness", name].add_to(weight, _SOFT - 1.0)
         added, base = np.hstack(pieces), self.base
@@ -727,6 +745,7 @@ class _Reduced:
         values, turn = la.eigh(added.T @ (weight @ added))
         strong = np.flatnonzero(values > lost)[::-1][: most - base.shape[1]]
         found = np.hstack([base, added @ (turn[:, strong] / np.sqrt(values[strong]))])
+        del self.inverse, self._heavy  # as large as all groups together, and asked no more
         return orthonormal(found, found.T @ (self.shifted @ found), _DEPENDENT)
 
 
