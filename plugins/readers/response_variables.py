@@ -138,7 +138,7 @@ def _over_frequency(found: Mapping[str, Any], path: Path) -> FrequencyResponses:
     second = _side(found, "references", values.shape[2], path)
     quantity = _quantity(found, "values", path)
     return FrequencyResponses(
-        first, second, hz, values.astype(complex), quantity, *(s.real for s in stds)
+        first, second, hz, values.astype(complex), quantity, np.real(stds[0]) if stds else None
     )
 
 

@@ -141,7 +141,8 @@ class Motions:
         """Add the translations of a node, which some nodes follow."""
         for d, axes in enumerate(np.eye(6)[:3]):
             if (node, d) not in self.held:
-                self.add(Motion(node, d, xyz, axes), dict.fromkeys(moved, axes[:3]))
+                along: FloatArray = axes[:3]
+                self.add(Motion(node, d, xyz, axes), dict.fromkeys(moved, along))
 
     def matrix(self) -> tuple[list[Motion], SparseArray]:
         """Return the degrees of freedom and what they do to all rows of solids, (3 N, n)."""
@@ -404,8 +405,8 @@ def thicken(
     line_of: dict[tuple[int, int], NodeLine] = {}
     for node, meeting in ends.items():
         for part in _parts(meeting, elements, thickness):
-            mean = sum(normal for _, _, normal in part)
-            normal = np.asarray(mean / np.linalg.norm(mean))
+            mean = np.sum([normal for _, _, normal in part], axis=0)
+            normal: FloatArray = np.divide(mean, np.linalg.norm(mean))
             three = next_node, next_node + 1, next_node + 2
             line = NodeLine(three, normal, thickness[part[0][0]])
             next_node += 3

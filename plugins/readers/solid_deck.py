@@ -412,12 +412,12 @@ def factors_of(before: Model, model: Model) -> tuple[dict[str, float], dict[str,
         if set(own) != set(parts) or made.shape != whole.shape:
             return None
         factors = {n: float(own[n].diagonal().sum() / k.diagonal().sum()) for n, k in parts.items()}
-        grown = sum(((factors[n] - 1.0) * k for n, k in parts.items()), start=whole)
+        grown = whole + sum((factors[n] - 1.0) * k for n, k in parts.items())
         every = float(made.diagonal().sum() / grown.diagonal().sum())  # a factor on all there is
         every = 1.0 if abs(every - 1.0) < _SAME else every
         factors = {n: every * factor for n, factor in factors.items()}
         factors = {n: 1.0 if abs(f - 1.0) < _SAME else f for n, f in factors.items()}
-        grown = sum(((factors[n] - 1.0) * k for n, k in parts.items()), start=whole)
+        grown = whole + sum((factors[n] - 1.0) * k for n, k in parts.items())
         if abs(grown - made).max() > _SAME * abs(made).max():
             return None
         found.append(factors)

@@ -9,6 +9,7 @@ from functools import partial
 from typing import ClassVar
 
 import numpy as np
+import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.optimize import minimize
 from scipy.sparse.linalg import splu
@@ -101,7 +102,9 @@ class ConstitutiveError(ParametricStrategy):
             added = ~chosen & (left >= self.localise * left.max())
             chosen = chosen | added
 
-            def along(z: FloatArray, own: FloatArray = chosen) -> tuple[float, FloatArray]:
+            def along(
+                z: FloatArray, own: npt.NDArray[np.bool_] = chosen
+            ) -> tuple[float, FloatArray]:
                 point = x.copy()
                 point[own] = z
                 value, slope, _ = of(parts, measurement, energy, point)

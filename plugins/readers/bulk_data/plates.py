@@ -272,7 +272,7 @@ class BulkPlates(BulkData):
         scaled = whole / np.outer(size, size)
         if np.linalg.eigvalsh(scaled).min() < _LINE:
             raise card.error("the grids lie on one line", "three grids that do not", "G")
-        of = {number: np.asarray(np.linalg.solve(whole, part)) for number, part in own.items()}
+        of = {n: np.asarray(np.linalg.solve(whole, p), np.float64) for n, p in own.items()}
         self._follow(card, grid, along, of)
 
     def _follow(
