@@ -5,10 +5,13 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+import scipy.linalg as la
 import scipy.sparse as sp
+from large_structures import brick_ladder
 from scipy.sparse.linalg import splu
 
 from femubench import fem
@@ -99,8 +102,8 @@ class Spy:
         self.most_held = 0
         start, factorise = LU.__init__, Cholesky.factorise
 
-        def counted_start(factor: LU, matrix: sp.csc_array, *, pivot: float = 0.0) -> None:
-            start(factor, matrix, pivot=pivot)
+        def counted_start(factor: LU, matrix: sp.csc_array, **given: Any) -> None:
+            start(factor, matrix, **given)
             self.made.append(True)
             self.held.add(factor)
             self.most_held = max(self.most_held, len(self.held))
@@ -200,6 +203,23 @@ def vanishing_pivots(seed: int) -> tuple[Model, float]:
     diagonal = np.append(np.full(tiny, np.nextafter(1.0, 2.0)), np.full(n - tiny, 4.05))
     stiffness = sp.csc_array(low + low.T + sp.diags_array(diagonal))
     return fem.matrix_model(sp.eye_array(n), stiffness, range(n), ["x"] * n), 1.0
+
+
+def test_planes_order_a_thick_solid(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They fill less than minimum degree, and answers and counts stay."""
+    use(monkeypatch, "SuperLU")
+    solid = brick_ladder(2, 4, 3)
+    force = np.random.default_rng(0).standard_normal((solid.size, 2))
+    answers, fills, counts = [], [], []
+    for large in (solid.size, solid.size + 1):
+        monkeypatch.setattr(sparse_eigen, "_LARGE", large)
+        shifted = ShiftedModel(solid, -1e6)
+        answers.append(shifted.solve(force))
+        fills.append(shifted._factor._factor.L.nnz)
+        counts.append(shifted.move(1e9).eigenvalues_below())
+    assert la.norm(answers[1] - answers[0]) < 1e-9 * la.norm(answers[1])
+    assert fills[0] < 0.9 * fills[1]
+    assert counts == [7, 7]
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
 from femubench.core.modal.superlu_pivots import pivots
-from femubench.core.typing import FloatArray, SparseArray
+from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
@@ -100,6 +100,7 @@ class LU:
     Arguments:
         matrix: symmetric, sparse, (n, n).
         pivot: share of the largest entry of its column below which a diagonal entry is no pivot.
+        order: in which rows are eliminated, (n,); None for minimum degree.
 
     Raises:
         RuntimeError: when the matrix is singular.
@@ -107,19 +108,26 @@ class LU:
     Source: Li (2005), SuperLU; symmetric mode with minimum degree on the pattern.
     """
 
-    def __init__(self, matrix: SparseArray, *, pivot: float = 0.0) -> None:
+    def __init__(
+        self, matrix: SparseArray, *, pivot: float = 0.0, order: IntArray | None = None
+    ) -> None:
         from scipy.sparse.linalg import splu
 
+        self._order = order
         self._factor = splu(
-            sp.csc_matrix(matrix),
-            permc_spec="MMD_AT_PLUS_A",
+            sp.csc_matrix(matrix if order is None else sp.csc_array(matrix)[order][:, order]),
+            permc_spec="MMD_AT_PLUS_A" if order is None else "NATURAL",
             diag_pivot_thresh=pivot,
             options={"SymmetricMode": True},
         )
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return the inverse times one or several right sides, (n,) or (n, m)."""
-        return np.asarray(self._factor.solve(np.ascontiguousarray(right)))
+        if self._order is None:
+            return np.asarray(self._factor.solve(np.ascontiguousarray(right)))
+        answer = np.empty(right.shape)
+        answer[self._order] = self._factor.solve(right[self._order])
+        return answer
 
     @property
     def negative(self) -> int | None:
@@ -130,16 +138,21 @@ class LU:
 
 
 class DefiniteLU:
-    """L U of positive definite matrices by SuperLU; no pivot of such a matrix is negative."""
+    """L U of positive definite matrices by SuperLU; no pivot of such a matrix is negative.
 
-    def __init__(self) -> None:
+    Arguments:
+        order: as for `LU`.
+    """
+
+    def __init__(self, order: IntArray | None = None) -> None:
         self._factor: LU | None = None
+        self._order = order
 
     def factorise(self, matrix: SparseArray) -> bool:
         """Put another matrix into the place of the last; False where it is not definite."""
         self._factor = None
         try:
-            factor = LU(matrix)
+            factor = LU(matrix, order=self._order)
         except RuntimeError:
             return False
         self._factor = factor if factor.negative == 0 else None

@@ -14,9 +14,10 @@ from femubench.core.errors import ModelError
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.factorisation import LU, Cholesky, DefiniteLU, Symmetric, cholmod_obstacle
 from femubench.core.modal.inertia import Change, negative_after, negative_by_pins, signs_hold
+from femubench.core.modal.nested_dissection import dissect
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.modal.smooth_fields import softest_smooth_field
-from femubench.core.typing import FloatArray, SparseArray
+from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 _RIGID_RESIDUAL = 1e-12
 _MODE_RESIDUAL = 1e-6
@@ -27,6 +28,7 @@ _ROUNDS = 12
 _RESTARTS = 100  # of Lanczos, for eigenvalues below a shift
 _SEPARATE = 1e-5  # of an eigenvalue: closer ones are counted as one
 _ROUNDING = 1e-13  # of the largest k/m, below which K - shift M may be indefinite by rounding
+_LARGE, _THICK = 50_000, 60  # rows, and entries of one, from which on planes order solids best
 _FLAT = 1e-3  # extent of a planar structure across its plane, over its size
 
 
@@ -50,7 +52,10 @@ class ShiftedModel:
         """
         for kept in ("_factor", "_woodbury"):
             self.__dict__.pop(kept, None)
-        return ShiftedModel(self.model, shift, self._cholesky)
+        moved = ShiftedModel(self.model, shift, self._cholesky)
+        if "_order" in vars(self):  # of the pattern, which stays
+            vars(moved)["_order"] = self._order
+        return moved
 
     @property
     def _matrix(self) -> SparseArray:
@@ -69,12 +74,21 @@ class ShiftedModel:
         )
 
     @cached_property
+    def _order(self) -> IntArray | None:
+        """Return the order of rows for SuperLU where the model is a large solid."""
+        stiffness, dofs = self.model.stiffness, self.model.dofs
+        size, entries = self.model.size, stiffness.nnz
+        if size < _LARGE or entries < _THICK * size or not np.isfinite(dofs.xyz).all():
+            return None
+        return dissect(stiffness, dofs.node, dofs.xyz)
+
+    @cached_property
     def _factor(self) -> Symmetric:
         # Above the lowest eigenvalue there is no Cholesky factorisation.
         if self.shift <= 0.0 and (cholesky := self._cholesky) and cholesky.factorise(self._matrix):
             return cholesky
         try:
-            return LU(self._matrix)
+            return LU(self._matrix, order=self._order)
         except RuntimeError as error:
             raise ModelError(
                 "K - shift M is singular: a degree of freedom has neither mass nor stiffness"
@@ -124,7 +138,7 @@ class ShiftedModel:
         if below is None or (below and not signs_hold(self._factor, matrix)):
             for kept in ("_factor", "_woodbury"):  # one factorisation at a time
                 self.__dict__.pop(kept, None)
-            return negative_by_pins(DefiniteLU(), matrix, change, self.model, about)
+            return negative_by_pins(DefiniteLU(self._order), matrix, change, self.model, about)
         if self._woodbury is None or change is None:
             return below
         return negative_after(below, change[1], self._woodbury[1])
