@@ -510,7 +510,10 @@ class _Substructures:
 
 def _rest_of(whole: SparseArray, parts: Sequence[SparseArray]) -> SparseArray:
     """Return what parts leave of a matrix, without what rounding left."""
-    found = sp.coo_array(whole - sum(parts, sp.csc_array(whole.shape)))
+    pieces = [sp.csc_array(whole.shape), *parts]
+    while len(pieces) > 1:  # in pairs: a sum that grows part by part would be copied as often
+        pieces = [sum(pieces[i + 1 : i + 2], pieces[i]) for i in range(0, len(pieces), 2)]
+    found = sp.coo_array(whole - pieces[0])
     size = np.sqrt(np.abs(whole.diagonal()))
     real = np.abs(found.data) > 1e-10 * size[found.row] * size[found.col]
     return sp.csc_array((found.data[real], (found.row[real], found.col[real])), shape=found.shape)
@@ -635,9 +638,10 @@ class _Reduced:
             for block in (*own.values(), span.reduce(_rest_of(whole, list(parts.values())))):
                 block.add_to(total)
         self.exact = exact / np.sqrt(np.einsum("ij,ij->j", exact, self.energy(exact)))
-        self.inverse = la.cho_solve(
-            la.cho_factor(self.shifted, overwrite_a=True), np.eye(span.count), overwrite_b=True
-        )
+        self.inverse = la.lapack.dpotri(
+            la.cholesky(self.shifted, lower=True), lower=True, overwrite_c=True
+        )[0]
+        self.inverse += np.tril(self.inverse, -1).T
         # What the coordinates lack of the energy of a mode raises its eigenvalue.
         self.lacking = 0.5 * float(self.add(self.exact)[rigid:].max(initial=0.0))
 
