@@ -167,8 +167,8 @@ def test_failing_tests_of_the_repository_fail_the_job(repository: Repository) ->
     code, stated, _ = repository.act(tests="own_test.py -p no:cacheprovider")
     assert code == 1
     assert "a test of the repository" in stated
-    # The result file is made all the same.
-    assert stated.splitlines()[-1] == "accepted: submission.json"
+    # The result file is made all the same; a slow machine reports how far it is, too.
+    assert "accepted: submission.json" in stated.splitlines()
 
 
 @pytest.mark.nightly

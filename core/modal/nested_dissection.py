@@ -2,7 +2,7 @@
 
 A plane across the structure parts its nodes in two; those behind it with a neighbour before it
 come last, and both parts are cut again. Minimum degree, which sees only what is next to a node, is
-as good on frames and thin walls, and fills up to 1.6 times as much where bodies are thick.
+as good or better on frames and thin walls, and fills up to 1.6 times as much in thick bodies.
 
 Source: George (1973), SIAM J. Numer. Anal. 10, for the order; Heath & Raghavan (1995), SIAM J.
 Matrix Anal. Appl. 16, for planes across coordinates.
