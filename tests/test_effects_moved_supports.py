@@ -116,7 +116,12 @@ def test_every_shift_of_the_roller(noise: float, count: int) -> None:
     """What no reading can show at this noise is no cause, and nothing else is named for it."""
     for seed, shift in enumerate((-0.15, -0.093, -0.05, -0.02, 0.02, 0.05, 0.093, 0.15)):
         found = tell(beam(), [ROLLER], [ROLLER + shift], noise, seed, count)
-        check_moved(found, "support:m0@0.6", shift)
+        # By 2 cm all frequencies together change by 12 to 16 of chi-square at this noise: one draw
+        # in five cannot be distinguished from the reference.
+        if noise > 0.01 and abs(shift) < 0.03 and not found.states.differs:
+            assert (found.verdict, found.causes) == ("none", ())
+        else:
+            check_moved(found, "support:m0@0.6", shift)
     for seed in range(20, 28):
         assert tell(beam(), [ROLLER], [ROLLER], noise, seed, count).verdict == "none"
     for shift in (-0.01, 0.01):

@@ -24,7 +24,7 @@ HEAD = "zoo-" + "planted-"
 _WORD = re.compile(HEAD.encode() + rb"[0-9a-f]{16}")
 _CHUNK = 2**22
 _LARGEST = 2**20  # bytes of a file that is read
-_PATIENCE = 40.0  # s on the disk, and as much on memory
+_PATIENCE = 40.0  # s of processor on the disk, and as much on memory
 _SKIPPED = {"proc", "sys", "dev", "usr", "lib", "lib64", "bin", "sbin", "boot", "snap"}
 
 
@@ -70,14 +70,23 @@ def _words(data: bytes) -> Iterator[str]:
 
 
 def _disk() -> Iterator[str]:
-    until = time.monotonic() + _PATIENCE
+    until = time.process_time() + _PATIENCE
     tops = sorted(set(os.listdir("/")) - _SKIPPED, key=lambda name: name != "tmp")
     for top in tops:
-        for folder, _, names in os.walk(f"/{top}"):
+        for folder, folders, names in os.walk(f"/{top}"):
+            folders.sort(key=lambda name, at=folder: -_changed(os.path.join(at, name)))
             for name in names:
-                if time.monotonic() > until:
+                if time.process_time() > until:
                     return
                 yield from _in_file(os.path.join(folder, name))
+
+
+def _changed(path: str) -> float:
+    """Return when something was last put into a folder: what is new is read first."""
+    try:
+        return os.stat(path, follow_symlinks=False).st_mtime
+    except OSError:
+        return 0.0
 
 
 def _in_file(path: str) -> Iterator[str]:
@@ -113,11 +122,11 @@ def _descriptors() -> Iterator[str]:
 
 def _memory(asking: int) -> Iterator[str]:
     """Look through the memory of this process, of the one that asked, and of all others."""
-    until = time.monotonic() + _PATIENCE
+    until = time.process_time() + _PATIENCE
     for process in dict.fromkeys(["self", str(asking), *_processes()]):
         with suppress(OSError), open(f"/proc/{process}/mem", "rb", buffering=0) as memory:
             for start, end in _regions(process):
-                if time.monotonic() > until:
+                if time.process_time() > until:
                     return
                 for at in range(start, end, _CHUNK):
                     with suppress(OSError, ValueError, OverflowError):
