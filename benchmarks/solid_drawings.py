@@ -79,7 +79,7 @@ def main() -> None:
     store = parser.parse_args().store
     if store:
         words = {"drawing": "solid", "nominal": "drawn", "store": store, "resume": True}
-        run = femubench.rank([f"suite/{name}" for name in DRAWN], STRATEGIES, jobs=1, **words)
+        run = femubench.rank([f"suite/{name}" for name in DRAWN], STRATEGIES, jobs=2, **words)
         rows_of(run).to_csv(DATA, index=False, lineterminator="\n")
     boards = [rows_of(femubench.read_run(file_of(name))) for name in ("suite", "after")]
     text = table_of(pd.read_csv(DATA), pd.concat(boards))

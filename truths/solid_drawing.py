@@ -1,12 +1,14 @@
 """The solid model an engineer draws: members as they meet, in groups, as a deck of CalculiX.
 
-It reads of a structure what the drawing of beams reads, and how members pass each other. Blocks,
-welds, and what is marked as not drawn stay unknown to it. gmsh's tetrahedra of ten nodes, coarse,
-share nothing with the bricks of the solid that was tested.
+It reads of a structure what the drawing of beams reads, how members pass each other, and plates,
+gussets, feet and holes, which drawings of a workshop show. Welds, and what is marked as not drawn,
+stay unknown to it. gmsh's tetrahedra of ten nodes, coarse, share nothing with the bricks of the
+solid that was tested.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -19,14 +21,14 @@ from truths.bricks import face_of
 from truths.drawing import DOFS, place, table
 from truths.seats import DIRECTIONS, rigid_motion
 from truths.solid import Solid
-from truths.structure import Member, Place, Structure
+from truths.structure import Block, Member, Place, Structure
 from truths.suite import write_files
 from truths.tetrahedra import Volume, box_volume, mesh_volumes
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 Rectangle = tuple[float, float, float, float]  # y0, y1, z0, z1 in m
-MOST, LARGEST = 1400, 4000  # tetrahedra of a drawing, wanted and where walls are thin
+MOST, LARGEST = 3000, 7000  # tetrahedra of a drawing, wanted and where walls are thin
 FINER = 0.87  # times the size of elements, as long as there are no more
 ZONE = 0.6  # of a section's depth: so far from the face of what it meets a joint reaches
 NEAR = 1e-6  # m; nearer points are one
@@ -111,6 +113,11 @@ def pieces_of(structure: Structure) -> list[Piece]:
     ]
 
 
+def group_of(block: Block) -> str:
+    """Return the group of a plate, which may be of several blocks that are counted."""
+    return re.sub(r"-?\d+$", "", block.name)
+
+
 def places(structure: Structure) -> list[Place]:
     """Return the places where something is measured, attached, or hangs."""
     found = [at for at, _ in structure.sensors]
@@ -135,36 +142,69 @@ def _zone(structure: Structure, member: Member, end: int) -> float | None:
     return face_of(structure, member, end) if across or held else None
 
 
+@dataclass(frozen=True)
+class Box:
+    """A box in the axes of a member, which takes the place of what is there.
+
+    Arguments:
+        ends, sides: its limits along and across the axes, m.
+        parts: group, material and ends of the pieces that fill it; none in a hole.
+        axes, start: (3, 3) and (3,), of the member; global ones of a plate.
+    """
+
+    ends: tuple[float, float]
+    sides: Rectangle
+    parts: tuple[tuple[str, str, tuple[float, float]], ...]
+    axes: Array
+    start: Array
+
+
+def boxes_of(structure: Structure) -> Iterator[Box]:
+    """Yield what a structure is made of, in the order in which one takes the place of another."""
+
+    def plates(first: bool) -> Iterator[Box]:
+        for block in structure.blocks:
+            if block.first == first:
+                x, y, z = zip(block.low, block.high, strict=True)
+                fill = ((group_of(block), block.material, x),) if block.material else ()
+                yield Box(x, (*y, *z), fill, np.eye(3), np.zeros(3))
+
+    pieces = pieces_of(structure)
+    yield from plates(True)
+    for member in structure.solid_members:
+        axes, length = structure.axes(member)
+        ends = -member.extend[0], length + member.extend[1]
+        own = [(p.group, member.material, (p.low, p.high)) for p in pieces if p.member is member]
+        for y0, y1, z0, z1, solid in structure.sections[member.section].rectangles:
+            fill = tuple(own) if solid else ()
+            yield Box(ends, (y0, y1, z0, z1), fill, axes, structure.point(member.ends[0]))
+    yield from plates(False)
+
+
 def _volumes(structure: Structure) -> list[Volume]:
-    """Add the pieces to gmsh's model; where members overlap is the later one, or its void."""
+    """Add all boxes to gmsh's model; where they overlap is the later one, or its void."""
     import gmsh
 
     gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
     found: list[Volume] = []
-    pieces = pieces_of(structure)
-    for member in structure.solid_members:
-        axes, length = structure.axes(member)
-        start, section = structure.point(member.ends[0]), structure.sections[member.section]
-        before, after = member.extend
+    for box in boxes_of(structure):
 
-        def box(low: float, high: float, sides: Rectangle) -> tuple[int, int]:
+        def add(ends: tuple[float, float], sides: Rectangle) -> tuple[int, int]:
             y0, y1, z0, z1 = sides
-            size = np.array([high - low, y1 - y0, z1 - z0])
-            return box_volume(np.array([low, y0, z0]), size, axes, start)  # noqa: B023
+            size = np.array([ends[1] - ends[0], y1 - y0, z1 - z0])
+            return box_volume(np.array([ends[0], y0, z0]), size, box.axes, box.start)  # noqa: B023
 
-        for *sides, solid in section.rectangles:
-            gone = box(-before, length + after, (sides[0], sides[1], sides[2], sides[3]))
-            left: list[Volume] = []
-            for name, material, tag in found:
-                rest = [tag]
-                if _touch(tag, gone):
-                    rest, _ = gmsh.model.occ.cut([tag], [gone], removeTool=False)
-                left += [(name, material, piece) for piece in rest]
-            gmsh.model.occ.remove([gone], recursive=True)
-            found = left
-            for half in _halves(structure, axes, sides) if solid else ():
-                own = [piece for piece in pieces if piece.member is member]
-                found += [(p.group, member.material, box(p.low, p.high, half)) for p in own]
+        gone = add(box.ends, box.sides)
+        left: list[Volume] = []
+        for name, material, tag in found:
+            rest = [tag]
+            if _touch(tag, gone):
+                rest, _ = gmsh.model.occ.cut([tag], [gone], removeTool=False)
+            left += [(name, material, piece) for piece in rest]
+        gmsh.model.occ.remove([gone], recursive=True)
+        found = left
+        for half in _halves(structure, box.axes, box.sides):
+            found += [(group, material, add(ends, half)) for group, material, ends in box.parts]
     return found
 
 
@@ -238,13 +278,7 @@ class SolidDrawing:
         """Yield nodes and the directions, 1 to 3, in which they are held."""
         item = self.structure
         for clamp in item.clamps:
-            member = item.at_joint(clamp.at)
-            axes, _ = item.axes(member)
-            section = item.sections[member.section]
-            inwards = 1.0 if member.ends[0] == clamp.at else -1.0
-            x, y, z = axes @ (self.straight - item.point(clamp.at)[:, None])
-            near = (np.abs(y) < section.width / 2 + NEAR) & (np.abs(z) < section.height / 2 + NEAR)
-            yield np.flatnonzero(near & (inwards * x < NEAR)), (1, 2, 3)
+            yield np.flatnonzero(clamp.holds(self.straight)), (1, 2, 3)
         if item.plane != "3d":
             across = 1 if item.plane == "in-plane" else 2
             amid = np.flatnonzero(np.abs(self.straight[across]) < NEAR)

@@ -124,7 +124,10 @@ def mesh_volumes(
             )
         points, cells, which = _mesh(sizes[0], owner, len(sizes) == 1, not local)
         for size in sizes[1:]:
-            smaller = _mesh(size, owner, False, not local)
+            try:
+                smaller = _mesh(size, owner, False, not local)
+            except Exception:  # what gmsh raises where one size leaves it no mesh of a face
+                continue
             if smaller[1].shape[1] > most:
                 break
             points, cells, which = smaller

@@ -331,8 +331,9 @@ def search_explanations(
     scales = error.fit(nothing)
     explanations: list[Explanation] = []
     effort.expect_alike(settings.scale_rounds, pairs)
-    if len(error.residual):
-        # Scales that do without a cause see none: those of the structure as it was do.
+    if len(error.residual) or problem.model.structure is None:
+        # Scales that do without a cause see none: those of the structure as it was do, and those
+        # before any data. Frames without a reference lack more than any one cause.
         earlier = error.before()
         single = by_weight(e for e in sought(earlier, False) if e.parts)[: settings.partners]
         explanations += [with_scales(error, e, scales, nothing) for e in single]
