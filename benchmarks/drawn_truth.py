@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,8 @@ from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.places import split_direction
 from femubench.core.fem.group_factors import GROUP
 from femubench.core.fem.mesh import place_xyz
+from truths.solid_drawing import NEAR, group_of
+from truths.suite import structures
 
 JOINT = "joint-"  # how groups of joints begin
 STIFFNESS, MASS, BOTH = "member-stiffness", "group-mass", "group-material"
@@ -23,29 +26,43 @@ OF_MEMBER = {
     "wall-thickness": (BOTH, STIFFNESS, MASS),
     "member-mass": (MASS,),
 }
-AT_JOINT = ("joint-rotation", "joint-flexibility", "support-flexibility")
+SOFT_FOOT = "support-flexibility"
+AT_JOINT = ("joint-rotation", "joint-flexibility", SOFT_FOOT)
 
 
 def truth_in_groups(truth: KnownCase, model: Model) -> KnownCase:
     """Return a truth whose causes also count as found in the groups of a drawing.
 
     A loose joint or a soft foot is the joint's group, or where it has none the member that ends
-    there; a material or a wall scales stiffness and mass of the member's group.
+    there; a soft foot is in the plate that is held, too, whose cells are soft. A material or a wall
+    scales stiffness and mass of the member's group.
 
     Arguments:
         truth: in the words of the beams.
         model: the drawing.
     """
     groups = {*model.groups, *model.mass_groups}
-    return replace(truth, causes=tuple(_in_groups(cause, groups) for cause in truth.causes))
+    plates = plates_held(truth.structure)
+    return replace(truth, causes=tuple(_in_groups(cause, groups, plates) for cause in truth.causes))
 
 
-def _in_groups(cause: TrueCause, groups: set[str]) -> TrueCause:
+def plates_held(name: str) -> dict[str, list[str]]:
+    """Return the plates of a structure of the suite that a clamp holds, by its joint."""
+    structure, found = structures().get(name), {}
+    for clamp in () if structure is None else structure.clamps:
+        low, high = np.array(clamp.low) - NEAR, np.array(clamp.high) + NEAR
+        held = [b for b in structure.blocks if (low < b.high).all() and (high > b.low).all()]
+        found[clamp.at] = [group_of(block) for block in held if block.material]
+    return found
+
+
+def _in_groups(cause: TrueCause, groups: set[str], plates: Mapping[str, list[str]]) -> TrueCause:
     joint = cause.place.removeprefix("support:").rpartition("@")[2]
     member = next((g for g in groups if g == cause.place.partition("/")[0]), None)
     found: list[str] = []
     if cause.effect in AT_JOINT:
         zones = {g for g in groups if g == JOINT + joint or g.startswith(f"{JOINT}{joint}-")}
+        zones |= {*plates.get(joint, ())} & groups if cause.effect == SOFT_FOOT else set()
         found = [f"{STIFFNESS}@{GROUP}{zone}" for zone in sorted(zones)]
     elif member is not None:
         found = [f"{name}@{GROUP}{member}" for name in OF_MEMBER.get(cause.effect, ())]

@@ -373,3 +373,17 @@ def test_a_built_in_strategy_says_how_sure_it_is() -> None:
     assert result.status == "ok"
     stds = [m.predicted_std_hz for b in result.blocks.values() for m in b.modes]
     assert all(std is not None and std > 0.0 for std in stds)
+
+
+def test_samples_of_a_model_in_groups_hold_the_whole_alone() -> None:
+    """Groups are as large as the whole each: of 64 samples they took gigabytes."""
+    model = replace(CASE.model, structure=None, groups={"all": CASE.model.stiffness})
+
+    def softer(q: femubench.fem.FloatArray) -> Model:
+        own = np.exp(q[0]) * model.stiffness
+        return replace(model, stiffness=own, groups={"all": own})
+
+    found = Uncertainty.draw(softer, np.zeros(1), np.array([[0.01]]))
+    assert not any(sample.groups for sample in found.samples)
+    ratios = [solve_modes(s).eigenvalues[-1] for s in found.samples]
+    assert np.log(ratios).std() == pytest.approx(0.1, rel=1e-6)

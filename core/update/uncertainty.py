@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -86,7 +86,11 @@ class Uncertainty:
         models = []
         for draw in draws:
             with suppress(FemubenchError):
-                models.append(make(draw))
+                made = make(draw)
+                if made.groups or made.mass_groups:
+                    # Each is as large as the whole, and nothing is asked of them any more.
+                    made = replace(made, groups={}, mass_groups={}, powers={})
+                models.append(made)
         return cls(tuple(models), discrepancy_std)
 
 
