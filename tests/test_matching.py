@@ -75,6 +75,16 @@ def test_tolerance_is_a_share_of_the_structure(tmp_path: Path) -> None:
         read(tmp_path, Reader(PLACES + np.array([0.0, 0.001, 0.0])), "tolerance = 0.0")
 
 
+@pytest.mark.parametrize("size", [-1e31, 1.4e154, 1.7e308])
+def test_a_coordinate_of_which_a_square_might_overflow_is_refused(
+    tmp_path: Path, size: float
+) -> None:
+    lost = PLACES.copy()
+    lost[0, 2] = size
+    with pytest.raises(InputError, match=r"a coordinate of 'a' is 1.*expected .* up to 1e\+30"):
+        read(tmp_path, Reader(lost))
+
+
 @pytest.mark.parametrize(("unit", "metres"), [("mm", 1e-3), ("cm", 1e-2), ("in", 0.0254)])
 def test_unit_is_detected_and_said(tmp_path: Path, unit: str, metres: float) -> None:
     case = read(tmp_path, Reader(PLACES / metres))

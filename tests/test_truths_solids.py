@@ -163,6 +163,14 @@ def test_a_solid_drawing_is_a_deck_with_places_springs_and_lumps(tmp_path: Path)
     np.testing.assert_allclose(solve_modes(model, 2).natural_frequencies, expected, rtol=1e-2)
 
 
+def test_a_clamp_in_which_nothing_lies_is_no_drawing() -> None:
+    structure = beam(bar(0.05, 0.05), 1.0, True)
+    mesh = tetrahedra(brick_mesh(structure, 0.05))
+    loose = replace(structure, clamps=(Clamp("A", (-0.2, 0.0, 0.0), (-0.1, 0.1, 0.1)),))
+    with pytest.raises(ValueError, match="no node in the clamp at A"):
+        deck_of(drawing_of(loose, mesh))
+
+
 def test_the_solid_drawings_are_those_that_are_listed() -> None:
     suite = TRUTHS.parent / "scenarios" / "suite"
     assert sorted(file.parent.name for file in suite.glob("*/solid.toml")) == sorted(DRAWN)

@@ -32,7 +32,7 @@ MOST, LARGEST = 3000, 7000  # tetrahedra of a drawing, wanted and where walls ar
 FINER = 0.87  # times the size of elements, as long as there are no more
 ZONE = 0.6  # of a section's depth: so far from the face of what it meets a joint reaches
 NEAR = 1e-6  # m; nearer points are one
-WALLS = (0.5, 1.0)  # of the width of a thin-walled section: elements where such sections meet
+WALLS = (0.5, 1.0, np.inf)  # of a thin-walled section's width: elements where such sections meet
 APART = 0.15  # of a section's depth: cuts nearer than this are one
 DECK, JOINT = "solid.inp", "joint-"  # the file, and how groups of joints begin
 # The others: docs/scenarios.md says why not.
@@ -275,10 +275,17 @@ class SolidDrawing:
         return rigid_motion(arms / np.abs(arms).max())
 
     def held(self) -> Iterator[tuple[Integers, tuple[int, ...]]]:
-        """Yield nodes and the directions, 1 to 3, in which they are held."""
+        """Yield nodes and the directions, 1 to 3, in which they are held.
+
+        Raises:
+            ValueError: where no node lies in a clamp.
+        """
         item = self.structure
         for clamp in item.clamps:
-            yield np.flatnonzero(clamp.holds(self.straight)), (1, 2, 3)
+            found = np.flatnonzero(clamp.holds(self.straight))
+            if not len(found):
+                raise ValueError(f"{item.name}: no node in the clamp at {clamp.at}")
+            yield found, (1, 2, 3)
         if item.plane != "3d":
             across = 1 if item.plane == "in-plane" else 2
             amid = np.flatnonzero(np.abs(self.straight[across]) < NEAR)

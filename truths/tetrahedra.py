@@ -126,7 +126,9 @@ def mesh_volumes(
         for size in sizes[1:]:
             try:
                 smaller = _mesh(size, owner, False, not local)
-            except Exception:  # what gmsh raises where one size leaves it no mesh of a face
+            except Exception as error:  # where one size leaves gmsh no mesh of a face
+                if type(error) is not Exception:  # and it raises nothing narrower
+                    raise
                 continue
             if smaller[1].shape[1] > most:
                 break

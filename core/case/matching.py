@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
@@ -19,7 +18,7 @@ from femubench.core.case.case import Match
 from femubench.core.case.faults import Misfit, Remedy, WrongDirection
 from femubench.core.case.frames import FrameSite, Site
 from femubench.core.case.nodes import BETWEEN
-from femubench.core.case.schema import LengthUnit, MeasurementSpec
+from femubench.core.case.schema import LARGEST, LengthUnit, MeasurementSpec
 from femubench.core.case.tables import PLACES
 from femubench.core.case.units import METRES
 from femubench.core.errors import InputError
@@ -124,8 +123,7 @@ def parse_frame(text: str) -> FloatArray:
 
 def size_of(points: FloatArray) -> float:
     """Return the diagonal of the box around points in m."""
-    low, high = points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)
-    return math.hypot(*(max(b - a, 0.0) for a, b in zip(low.tolist(), high.tolist(), strict=True)))
+    return float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
 
 
 @dataclass(frozen=True)
@@ -406,6 +404,10 @@ def match_sensors(
         for i, label in enumerate(read.labels)
         if known[i] and (wanted is None or label in wanted) and label not in alignment.without
     ]
+    for i in rows:
+        if (size := np.abs(read.xyz[i]).max()) > LARGEST:
+            what = f"a coordinate of {read.labels[i]!r} is {size:.3g}"
+            raise InputError(what, file=file, expected=f"finite numbers up to {LARGEST:g}")
     kept: list[tuple[Match, str]] = []
     stated: tuple[str, ...] = ()
     if rows:
