@@ -296,7 +296,8 @@ def interrupt(result: JobResult, done: int, total: int) -> None:
 
 
 SUBMIT = """#!/bin/sh
-setsid sh "$1" >/dev/null 2>&1 &
+script=$(cat "$1")  # as sbatch does: the file goes as soon as this returns
+setsid sh -c "$script" >/dev/null 2>&1 &
 echo "Submitted batch job $!"
 """
 CANCEL = """#!/bin/sh
