@@ -36,47 +36,15 @@ WALLS = (0.5, 1.0, np.inf)  # of a thin-walled section's width: elements where s
 APART = 0.15  # of a section's depth: cuts nearer than this are one
 DECK, JOINT = "solid.inp", "joint-"  # the file, and how groups of joints begin
 # The others: docs/scenarios.md says why not.
-DRAWN = (
-    "a-frame",
-    "arch",
-    "bell-crank",
-    "bicycle",
-    "bracket",
-    "c-press",
-    "chair",
-    "connecting-rod",
-    "curved-deck",
-    "drill-press",
-    "engine-mount",
-    "footing-frame",
-    "fork-carriage",
-    "gable",
-    "gantry",
-    "garteur",
-    "h-tube",
-    "haunched-portal",
-    "hook-block",
-    "ladder-channel",
-    "lathe-bed",
-    "mast-lumps",
-    "mast-on-pad",
-    "pi-portal",
-    "pile-bent",
-    "portal",
-    "propeller",
-    "robot-arm",
-    "stepped-strip",
-    "stiffened-strip",
-    "table-feet",
-    "tapered-cantilever",
-    "tower",
-    "trailer",
-    "tuning-fork",
-    "turbine-blade",
-    "two-material-tee",
-    "vierendeel",
-    "wing-spar",
-)
+_NAMES = """
+    a-frame arch bell-crank bicycle bracket c-press chair connecting-rod curved-deck
+    drill-press engine-mount footing-frame fork-carriage gable gantry garteur h-tube
+    haunched-portal hook-block ladder-channel lathe-bed mast-lumps mast-on-pad pi-portal
+    pile-bent portal propeller robot-arm stepped-strip stiffened-strip table-feet
+    tapered-cantilever tower trailer tuning-fork turbine-blade two-material-tee vierendeel
+    wing-spar
+"""
+DRAWN = tuple(_NAMES.split())
 FEWEST = 8  # nodes of a seat
 EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))  # of a tetrahedron in Abaqus' order
 
