@@ -14,7 +14,7 @@ from typing import Any
 
 from femubench import reports
 
-# Of a processor, that no small file may take. The largest mesh allowed takes 7 to 9 s, and 14 to
+# Of a processor, that no small file may take. The largest mesh allowed takes some 7 s, and 14 to
 # more than 30 where seven processes share two cores and their caches.
 SECONDS = 90.0
 # Again and again so many seconds, in each of which a reader that works has used the processor.
