@@ -14,10 +14,9 @@ from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.places import split_direction
 from femubench.core.fem.group_factors import GROUP
 from femubench.core.fem.mesh import place_xyz
-from truths.solid_drawing import NEAR, group_of
+from truths.solid_drawing import JOINT, NEAR, group_of
 from truths.suite import structures
 
-JOINT = "joint-"  # how groups of joints begin
 STIFFNESS, MASS, BOTH = "member-stiffness", "group-mass", "group-material"
 # Effects of a member -> what scales in its group.
 OF_MEMBER = {
