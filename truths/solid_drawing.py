@@ -40,9 +40,9 @@ _NAMES = """
     a-frame arch bell-crank bicycle bracket c-press chair connecting-rod curved-deck
     drill-press engine-mount footing-frame fork-carriage gable gantry garteur h-tube
     haunched-portal hook-block ladder-channel lathe-bed mast-lumps mast-on-pad pi-portal
-    pile-bent portal propeller robot-arm stepped-strip stiffened-strip table-feet
-    tapered-cantilever tower trailer tuning-fork turbine-blade two-material-tee vierendeel
-    wing-spar
+    pile-bent portal propeller robot-arm ski stepped-strip stiffened-strip table-feet
+    tapered-cantilever tee-bridge tower trailer tuning-fork turbine-blade turbine-deck
+    two-material-tee vierendeel wing-spar
 """
 DRAWN = tuple(_NAMES.split())
 FEWEST = 8  # nodes of a seat
