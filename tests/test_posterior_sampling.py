@@ -163,6 +163,30 @@ def test_rounding_does_not_grow_along_the_chain(settled: UpdateResult) -> None:
         assert (one.after, one.std) == pytest.approx((other.after, other.std), rel=1e-8)
 
 
+def test_of_many_parameters_the_chain_has_what_the_data_know(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    few, words = CASE.used_measurement().select([1, 2]), {"discrepancy_median": 0.02}
+    every = sampled(few, **words)
+    assert len(every.parameters) > len(few)
+    monkeypatch.setattr(posterior_sampling, "_MANY", len(few))
+    solved = []
+    predict = posterior_sampling.Target.predict
+
+    def counting(target: posterior_sampling.Target, points: FloatArray) -> Any:
+        solved.append(len(points))
+        return predict(target, points)
+
+    monkeypatch.setattr(posterior_sampling.Target, "predict", counting)
+    found = sampled(few, **words)
+    assert set(solved) == {9}  # 1.5 for each of the six coefficients of two variables
+    assert "normal_approximation" not in found.diagnostics
+    for one, other in zip(found.parameters, every.parameters, strict=True):
+        assert one.std is not None
+        assert abs(one.after - other.after) < 0.2 * one.std
+        assert one.std == pytest.approx(other.std, rel=0.1)
+
+
 def chain_of(density: Callable[[FloatArray], FloatArray], steps: int, **options: Any) -> Any:
     import emcee
 

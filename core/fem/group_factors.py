@@ -93,8 +93,10 @@ class Groups:
             if change is not None and _ALL in places:
                 change = replace(change, core=factor * change.core)
             scales = (factor, 1.0) if matrix == "stiffness" else (1.0, factor)
-            grown = model.map_powers(*(partial(mul, scale) for scale in scales))
-            powers = {p: grown[p] if {p, _ALL} & {*places} else k for p, k in model.powers.items()}
+            few = replace(
+                model, powers={p: k for p, k in model.powers.items() if {p, _ALL} & {*places}}
+            )
+            powers = {**model.powers, **few.map_powers(*(partial(mul, s) for s in scales))}
             changed = {matrix: whole, f"{matrix}_change": change, own: groups, "powers": powers}
             model = replace(model, **changed)
         return model

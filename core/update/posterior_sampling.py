@@ -46,6 +46,7 @@ _WIDER = 1.5  # than the normal approximation, from where the first of them are 
 _ROUNDS = 3
 _OFF = 0.25  # of a datum's standard deviation: rms error of the polynomials that is let pass
 _USELESS = 5.0  # of it: with such polynomials a chain knows less than the normal approximation
+_MANY = 18  # parameters, a round of 285 solutions for all of them; no frame of the suite has more
 _SAMPLES = 40
 _WALKERS, _FEWEST_WALKERS = 4, 96  # for each unknown, and in all: few take no less time
 _BLOCK, _LONGEST = 500, 8000  # steps
@@ -62,7 +63,9 @@ class Target:
     Arguments:
         point: the most probable ones at the prior median of the discrepancy.
         centre: its q, off the bounds, at which there is no density, (p,).
-        root: Cholesky factor of the covariance of q about it, (p, p).
+        root: of the covariance of q about it, (p, p); its Cholesky factor where all coordinates
+            are known.
+        known: how many coordinates the data know of, to first order; they are the first ones.
         measurement: the modes that have a partner there.
     """
 
@@ -70,6 +73,7 @@ class Target:
     point: Iterate
     centre: FloatArray
     root: FloatArray
+    known: int
     measurement: Measurement
     discrepancy: Discrepancy
 
@@ -81,6 +85,12 @@ class Target:
         the same on every processor, those of q would follow its rounding of point and root.
         """
         return self.centre + z @ self.root.T
+
+    def variables(self, q: FloatArray) -> FloatArray:
+        """Return the variables of the polynomials at q (n, p): all, or the known ones, (n, k)."""
+        if self.known == len(self.centre):
+            return q
+        return np.asarray(np.linalg.solve(self.root, (q - self.centre).T).T[:, : self.known])
 
     def inside(self, q: FloatArray) -> BoolArray:
         """Return which points (n, p) are within the bounds, (n,)."""
@@ -120,7 +130,7 @@ class Target:
             if (row > 0.0).all():
                 rows.append(np.log(row))
                 kept.append(q)
-        if len(rows) <= coefficients_of(points.shape[1]):
+        if len(rows) <= coefficients_of(self.known):
             raise StrategyFailure(f"only {len(rows)} of {len(points)} points give a model")
         return np.array(kept), np.array(rows)
 
@@ -163,7 +173,7 @@ class Target:
 
         def likelihood(x: FloatArray) -> FloatArray:
             variance = known + np.square(self.discrepancy.std(x[:, -1]))[:, None] * own
-            return -0.5 * self._misfit(log - fit(x[:, :-1]), variance)
+            return -0.5 * self._misfit(log - fit(self.variables(x[:, :-1])), variance)
 
         return likelihood
 
@@ -219,12 +229,14 @@ def sample_posterior(
     Logarithms of frequencies are taken as quadratic in those of the parameters, fitted to solutions
     near the most probable ones, and anew with more of them until the rms error over the posterior
     is at most a quarter of each datum's standard deviation, discrepancy included; what is left
-    after three rounds widens the likelihood. Where polynomials miss a datum by five times its
-    standard deviation, as over the wide priors of supports, no chain is run: the answer is the
-    normal approximation about the most probable parameters, at the median of the discrepancy. So
-    it is where they miss by more than a quarter, and the chain is too short, or where `max_solves`
-    of the options leaves too few solutions for the polynomials. Of such an answer
-    ``normal_approximation`` in the diagnostics is 1.
+    after three rounds widens the likelihood. Of more than 18 parameters polynomials and chain have
+    as many coordinates as there are data: of the others the data know nothing to first order, and
+    they keep their prior. Where polynomials miss a datum by five times its standard deviation, as
+    over the wide priors of supports, no chain is run: the answer is the normal approximation about
+    the most probable parameters, at the median of the discrepancy. So it is where they miss by more
+    than a quarter, and the chain is too short, or where `max_solves` of the options leaves too few
+    solutions for the polynomials. Of such an answer ``normal_approximation`` in the diagnostics
+    is 1.
 
     Arguments:
         source: the nominal model, matrices with groups or a frame, or the latter's structure.
@@ -243,7 +255,8 @@ def sample_posterior(
             chain is too short for its autocorrelation though the polynomials are good.
 
     Source: Goodman & Weare (2010), Commun. Appl. Math. Comput. Sci. 5, 65-80, as implemented by
-    Foreman-Mackey, Hogg, Lang & Goodman (2013), PASP 125, 306-312.
+    Foreman-Mackey, Hogg, Lang & Goodman (2013), PASP 125, 306-312; for many parameters Cui, Martin,
+    Marzouk, Solonen & Spantini (2014), Inverse Problems 30, 114015, section 3.
 
     Examples:
         >>> factor = update.Changes(structure).stiffness(prior_std=0.1)
@@ -276,20 +289,21 @@ def _fitted(
 
     No sampler where the polynomials are useless, or no solutions are left for them.
     """
-    count = int(np.ceil(_POINTS * coefficients_of(len(target.centre))))
+    most = max(target.known, min(len(target.centre), _MANY))
+    count = int(np.ceil(_POINTS * coefficients_of(most)))
     solves = target.iteration.solves
     if solves.left < 2 * count:
         return None, None, True
     points, values = target.predict(kind.first(target, rng, count))
     for _ in range(_ROUNDS):
-        fit = QuadraticFit.of(points, values)
+        fit = QuadraticFit.of(target.variables(points), values)
         if (fit.error > _USELESS * target.std(np.zeros(1))).any():
             return None, float(fit.error.max()), True
         sampler = kind(target, fit, rng)
         drawn = sampler.draws
         drawn = drawn[rng.choice(len(drawn), count, replace=False)]
         more, exact = target.predict(drawn[:, :-1])
-        off = np.sqrt(np.mean(np.square(fit(more) - exact), axis=0))
+        off = np.sqrt(np.mean(np.square(fit(target.variables(more)) - exact), axis=0))
         rough = not (off <= _OFF * target.std(drawn[:, -1])).all()
         if not rough or solves.left < count:
             break
@@ -328,8 +342,12 @@ def most_probable(
     kept = measurement.select([number for number, partner in pairs if partner >= 0])
     low, high = parametric.lower, parametric.upper
     centre = np.clip(point.q, np.where(low < 0.0, 0.99 * low, 0.01 * high), 0.99 * high)
-    root = np.asarray(np.linalg.cholesky(covariance))
-    return Target(iteration, point, centre, root, kept, discrepancy)
+    root, known = np.asarray(np.linalg.cholesky(covariance)), len(centre)
+    if known > _MANY:
+        # The precision of the prior is 1 here but along as many directions as there are data.
+        root = root @ np.linalg.eigh((root.T * parametric.precision) @ root)[1]
+        known = min(known, len(kept) + (kept.total_mass is not None))
+    return Target(iteration, point, centre, root, known, kept, discrepancy)
 
 
 class _Ensemble:
@@ -338,10 +356,11 @@ class _Ensemble:
     def __init__(self, target: Target, fit: QuadraticFit, rng: np.random.Generator) -> None:
         import emcee
 
-        size, likelihood = len(target.centre) + 1, target.log_likelihood(fit)
+        self.target, self.rng = target, rng
+        size, likelihood = target.known + 1, target.log_likelihood(fit)
         walkers = max(_WALKERS * size, _FEWEST_WALKERS)
         near = rng.standard_normal((walkers, size))
-        while (outside := ~target.inside(target.at(near[:, :-1]))).any():
+        while (outside := ~target.inside(self._turned(near)[:, :-1])).any():
             near[outside] /= 2.0
 
         def density(at: FloatArray) -> FloatArray:
@@ -349,7 +368,7 @@ class _Ensemble:
             return target.log_prior(x) + likelihood(x)
 
         own = {"vectorize": True, "moves": StretchMove()}
-        self.target, self.sampler = target, emcee.EnsembleSampler(walkers, size, density, **own)
+        self.sampler = emcee.EnsembleSampler(walkers, size, density, **own)
         seed = int(rng.integers(2**32))
         self.sampler.random_state = np.random.RandomState(seed).get_state()
         self.sampler.run_mcmc(near, _BLOCK)
@@ -357,10 +376,20 @@ class _Ensemble:
     @staticmethod
     def first(target: Target, rng: np.random.Generator, count: int) -> FloatArray:
         """Return where the model is solved first, (count, p)."""
-        return target.at(_WIDER * rng.standard_normal((count, len(target.centre))))
+        z = rng.standard_normal((count, len(target.centre)))
+        z[:, : target.known] *= _WIDER
+        return target.at(z)
 
-    def _turned(self, chain: FloatArray) -> FloatArray:
-        return np.column_stack([self.target.at(chain[:, :-1]), chain[:, -1]])
+    def _turned(self, chain: FloatArray, rng: np.random.Generator | None = None) -> FloatArray:
+        """Return q and v; coordinates that the data do not know are zero, or drawn by `rng`."""
+        shape = len(chain), len(self.target.centre) - self.target.known
+        rest = np.zeros(shape) if rng is None else rng.standard_normal(shape)
+        q = self.target.at(np.hstack([chain[:, :-1], rest]))
+        return np.column_stack([q, chain[:, -1]])
+
+    def _drawn(self, chain: FloatArray) -> FloatArray:
+        drawn = self._turned(chain, self.rng)
+        return drawn[self.target.inside(drawn[:, :-1])]
 
     @property
     def steps(self) -> float:
@@ -370,7 +399,7 @@ class _Ensemble:
     @property
     def draws(self) -> FloatArray:
         """Return those of q and v after the first steps, (n, p + 1)."""
-        return self._turned(self.sampler.get_chain(discard=_BLOCK // 2, flat=True))
+        return self._drawn(self.sampler.get_chain(discard=_BLOCK // 2, flat=True))
 
     def settle(self) -> tuple[FloatArray, dict[str, float]]:
         """Return draws of q and v, (n, p + 1), after so many steps as they need, and how many.
@@ -390,7 +419,7 @@ class _Ensemble:
                 )
             sampler.run_mcmc(None, _BLOCK)
         chain = sampler.get_chain(discard=int(np.ceil(_BURN_IN * time)), flat=True)
-        return self._turned(chain), {
+        return self._drawn(chain), {
             "steps": self.steps,
             "autocorrelation_time": time,
             "effective_samples": len(chain) / time,
