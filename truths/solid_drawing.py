@@ -150,8 +150,12 @@ def boxes_of(structure: Structure) -> Iterator[Box]:
         for block in structure.blocks:
             if block.first == first:
                 x, y, z = zip(block.low, block.high, strict=True)
-                fill = ((group_of(block), block.material, x),) if block.material else ()
-                yield Box(x, (*y, *z), fill, np.eye(3), np.zeros(3))
+                # Where jaws end on a plate nodes are needed, or a line of them is all that is held.
+                cuts = sorted({*x, *(c for c in _jaws(structure, block) if x[0] < c < x[1])})
+                fill = [(group_of(block), block.material, ends) for ends in pairwise(cuts)]
+                yield Box(
+                    x, (*y, *z), tuple(fill if block.material else ()), np.eye(3), np.zeros(3)
+                )
 
     pieces = pieces_of(structure)
     yield from plates(True)
@@ -163,6 +167,14 @@ def boxes_of(structure: Structure) -> Iterator[Box]:
             fill = tuple(own) if solid else ()
             yield Box(ends, (y0, y1, z0, z1), fill, axes, structure.point(member.ends[0]))
     yield from plates(False)
+
+
+def _jaws(structure: Structure, block: Block) -> Iterator[float]:
+    """Yield the limits in x of clamps that touch a plate."""
+    for clamp in structure.clamps:
+        low, high = np.maximum(clamp.low, block.low), np.minimum(clamp.high, block.high)
+        if (low < high + NEAR).all():
+            yield from (clamp.low[0], clamp.high[0])
 
 
 def _volumes(structure: Structure) -> list[Volume]:
