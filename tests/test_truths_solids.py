@@ -25,7 +25,7 @@ from truths.prestress import with_misfit
 from truths.seats import rigid_fit
 from truths.sections import Section, angle, bar, channel, i_beam, rectangular_tube, tee
 from truths.solid import Solid
-from truths.solid_drawing import DRAWN, deck_of, drawing_of, group_of
+from truths.solid_drawing import DECK, DRAWN, deck_of, drawing_of, group_of
 from truths.structure import STEEL, Change, Clamp, Lump, Member, Oscillator, Spring, Structure
 from truths.suite import structures
 
@@ -169,6 +169,23 @@ def test_a_clamp_in_which_nothing_lies_is_no_drawing() -> None:
     loose = replace(structure, clamps=(Clamp("A", (-0.2, 0.0, 0.0), (-0.1, 0.1, 0.1)),))
     with pytest.raises(ValueError, match="no node in the clamp at A"):
         deck_of(drawing_of(loose, mesh))
+
+
+@pytest.mark.parametrize("name", ["haunched-portal", "mast-lumps", "robot-arm"])
+def test_a_clamp_holds_a_plate_as_far_as_its_jaws_reach(name: str) -> None:
+    """One line of nodes amid a strip would be a hinge."""
+    structure = structures()[name]
+    deck = (TRUTHS.parent / "scenarios" / "suite" / name / DECK).read_text()
+    rows = deck.partition("*NODE\n")[2].partition("*")[0].split()
+    nodes = np.array([row.split(",") for row in rows], dtype=float)[:, 1:]
+    for i, clamp in enumerate(structure.clamps, 1):
+        words = deck.partition(f"*NSET, NSET=held-{i}\n")[2].partition("*")[0]
+        held = nodes[np.array(words.replace(",", " ").split(), dtype=int) - 1]
+        jaws = np.array([clamp.low, clamp.high])
+        plates = (np.array([block.low, block.high]) for block in structure.blocks)
+        met = [np.clip(jaws, *b) for b in plates if ((b[0] <= jaws[1]) & (b[1] >= jaws[0])).all()]
+        assert held.min(axis=0) == pytest.approx(met[0][0], abs=1e-5)
+        assert held.max(axis=0) == pytest.approx(met[0][1], abs=1e-5)
 
 
 def test_the_solid_drawings_are_those_that_are_listed() -> None:
