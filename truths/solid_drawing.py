@@ -387,9 +387,11 @@ def deck_of(drawing: SolidDrawing) -> str:
 
 def toml_of(drawing: SolidDrawing) -> str:
     """Return the file that names the deck as a drawing of the case."""
-    joints = [part for part in drawing.solid.parts if part.startswith(JOINT)]
+    kinds = {piece.group: "part" for piece in pieces_of(drawing.structure)}  # however light
+    kinds |= {name: "joint" for name in drawing.solid.parts if name.startswith(JOINT)}
     values: dict[str, object] = {"kind": "file", "file": DECK}
-    groups = [table("[[model.groups]]", {"name": name, "kind": "joint"}) for name in joints]
+    known = [{"name": name, "kind": kinds[name]} for name in drawing.solid.parts if name in kinds]
+    groups = [table("[[model.groups]]", group) for group in known]
     return "\n".join(["# Written by `make truths`.\n", table("[model]", values), *groups])
 
 
