@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import harness_toys as toys
@@ -179,12 +180,37 @@ def test_of_many_parameters_the_chain_has_what_the_data_know(
 
     monkeypatch.setattr(posterior_sampling.Target, "predict", counting)
     found = sampled(few, **words)
-    assert set(solved) == {9}  # 1.5 for each of the six coefficients of two variables
+    assert set(solved) == {24}  # four for each of the six coefficients of two variables
     assert "normal_approximation" not in found.diagnostics
     for one, other in zip(found.parameters, every.parameters, strict=True):
         assert one.std is not None
         assert abs(one.after - other.after) < 0.2 * one.std
         assert one.std == pytest.approx(other.std, rel=0.1)
+
+
+def test_what_the_data_do_not_know_has_its_prior_within_the_bounds() -> None:
+    """Draws one after the other are those that are drawn together and left out where outside."""
+    rng, size = np.random.default_rng(4), 4
+    root = np.linalg.cholesky(np.cov(rng.standard_normal((size, 9)))) @ np.eye(size)[::-1]
+    bounds = SimpleNamespace(lower=np.full(size, -1.2), upper=np.array([0.1, 0.4, 3.0, np.inf]))
+    iteration: Any = SimpleNamespace(parametric=bounds)
+    nothing: Any = None
+    target = posterior_sampling.Target(
+        iteration, nothing, np.zeros(size), root, 1, nothing, nothing
+    )
+    z = np.zeros((40_000, size))
+    z[:, 0] = 0.03
+    for _ in range(40):
+        target.redraw(z, rng)
+    assert (z[:, 0] == 0.03).all()
+    assert target.inside(target.at(z)).all()
+    together = rng.standard_normal((800_000, size))
+    together[:, 0] = 0.03
+    inside = together[target.inside(target.at(together))]
+    assert len(inside) < 0.6 * len(together)
+    for one, other in ((z, inside), (target.at(z), target.at(inside))):
+        assert one.mean(axis=0) == pytest.approx(other.mean(axis=0), abs=0.02)
+        assert one.std(axis=0) == pytest.approx(other.std(axis=0), abs=0.02)
 
 
 def chain_of(density: Callable[[FloatArray], FloatArray], steps: int, **options: Any) -> Any:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
+from scipy.special import ndtr, ndtri
 
 from femubench.core.change.change import Change
 from femubench.core.change.parametric_model import ParametricModel
@@ -42,14 +43,17 @@ from femubench.core.update.uncertainty import Uncertainty
 
 _MORE = 8  # modes above the highest one that was measured, which samples may mix with it
 _POINTS = 1.5  # solutions for every coefficient of the polynomials
+_MORE_POINTS = 4.0  # where what the data do not know scatters the solutions
 _WIDER = 1.5  # than the normal approximation, from where the first of them are taken
 _ROUNDS = 3
 _OFF = 0.25  # of a datum's standard deviation: rms error of the polynomials that is let pass
 _USELESS = 5.0  # of it: with such polynomials a chain knows less than the normal approximation
-_MANY = 18  # parameters, a round of 285 solutions for all of them; no frame of the suite has more
+_MANY = 18  # parameters, whose polynomials take 285 solutions; no frame of the suite has more
 _SAMPLES = 40
 _WALKERS, _FEWEST_WALKERS = 4, 96  # for each unknown, and in all: few take no less time
 _BLOCK, _LONGEST = 500, 8000  # steps
+_MOVE, _MOVES = 2.38, 5  # of what the data know, by the root of how many; for one draw of the rest
+_STILL = 1e-9  # of the largest part in a parameter: it does not move
 _DRAWN = 2000  # samples of the transitional sampler
 _LONG_ENOUGH = 25.0  # autocorrelation times
 _WINDOW = 5.0  # of them, over which an autocorrelation is summed
@@ -91,6 +95,28 @@ class Target:
         if self.known == len(self.centre):
             return q
         return np.asarray(np.linalg.solve(self.root, (q - self.centre).T).T[:, : self.known])
+
+    def redraw(self, z: FloatArray, rng: np.random.Generator) -> None:
+        """Draw what the data do not know of z, (n, p), from its prior within the bounds.
+
+        One coordinate after the other, from the normal distribution between where the first
+        parameter on either side meets its bound.
+        """
+        low, high = self.iteration.parametric.lower, self.iteration.parametric.upper
+        q = self.at(z)
+        for j in range(self.known, z.shape[1]):
+            moving = np.abs(self.root[:, j]) > _STILL * np.abs(self.root).max(axis=1)
+            slope = self.root[moving, j]
+            rest = q[:, moving] - z[:, j, None] * slope
+            ends = (low[moving] - rest) / slope, (high[moving] - rest) / slope
+            least, most = np.minimum(*ends).max(axis=1), np.maximum(*ends).min(axis=1)
+            # Of two tails the one where the distribution function keeps its digits.
+            side = np.where(least > 0.0, -1.0, 1.0)
+            below, above = ndtr(np.sort([side * least, side * most], axis=0))
+            drawn = side * ndtri(below + rng.random(len(z)) * (above - below))
+            drawn = np.where((drawn > least) & (drawn < most), drawn, z[:, j])
+            q += (drawn - z[:, j])[:, None] * self.root[:, j]
+            z[:, j] = drawn
 
     def inside(self, q: FloatArray) -> BoolArray:
         """Return which points (n, p) are within the bounds, (n,)."""
@@ -269,7 +295,8 @@ def sample_posterior(
         40
     """
     target = most_probable(source, changes, measurement, Discrepancy(*discrepancy), options)
-    chain_of, off, rough = _fitted(_SAMPLERS[sampler], target, rng)
+    split = sampler == "ensemble" and target.known < len(target.centre)
+    chain_of, off, rough = _fitted(_Split if split else _SAMPLERS[sampler], target, rng)
     if chain_of is None:
         return _normal_result(target, off)
     try:
@@ -283,14 +310,14 @@ def sample_posterior(
 
 
 def _fitted(
-    kind: type[_Ensemble | _Transitional], target: Target, rng: np.random.Generator
+    kind: type[_Ensemble | _Split | _Transitional], target: Target, rng: np.random.Generator
 ) -> tuple[Any, Any, bool]:
     """Return a sampler after its first steps, the largest error of the polynomials, if too large.
 
     No sampler where the polynomials are useless, or no solutions are left for them.
     """
-    most = max(target.known, min(len(target.centre), _MANY))
-    count = int(np.ceil(_POINTS * coefficients_of(most)))
+    every = target.known == len(target.centre)
+    count = int(np.ceil((_POINTS if every else _MORE_POINTS) * coefficients_of(target.known)))
     solves = target.iteration.solves
     if solves.left < 2 * count:
         return None, None, True
@@ -345,8 +372,10 @@ def most_probable(
     root, known = np.asarray(np.linalg.cholesky(covariance)), len(centre)
     if known > _MANY:
         # The precision of the prior is 1 here but along as many directions as there are data.
-        root = root @ np.linalg.eigh((root.T * parametric.precision) @ root)[1]
+        _, turns = np.linalg.eigh((root.T * parametric.precision) @ root)
         known = min(known, len(kept) + (kept.total_mass is not None))
+        turns, _ = np.linalg.qr(np.hstack([turns[:, :known], np.eye(len(centre))]))
+        root = root @ (turns * np.sign(turns[np.abs(turns).argmax(axis=0), range(len(centre))]))
     return Target(iteration, point, centre, root, known, kept, discrepancy)
 
 
@@ -356,11 +385,10 @@ class _Ensemble:
     def __init__(self, target: Target, fit: QuadraticFit, rng: np.random.Generator) -> None:
         import emcee
 
-        self.target, self.rng = target, rng
-        size, likelihood = target.known + 1, target.log_likelihood(fit)
+        size, likelihood = len(target.centre) + 1, target.log_likelihood(fit)
         walkers = max(_WALKERS * size, _FEWEST_WALKERS)
         near = rng.standard_normal((walkers, size))
-        while (outside := ~target.inside(self._turned(near)[:, :-1])).any():
+        while (outside := ~target.inside(target.at(near[:, :-1]))).any():
             near[outside] /= 2.0
 
         def density(at: FloatArray) -> FloatArray:
@@ -368,7 +396,7 @@ class _Ensemble:
             return target.log_prior(x) + likelihood(x)
 
         own = {"vectorize": True, "moves": StretchMove()}
-        self.sampler = emcee.EnsembleSampler(walkers, size, density, **own)
+        self.target, self.sampler = target, emcee.EnsembleSampler(walkers, size, density, **own)
         seed = int(rng.integers(2**32))
         self.sampler.random_state = np.random.RandomState(seed).get_state()
         self.sampler.run_mcmc(near, _BLOCK)
@@ -376,20 +404,10 @@ class _Ensemble:
     @staticmethod
     def first(target: Target, rng: np.random.Generator, count: int) -> FloatArray:
         """Return where the model is solved first, (count, p)."""
-        z = rng.standard_normal((count, len(target.centre)))
-        z[:, : target.known] *= _WIDER
-        return target.at(z)
+        return target.at(_WIDER * rng.standard_normal((count, len(target.centre))))
 
-    def _turned(self, chain: FloatArray, rng: np.random.Generator | None = None) -> FloatArray:
-        """Return q and v; coordinates that the data do not know are zero, or drawn by `rng`."""
-        shape = len(chain), len(self.target.centre) - self.target.known
-        rest = np.zeros(shape) if rng is None else rng.standard_normal(shape)
-        q = self.target.at(np.hstack([chain[:, :-1], rest]))
-        return np.column_stack([q, chain[:, -1]])
-
-    def _drawn(self, chain: FloatArray) -> FloatArray:
-        drawn = self._turned(chain, self.rng)
-        return drawn[self.target.inside(drawn[:, :-1])]
+    def _turned(self, chain: FloatArray) -> FloatArray:
+        return np.column_stack([self.target.at(chain[:, :-1]), chain[:, -1]])
 
     @property
     def steps(self) -> float:
@@ -399,7 +417,7 @@ class _Ensemble:
     @property
     def draws(self) -> FloatArray:
         """Return those of q and v after the first steps, (n, p + 1)."""
-        return self._drawn(self.sampler.get_chain(discard=_BLOCK // 2, flat=True))
+        return self._turned(self.sampler.get_chain(discard=_BLOCK // 2, flat=True))
 
     def settle(self) -> tuple[FloatArray, dict[str, float]]:
         """Return draws of q and v, (n, p + 1), after so many steps as they need, and how many.
@@ -407,23 +425,103 @@ class _Ensemble:
         Raises:
             StrategyFailure: when the longest chain is too short for its autocorrelation.
         """
-        sampler = self.sampler
-        while True:
-            time = autocorrelation_time(sampler.get_chain())
-            if sampler.iteration >= _LONG_ENOUGH * time:
-                break
-            if sampler.iteration >= _LONGEST:
-                raise StrategyFailure(
-                    f"{sampler.iteration} steps are {sampler.iteration / time:.0f} autocorrelation "
-                    f"times, expected {_LONG_ENOUGH:g} at least"
-                )
-            sampler.run_mcmc(None, _BLOCK)
-        chain = sampler.get_chain(discard=int(np.ceil(_BURN_IN * time)), flat=True)
-        return self._drawn(chain), {
+        time = _settled(self.sampler.get_chain, lambda: self.sampler.run_mcmc(None, _BLOCK))
+        chain = self.sampler.get_chain(discard=int(np.ceil(_BURN_IN * time)), flat=True)
+        return self._turned(chain), {
             "steps": self.steps,
             "autocorrelation_time": time,
             "effective_samples": len(chain) / time,
         }
+
+
+class _Split:
+    """Metropolis moves of what the data know; what they do not know is drawn from its prior.
+
+    Source: Roberts, Gelman & Gilks (1997), Ann. Appl. Probab. 7, 110-120, for the size of a move;
+    Gelfand & Smith (1990), J. Am. Stat. Assoc. 85, 398-409, for draws one after the other.
+    """
+
+    def __init__(self, target: Target, fit: QuadraticFit, rng: np.random.Generator) -> None:
+        self.target, self.rng, self.likelihood = target, rng, target.log_likelihood(fit)
+        self.z = _start(target, rng, _FEWEST_WALKERS, 1.0)
+        self.v = rng.standard_normal(len(self.z))
+        self.chain, self.kept = list[FloatArray](), list[FloatArray]()
+        self._walk()
+
+    @staticmethod
+    def first(target: Target, rng: np.random.Generator, count: int) -> FloatArray:
+        """Return where the model is solved first, (count, p)."""
+        return target.at(_start(target, rng, count, _WIDER))
+
+    def _points(self, z: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return q and v, (n, p + 1), and ln of the density there, (n,)."""
+        x = np.column_stack([self.target.at(z), v])
+        return x, self.target.log_prior(x) + self.likelihood(x)
+
+    def _walk(self) -> None:
+        known, (count, _) = self.target.known, self.z.shape
+        for _ in range(_BLOCK):
+            _, density = self._points(self.z, self.v)
+            for _ in range(_MOVES):
+                step = _MOVE * (known + 1) ** -0.5 * self.rng.standard_normal((count, known + 1))
+                z, v = self.z.copy(), self.v + step[:, -1]
+                z[:, :known] += step[:, :-1]
+                _, trial = self._points(z, v)
+                taken = trial - density > np.log(self.rng.random(count))
+                self.z[taken], self.v[taken], density[taken] = z[taken], v[taken], trial[taken]
+            self.target.redraw(self.z, self.rng)
+            self.chain.append(np.column_stack([self.z[:, :known], self.v]))
+            if len(self.chain) % _MOVES == 0:
+                self.kept.append(self._points(self.z, self.v)[0])
+
+    @property
+    def steps(self) -> float:
+        """Return how many every walker made."""
+        return float(len(self.chain))
+
+    @property
+    def draws(self) -> FloatArray:
+        """Return those of q and v after the first steps, (n, p + 1)."""
+        return np.concatenate(self.kept[_BLOCK // 2 // _MOVES :])
+
+    def settle(self) -> tuple[FloatArray, dict[str, float]]:
+        """Return draws of q and v, (n, p + 1), after so many steps as they need, and how many.
+
+        Raises:
+            StrategyFailure: when the longest chain is too short for its autocorrelation.
+        """
+        time = _settled(lambda: np.array(self.chain), self._walk)
+        draws = np.concatenate(self.kept[int(np.ceil(_BURN_IN * time / _MOVES)) :])
+        return draws, {
+            "steps": self.steps,
+            "autocorrelation_time": time,
+            "effective_samples": len(draws) * min(_MOVES / time, 1.0),
+        }
+
+
+def _start(target: Target, rng: np.random.Generator, count: int, wide: float) -> FloatArray:
+    """Return coordinates z about 0 within the bounds, (count, p)."""
+    z = np.zeros((count, len(target.centre)))
+    z[:, : target.known] = wide * rng.standard_normal((count, target.known))
+    while (outside := ~target.inside(target.at(z))).any():
+        z[outside] /= 2.0
+    for _ in range(_MOVES):
+        target.redraw(z, rng)
+    return z
+
+
+def _settled(chain: Callable[[], FloatArray], go_on: Callable[[], object]) -> float:
+    """Return the autocorrelation time of a chain that is long enough; raises StrategyFailure."""
+    while True:
+        steps, time = len(chain()), autocorrelation_time(chain())
+        if steps >= _LONG_ENOUGH * time:
+            return time
+        if steps >= _LONGEST:
+            raise StrategyFailure(
+                f"{steps} steps are {steps / time:.0f} autocorrelation "
+                f"times, expected {_LONG_ENOUGH:g} at least"
+            )
+        go_on()
 
 
 class _Transitional:
