@@ -186,6 +186,8 @@ def test_of_many_parameters_the_chain_has_what_the_data_know(
         assert one.std is not None
         assert abs(one.after - other.after) < 0.2 * one.std
         assert one.std == pytest.approx(other.std, rel=0.1)
+    monkeypatch.setattr(posterior_sampling, "_OFF", 0.0)
+    assert sampled(few, **words).diagnostics["normal_approximation"] == 1.0
 
 
 def test_what_the_data_do_not_know_has_its_prior_within_the_bounds() -> None:
@@ -243,7 +245,7 @@ def test_a_density_without_a_value_ends_the_chain() -> None:
 
 
 def test_a_chain_that_is_too_short_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(posterior_sampling, "_LONGEST", 500)
+    monkeypatch.setattr(posterior_sampling, "_LONGEST", 250)
     monkeypatch.setattr(posterior_sampling, "_LONG_ENOUGH", 400.0)
     monkeypatch.setattr(posterior_sampling, "_OFF", np.inf)  # no polynomials are to blame
     with pytest.raises(StrategyFailure, match=r"^500 steps are \d+ autocorrelation times, expec"):

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -257,12 +258,12 @@ def sample_posterior(
     is at most a quarter of each datum's standard deviation, discrepancy included; what is left
     after three rounds widens the likelihood. Of more than 18 parameters polynomials and chain have
     as many coordinates as there are data: of the others the data know nothing to first order, and
-    they keep their prior. Where polynomials miss a datum by five times its standard deviation, as
-    over the wide priors of supports, no chain is run: the answer is the normal approximation about
-    the most probable parameters, at the median of the discrepancy. So it is where they miss by more
-    than a quarter, and the chain is too short, or where `max_solves` of the options leaves too few
-    solutions for the polynomials. Of such an answer ``normal_approximation`` in the diagnostics
-    is 1.
+    they keep their prior; where that is too little, so that the error stays larger, no chain is
+    run. Nor is it where polynomials miss a datum by five times its standard deviation, as over the
+    wide priors of supports. The answer then is the normal approximation about the most probable
+    parameters, at the median of the discrepancy. So it is where they miss by more than a quarter,
+    and the chain is too short, or where `max_solves` of the options leaves too few solutions for
+    the polynomials. Of such an answer ``normal_approximation`` in the diagnostics is 1.
 
     Arguments:
         source: the nominal model, matrices with groups or a frame, or the latter's structure.
@@ -299,8 +300,10 @@ def sample_posterior(
     chain_of, off, rough = _fitted(_Split if split else _SAMPLERS[sampler], target, rng)
     if chain_of is None:
         return _normal_result(target, off)
+    if split and rough:  # then wide priors move the data beyond what the first order knows of
+        return _normal_result(target, off)
     try:
-        chain, found = chain_of.settle()
+        chain, found = chain_of.settle(_LONGEST if rough else 2 * _LONGEST)
     except StrategyFailure:
         if not rough:
             raise
@@ -419,13 +422,14 @@ class _Ensemble:
         """Return those of q and v after the first steps, (n, p + 1)."""
         return self._turned(self.sampler.get_chain(discard=_BLOCK // 2, flat=True))
 
-    def settle(self) -> tuple[FloatArray, dict[str, float]]:
+    def settle(self, longest: int) -> tuple[FloatArray, dict[str, float]]:
         """Return draws of q and v, (n, p + 1), after so many steps as they need, and how many.
 
         Raises:
             StrategyFailure: when the longest chain is too short for its autocorrelation.
         """
-        time = _settled(self.sampler.get_chain, lambda: self.sampler.run_mcmc(None, _BLOCK))
+        go_on = partial(self.sampler.run_mcmc, None, _BLOCK)
+        time = _settled(self.sampler.get_chain, go_on, longest)
         chain = self.sampler.get_chain(discard=int(np.ceil(_BURN_IN * time)), flat=True)
         return self._turned(chain), {
             "steps": self.steps,
@@ -484,13 +488,13 @@ class _Split:
         """Return those of q and v after the first steps, (n, p + 1)."""
         return np.concatenate(self.kept[_BLOCK // 2 // _MOVES :])
 
-    def settle(self) -> tuple[FloatArray, dict[str, float]]:
+    def settle(self, longest: int) -> tuple[FloatArray, dict[str, float]]:
         """Return draws of q and v, (n, p + 1), after so many steps as they need, and how many.
 
         Raises:
             StrategyFailure: when the longest chain is too short for its autocorrelation.
         """
-        time = _settled(lambda: np.array(self.chain), self._walk)
+        time = _settled(lambda: np.array(self.chain), self._walk, longest)
         draws = np.concatenate(self.kept[int(np.ceil(_BURN_IN * time / _MOVES)) :])
         return draws, {
             "steps": self.steps,
@@ -510,13 +514,13 @@ def _start(target: Target, rng: np.random.Generator, count: int, wide: float) ->
     return z
 
 
-def _settled(chain: Callable[[], FloatArray], go_on: Callable[[], object]) -> float:
+def _settled(chain: Callable[[], FloatArray], go_on: Callable[[], object], longest: int) -> float:
     """Return the autocorrelation time of a chain that is long enough; raises StrategyFailure."""
     while True:
         steps, time = len(chain()), autocorrelation_time(chain())
         if steps >= _LONG_ENOUGH * time:
             return time
-        if steps >= _LONGEST:
+        if steps >= longest:
             raise StrategyFailure(
                 f"{steps} steps are {steps / time:.0f} autocorrelation "
                 f"times, expected {_LONG_ENOUGH:g} at least"
@@ -551,7 +555,7 @@ class _Transitional:
             drawn[outside] = more * parametric.precision**-0.5
         return drawn
 
-    def settle(self) -> tuple[FloatArray, dict[str, float]]:
+    def settle(self, longest: int) -> tuple[FloatArray, dict[str, float]]:
         """Return draws of q and v, (n, p + 1), with the evidence."""
         return self.draws, {"steps": self.steps, **self.figures}
 
