@@ -191,15 +191,16 @@ def test_of_many_parameters_the_chain_has_what_the_data_know(
 
 
 def test_what_the_data_do_not_know_has_its_prior_within_the_bounds() -> None:
-    """Draws one after the other are those that are drawn together and left out where outside."""
+    """Draws one after the other are those that are drawn together, weighed by the prior."""
     rng, size = np.random.default_rng(4), 4
-    root = np.linalg.cholesky(np.cov(rng.standard_normal((size, 9)))) @ np.eye(size)[::-1]
-    bounds = SimpleNamespace(lower=np.full(size, -1.2), upper=np.array([0.1, 0.4, 3.0, np.inf]))
-    iteration: Any = SimpleNamespace(parametric=bounds)
+    precision = np.array([1.0, 4.0, 0.5, 2.0])
+    turns, _ = np.linalg.qr(rng.standard_normal((size, size)))
+    lower, upper = np.full(size, -1.2), np.array([0.4, 0.5, 3.0, np.inf])
+    known: Any = SimpleNamespace(lower=lower, upper=upper, precision=precision)
+    iteration: Any = SimpleNamespace(parametric=known)
     nothing: Any = None
-    target = posterior_sampling.Target(
-        iteration, nothing, np.zeros(size), root, 1, nothing, nothing
-    )
+    root, centre = precision[:, None] ** -0.5 * turns, np.array([0.39, 0.1, -0.3, 0.2])
+    target = posterior_sampling.Target(iteration, nothing, centre, root, 1, nothing, nothing)
     z = np.zeros((40_000, size))
     z[:, 0] = 0.03
     for _ in range(40):
@@ -208,11 +209,16 @@ def test_what_the_data_do_not_know_has_its_prior_within_the_bounds() -> None:
     assert target.inside(target.at(z)).all()
     together = rng.standard_normal((800_000, size))
     together[:, 0] = 0.03
-    inside = together[target.inside(target.at(together))]
-    assert len(inside) < 0.6 * len(together)
-    for one, other in ((z, inside), (target.at(z), target.at(inside))):
-        assert one.mean(axis=0) == pytest.approx(other.mean(axis=0), abs=0.02)
-        assert one.std(axis=0) == pytest.approx(other.std(axis=0), abs=0.02)
+    together = together[target.inside(target.at(together))]
+    q = target.at(together)
+    weight = 0.5 * (np.square(together[:, 1:]).sum(axis=1) - np.square(q) @ precision)
+    weight = np.exp(weight - weight.max())
+    assert weight.sum() ** 2 / np.square(weight).sum() > 50_000.0
+    for one, other in ((z, together), (target.at(z), q)):
+        mean = np.average(other, axis=0, weights=weight)
+        std = np.sqrt(np.average(np.square(other - mean), axis=0, weights=weight))
+        assert one.mean(axis=0) == pytest.approx(mean, abs=0.02)
+        assert one.std(axis=0) == pytest.approx(std, abs=0.02)
 
 
 def chain_of(density: Callable[[FloatArray], FloatArray], steps: int, **options: Any) -> Any:

@@ -101,21 +101,24 @@ class Target:
         """Draw what the data do not know of z, (n, p), from its prior within the bounds.
 
         One coordinate after the other, from the normal distribution between where the first
-        parameter on either side meets its bound.
+        parameter on either side meets its bound. Its mean is not 0 where the most probable
+        parameters are at a bound that the data press them against.
         """
-        low, high = self.iteration.parametric.lower, self.iteration.parametric.upper
-        q = self.at(z)
+        parametric = self.iteration.parametric
+        low, high, q = parametric.lower, parametric.upper, self.at(z)
+        means = -self.root.T @ (parametric.precision * self.centre)
         for j in range(self.known, z.shape[1]):
             moving = np.abs(self.root[:, j]) > _STILL * np.abs(self.root).max(axis=1)
             slope = self.root[moving, j]
             rest = q[:, moving] - z[:, j, None] * slope
             ends = (low[moving] - rest) / slope, (high[moving] - rest) / slope
-            least, most = np.minimum(*ends).max(axis=1), np.maximum(*ends).min(axis=1)
+            least = np.minimum(*ends).max(axis=1) - means[j]
+            most = np.maximum(*ends).min(axis=1) - means[j]
             # Of two tails the one where the distribution function keeps its digits.
             side = np.where(least > 0.0, -1.0, 1.0)
             below, above = ndtr(np.sort([side * least, side * most], axis=0))
             drawn = side * ndtri(below + rng.random(len(z)) * (above - below))
-            drawn = np.where((drawn > least) & (drawn < most), drawn, z[:, j])
+            drawn = np.where((drawn > least) & (drawn < most), drawn + means[j], z[:, j])
             q += (drawn - z[:, j])[:, None] * self.root[:, j]
             z[:, j] = drawn
 
@@ -298,9 +301,8 @@ def sample_posterior(
     target = most_probable(source, changes, measurement, Discrepancy(*discrepancy), options)
     split = sampler == "ensemble" and target.known < len(target.centre)
     chain_of, off, rough = _fitted(_Split if split else _SAMPLERS[sampler], target, rng)
-    if chain_of is None:
-        return _normal_result(target, off)
-    if split and rough:  # then wide priors move the data beyond what the first order knows of
+    # Wide priors may move the data beyond what the first order knows of.
+    if chain_of is None or (split and rough):
         return _normal_result(target, off)
     try:
         chain, found = chain_of.settle(_LONGEST if rough else 2 * _LONGEST)
