@@ -230,6 +230,14 @@ def test_another_material_scales_the_mass_and_the_stiffness_of_a_part() -> None:
     np.testing.assert_allclose(factors, [[1.9, gain]])
 
 
+def test_a_part_that_is_stated_is_a_part_that_is_not() -> None:
+    stated = replace(MODEL, group_kinds={"left": "part"})
+    joint = replace(MODEL, group_kinds={"left": "joint"})
+    effect = MemberStiffness()
+    assert effect.parameters(stated, "group:left") == effect.parameters(MODEL, "group:left")
+    assert effect.parameters(joint, "group:left") != effect.parameters(MODEL, "group:left")
+
+
 def test_slopes_are_those_of_differences() -> None:
     parameters = [Property("a", "E", ("group:left", "group:foot"))]
     parameters += [Property("b", "density", ("group:half",)), Property("c", "E", ("all",))]

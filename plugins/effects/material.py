@@ -48,7 +48,8 @@ class MaterialEffect(FrameEffect):
         """Return the relative change; of a group with a prior of its own, that of a factor."""
         name = f"change of {self.constant}"
         group = place.removeprefix(Groups.PREFIX)
-        known = {*model.group_priors, *model.group_kinds, *GroupPriors(model).supports}
+        stated = (name for name, kind in model.group_kinds.items() if kind != "part")
+        known = {*model.group_priors, *stated, *GroupPriors(model).supports}
         if model.structure is None and place.startswith(Groups.PREFIX) and group in known:
             matrix: Literal["mass", "stiffness"] = "stiffness" if self.constant == "E" else "mass"
             # What a joint is stiffer by, as by a fillet, is no defect: the drawing lacks it.
