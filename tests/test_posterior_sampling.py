@@ -170,7 +170,7 @@ def test_of_many_parameters_the_chain_has_what_the_data_know(
     few, words = CASE.used_measurement().select([1, 2]), {"discrepancy_median": 0.02}
     every = sampled(few, **words)
     assert len(every.parameters) > len(few)
-    monkeypatch.setattr(posterior_sampling, "_MANY", len(few))
+    monkeypatch.setattr(posterior_sampling, "_ALL_KNOWN", len(few))
     solved = []
     predict = posterior_sampling.Target.predict
 

@@ -12,7 +12,7 @@ updating.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -49,11 +49,12 @@ _WIDER = 1.5  # than the normal approximation, from where the first of them are 
 _ROUNDS = 3
 _OFF = 0.25  # of a datum's standard deviation: rms error of the polynomials that is let pass
 _USELESS = 5.0  # of it: with such polynomials a chain knows less than the normal approximation
-_MANY = 18  # parameters, whose polynomials take 285 solutions; no frame of the suite has more
+_ALL_KNOWN = 18  # parameters, whose polynomials take 285 solutions; no frame of the suite has more
 _SAMPLES = 40
 _WALKERS, _FEWEST_WALKERS = 4, 96  # for each unknown, and in all: few take no less time
 _BLOCK, _LONGEST = 500, 8000  # steps
 _MOVE, _MOVES = 2.38, 5  # of what the data know, by the root of how many; for one draw of the rest
+_SWEEPS = 5  # draws of the rest, from one start and from one draw that is kept to the next
 _STILL = 1e-9  # of the largest part in a parameter: it does not move
 _DRAWN = 2000  # samples of the transitional sampler
 _LONG_ENOUGH = 25.0  # autocorrelation times
@@ -97,6 +98,18 @@ class Target:
             return q
         return np.asarray(np.linalg.solve(self.root, (q - self.centre).T).T[:, : self.known])
 
+    def split(self) -> Target:
+        """Return it in coordinates of which the data know, to first order, the first ones alone.
+
+        The precision of the prior is 1 but along as many directions as there are data.
+        """
+        precision, size = self.iteration.parametric.precision, len(self.centre)
+        _, turns = np.linalg.eigh((self.root.T * precision) @ self.root)
+        known = min(size, len(self.data[0]))
+        turns, _ = np.linalg.qr(np.hstack([turns[:, :known], np.eye(size)]))
+        turns *= np.sign(turns[np.abs(turns).argmax(axis=0), range(size)])
+        return replace(self, root=self.root @ turns, known=known)
+
     def redraw(self, z: FloatArray, rng: np.random.Generator) -> None:
         """Draw what the data do not know of z, (n, p), from its prior within the bounds.
 
@@ -107,8 +120,9 @@ class Target:
         parametric = self.iteration.parametric
         low, high, q = parametric.lower, parametric.upper, self.at(z)
         means = -self.root.T @ (parametric.precision * self.centre)
+        moves = np.abs(self.root) > _STILL * np.abs(self.root).max(axis=1)[:, None]
         for j in range(self.known, z.shape[1]):
-            moving = np.abs(self.root[:, j]) > _STILL * np.abs(self.root).max(axis=1)
+            moving = moves[:, j]
             slope = self.root[moving, j]
             rest = q[:, moving] - z[:, j, None] * slope
             ends = (low[moving] - rest) / slope, (high[moving] - rest) / slope
@@ -299,10 +313,12 @@ def sample_posterior(
         40
     """
     target = most_probable(source, changes, measurement, Discrepancy(*discrepancy), options)
-    split = sampler == "ensemble" and target.known < len(target.centre)
-    chain_of, off, rough = _fitted(_Split if split else _SAMPLERS[sampler], target, rng)
+    kind = _SAMPLERS[sampler]
+    if kind is _Ensemble and len(target.centre) > _ALL_KNOWN:
+        kind, target = _Split, target.split()
+    chain_of, off, rough = _fitted(kind, target, rng)
     # Wide priors may move the data beyond what the first order knows of.
-    if chain_of is None or (split and rough):
+    if chain_of is None or (rough and kind is _Split):
         return _normal_result(target, off)
     try:
         chain, found = chain_of.settle(_LONGEST if rough else 2 * _LONGEST)
@@ -321,8 +337,8 @@ def _fitted(
 
     No sampler where the polynomials are useless, or no solutions are left for them.
     """
-    every = target.known == len(target.centre)
-    count = int(np.ceil((_POINTS if every else _MORE_POINTS) * coefficients_of(target.known)))
+    each = _MORE_POINTS if kind is _Split else _POINTS
+    count = int(np.ceil(each * coefficients_of(target.known)))
     solves = target.iteration.solves
     if solves.left < 2 * count:
         return None, None, True
@@ -374,14 +390,8 @@ def most_probable(
     kept = measurement.select([number for number, partner in pairs if partner >= 0])
     low, high = parametric.lower, parametric.upper
     centre = np.clip(point.q, np.where(low < 0.0, 0.99 * low, 0.01 * high), 0.99 * high)
-    root, known = np.asarray(np.linalg.cholesky(covariance)), len(centre)
-    if known > _MANY:
-        # The precision of the prior is 1 here but along as many directions as there are data.
-        _, turns = np.linalg.eigh((root.T * parametric.precision) @ root)
-        known = min(known, len(kept) + (kept.total_mass is not None))
-        turns, _ = np.linalg.qr(np.hstack([turns[:, :known], np.eye(len(centre))]))
-        root = root @ (turns * np.sign(turns[np.abs(turns).argmax(axis=0), range(len(centre))]))
-    return Target(iteration, point, centre, root, known, kept, discrepancy)
+    root = np.asarray(np.linalg.cholesky(covariance))
+    return Target(iteration, point, centre, root, len(centre), kept, discrepancy)
 
 
 class _Ensemble:
@@ -477,7 +487,7 @@ class _Split:
                 self.z[taken], self.v[taken], density[taken] = z[taken], v[taken], trial[taken]
             self.target.redraw(self.z, self.rng)
             self.chain.append(np.column_stack([self.z[:, :known], self.v]))
-            if len(self.chain) % _MOVES == 0:
+            if len(self.chain) % _SWEEPS == 0:
                 self.kept.append(self._points(self.z, self.v)[0])
 
     @property
@@ -488,7 +498,7 @@ class _Split:
     @property
     def draws(self) -> FloatArray:
         """Return those of q and v after the first steps, (n, p + 1)."""
-        return np.concatenate(self.kept[_BLOCK // 2 // _MOVES :])
+        return np.concatenate(self.kept[_BLOCK // 2 // _SWEEPS :])
 
     def settle(self, longest: int) -> tuple[FloatArray, dict[str, float]]:
         """Return draws of q and v, (n, p + 1), after so many steps as they need, and how many.
@@ -497,11 +507,11 @@ class _Split:
             StrategyFailure: when the longest chain is too short for its autocorrelation.
         """
         time = _settled(lambda: np.array(self.chain), self._walk, longest)
-        draws = np.concatenate(self.kept[int(np.ceil(_BURN_IN * time / _MOVES)) :])
+        draws = np.concatenate(self.kept[int(np.ceil(_BURN_IN * time / _SWEEPS)) :])
         return draws, {
             "steps": self.steps,
             "autocorrelation_time": time,
-            "effective_samples": len(draws) * min(_MOVES / time, 1.0),
+            "effective_samples": len(draws) * min(_SWEEPS / time, 1.0),
         }
 
 
@@ -511,7 +521,7 @@ def _start(target: Target, rng: np.random.Generator, count: int, wide: float) ->
     z[:, : target.known] = wide * rng.standard_normal((count, target.known))
     while (outside := ~target.inside(target.at(z))).any():
         z[outside] /= 2.0
-    for _ in range(_MOVES):
+    for _ in range(_SWEEPS):
         target.redraw(z, rng)
     return z
 
@@ -519,7 +529,8 @@ def _start(target: Target, rng: np.random.Generator, count: int, wide: float) ->
 def _settled(chain: Callable[[], FloatArray], go_on: Callable[[], object], longest: int) -> float:
     """Return the autocorrelation time of a chain that is long enough; raises StrategyFailure."""
     while True:
-        steps, time = len(chain()), autocorrelation_time(chain())
+        made = chain()
+        steps, time = len(made), autocorrelation_time(made)
         if steps >= _LONG_ENOUGH * time:
             return time
         if steps >= longest:
@@ -562,7 +573,7 @@ class _Transitional:
         return self.draws, {"steps": self.steps, **self.figures}
 
 
-_SAMPLERS: dict[str, type[_Ensemble | _Transitional]] = {
+_SAMPLERS: dict[str, type[_Ensemble | _Split | _Transitional]] = {
     "ensemble": _Ensemble,
     "transitional": _Transitional,
 }
