@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -14,10 +14,13 @@ from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.places import split_direction
 from femubench.core.fem.group_factors import GROUP
 from femubench.core.fem.mesh import place_xyz
+from femubench.core.modal.group_prior import GroupPriors
+from femubench.core.modal.interfaces import Interfaces
 from truths.solid_drawing import JOINT, NEAR, group_of
 from truths.suite import structures
 
 STIFFNESS, MASS, BOTH = "member-stiffness", "group-mass", "group-material"
+SOFTNESS = "interface-softness"
 # Effects of a member -> what scales in its group.
 OF_MEMBER = {
     "local-stiffness-loss": (STIFFNESS,),
@@ -33,7 +36,8 @@ def truth_in_groups(truth: KnownCase, model: Model) -> KnownCase:
     """Return a truth whose causes also count as found in the groups of a drawing.
 
     A loose joint or a soft foot is the joint's group, or where it has none the member that ends
-    there; a soft foot is in the plate that is held, too, whose cells are soft. A material or a wall
+    there; a soft foot is in the plate that is held, too, whose cells are soft, or in what lies
+    between them and the ground. A material or a wall
     scales stiffness and mass of the member's group.
 
     Arguments:
@@ -42,7 +46,9 @@ def truth_in_groups(truth: KnownCase, model: Model) -> KnownCase:
     """
     groups = {*model.groups, *model.mass_groups}
     plates = plates_held(truth.structure)
-    return replace(truth, causes=tuple(_in_groups(cause, groups, plates) for cause in truth.causes))
+    grounds = [p for p in GroupPriors(model).interfaces.places if Interfaces.GROUND in p]
+    causes = tuple(_in_groups(cause, groups, plates, grounds) for cause in truth.causes)
+    return replace(truth, causes=causes)
 
 
 def plates_held(name: str) -> dict[str, list[str]]:
@@ -55,7 +61,9 @@ def plates_held(name: str) -> dict[str, list[str]]:
     return found
 
 
-def _in_groups(cause: TrueCause, groups: set[str], plates: Mapping[str, list[str]]) -> TrueCause:
+def _in_groups(
+    cause: TrueCause, groups: set[str], plates: Mapping[str, list[str]], grounds: Iterable[str]
+) -> TrueCause:
     joint = cause.place.removeprefix("support:").rpartition("@")[2]
     member = next((g for g in groups if g == cause.place.partition("/")[0]), None)
     found: list[str] = []
@@ -63,6 +71,8 @@ def _in_groups(cause: TrueCause, groups: set[str], plates: Mapping[str, list[str
         zones = {g for g in groups if g == JOINT + joint or g.startswith(f"{JOINT}{joint}-")}
         zones |= {*plates.get(joint, ())} & groups if cause.effect == SOFT_FOOT else set()
         found = [f"{STIFFNESS}@{GROUP}{zone}" for zone in sorted(zones)]
+        if cause.effect == SOFT_FOOT:
+            found += [f"{SOFTNESS}@{word}" for word in grounds if word.rpartition("|")[2] in zones]
     elif member is not None:
         found = [f"{name}@{GROUP}{member}" for name in OF_MEMBER.get(cause.effect, ())]
     return replace(cause, also=(*cause.also, *found))

@@ -115,7 +115,7 @@ def test_terms_are_what_the_model_changes_by(
 
 def split(model: Model, left: float) -> Model:
     """Return the two flats apart, with springs at the seam of which so much is left in series."""
-    softer, rows = GroupPriors(model).interfaces.sides[SEAM]
+    softer, rows = GroupPriors(model).interfaces.edges[SEAM][:2]
     n, p = model.size, len(rows)
     own = np.arange(n)
     own[rows] = n + np.arange(p)
@@ -141,6 +141,76 @@ def test_an_interface_moves_as_two_parts_on_springs(bent: Model, left: float) ->
     found, exact = hertz(SOFT.extend(bent, SEAM, [left - 1.0])), hertz(split(bent, left))
     np.testing.assert_allclose(found[:6], exact[:6], rtol=1e-3)
     assert (hertz(bent) > found).any()
+
+
+@pytest.fixture(scope="module")
+def stood(tmp_path_factory: pytest.TempPathFactory) -> tuple[Model, Model]:
+    """Return a frame on two feet of one part that are held below, and the same without a hold."""
+    file = tmp_path_factory.mktemp("stood") / "model.inp"
+    boxes: Boxes = {
+        "FEET": ((0, 0, 0), (60, 60, 20)), "POST": ((20, 20, 20), (40, 40, 200)),
+        "HEAD": ((20, 20, 200), (240, 40, 220)), "LEG": ((220, 20, 20), (240, 40, 200)),
+        "FEET2": ((200, 0, 0), (260, 60, 20)),
+    }  # fmt: skip
+    write_deck(file, "C3D8I", 20.0, 1.0, boxes, {"FEET": 7e4, "FEET2": 7e4})
+    text, models = file.read_text().replace("ELSET=FEET2\n", "ELSET=FEET\n"), []
+    text = text.replace("C3D8I, ELSET=FEET2", "C3D8I, ELSET=FEET")
+    text = text.partition("*MATERIAL, NAME=FEET2")[0] + "*BOUNDARY" + text.partition("*BOUNDARY")[2]
+    for own in (text, text.partition("*BOUNDARY")[0]):
+        file.write_text(own)
+        models.append(femubench.read_model(file, unit="mm"))
+    return models[0], models[1]
+
+
+def on_springs(free: Model, at: FloatArray, left: float) -> Model:
+    """Return a model that stands on springs at some nodes, of which so much is left in series."""
+    rows = np.flatnonzero((abs(free.dofs.xyz[:, None] - at).max(axis=2) < 1e-9).any(axis=1))
+    part = free.groups["FEET"]
+    springs = sp.csc_array(free.stiffness.shape).tolil()
+    springs[np.ix_(rows, rows)] = left / (1.0 - left) * part[rows][:, rows]
+    return replace(free, stiffness=free.stiffness + springs.tocsc())
+
+
+def test_a_foot_gives_as_one_on_springs(stood: tuple[Model, Model]) -> None:
+    held, free = stood
+    places = ["interface:ground 1|FEET", "interface:ground 2|FEET"]
+    assert [p for p in SOFT.places(held) if "ground" in p] == places
+    below = free.dofs.xyz[free.dofs.xyz[:, 2] == 0.0]
+    assert free.size - held.size == len(below) > 50
+    for left in (0.5, 0.03, 1e-3):
+        both = SOFT.extend(SOFT.extend(held, places[0], [left - 1.0]), places[1], [left - 1.0])
+        exact = on_springs(free, below, left)
+        np.testing.assert_allclose(hertz(both)[:6], hertz(exact)[:6], rtol=1e-3)
+    one, other = (hertz(SOFT.extend(held, place, [-0.99])) for place in places)
+    np.testing.assert_allclose(one, other, rtol=1e-6)  # of one frame, seen from both sides
+    assert GroupPriors(held).supports == frozenset()
+    stated = SOFT.places(replace(held, group_kinds={"FEET": "support"}))
+    assert stated == ("interface:LEG|HEAD", "interface:POST|HEAD")
+
+
+def test_grounds_follow_their_rows(stood: tuple[Model, Model]) -> None:
+    """In other units, in a basis and with some more held a foot gives the same."""
+    held, place = stood[0], "interface:ground 2|FEET"
+    assert isinstance(held.geometry, MatrixGeometry)
+    soft = SOFT.extend(held, place, [-0.97])
+    by = Similarity(2.0, 3.0, 0.5)
+    similar = SOFT.extend(similar_matrices(held, held.geometry, by), place, [-0.97])
+    np.testing.assert_allclose(hertz(similar), by.frequency * hertz(soft), rtol=1e-7)
+    top = tuple(Support(Place(joint=name), ("x", "y")) for name in list(held.geometry.places)[-2:])
+    stayed = [alter_model(model, Alteration(supports=top)) for model in (held, soft)]
+    own = SOFT.extend(stayed[0], place, [-0.97])
+    np.testing.assert_allclose(hertz(own), hertz(stayed[1]), rtol=1e-9)
+    kept = np.arange(held.size)[:: held.size // 12]
+    for left in (0.5, 0.03, 1e-3):
+        found = reduce_groups(held, kept, 12)
+        assert found.moved < 1e-3
+        stiffness, mass = (
+            whole + sum((left - 1.0) ** p * pair[i] for p, pair in found.powers[place].items())
+            for i, whole in enumerate((found.stiffness, found.mass))
+        )
+        values = la.eigh(stiffness, mass, eigvals_only=True)[:12]
+        exact = hertz(SOFT.extend(held, place, [left - 1.0]), 12)[:12]
+        np.testing.assert_allclose(np.sqrt(values) / (2.0 * np.pi), exact, rtol=1e-3)
 
 
 def test_joints_that_are_drawn_and_bases_have_no_interfaces(bent: Model) -> None:

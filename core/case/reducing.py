@@ -96,11 +96,14 @@ def _small_model(model: Model, found: GroupedReduction) -> Model:
         stiffness=sp.csc_array(found.stiffness),
         dofs=small,
         geometry=MatrixGeometry(names, small, mesh=mesh),
-        # What holds to ground is not to be seen in coordinates that lie nowhere.
-        group_kinds={**dict.fromkeys(GroupPriors(model).supports, "support"), **model.group_kinds},
+        # What holds to ground, and what not, is not to be seen in coordinates that lie nowhere.
+        group_kinds={
+            name: GroupPriors(model).kind(name) for name in {**model.groups, **model.mass_groups}
+        },
         groups=sparse(found.groups),
         mass_groups=sparse(found.mass_groups),
         powers=replace(model, powers=found.powers).map_powers(sp.csc_array, sp.csc_array),
+        grounds={},
     )
 
 

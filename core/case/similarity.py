@@ -31,7 +31,7 @@ from femubench.core.fem.frame import (
     RigidEnd,
     Vector,
 )
-from femubench.core.fem.model import Dofs, Model
+from femubench.core.fem.model import Dofs, Edge, Model
 from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import DIRECTIONS, Sensors
 from femubench.core.modal.measurement import Measurement
@@ -173,6 +173,7 @@ def similar_matrices(model: Model, geometry: MatrixGeometry, by: Similarity) -> 
         powers=model.map_powers(
             lambda part: scale_matrix(part, stiffness), lambda part: scale_matrix(part, mass)
         ),
+        grounds={name: _edge(edge, mass, stiffness, by) for name, edge in model.grounds.items()},
         dofs=dofs,
         geometry=replace(geometry, dofs=dofs, outlines=outlines),
     )
@@ -195,6 +196,17 @@ def scale_matrix(matrix: SparseArray, factor: SparseArray) -> SparseArray:
     """Return a matrix with one of `matrix_factors` from both sides, (n, n)."""
     found: SparseArray = (factor @ matrix @ factor).asformat(matrix.format)
     return found
+
+
+def _edge(edge: Edge, mass: SparseArray, stiffness: SparseArray, by: Similarity) -> Edge:
+    """Return what is held by translations of the similar structure."""
+    heavy, stiff = by.mass, by.stiffness(DIRECTIONS[0])
+    return edge._replace(
+        pulled=np.sqrt(stiff) * (stiffness @ edge.pulled),
+        carried=np.sqrt(heavy) * (mass @ edge.carried),
+        stiff=stiff * edge.stiff,
+        heavy=heavy * edge.heavy,
+    )
 
 
 def similar_frame(frame: Frame, by: Similarity) -> Frame:

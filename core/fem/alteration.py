@@ -278,6 +278,7 @@ def _hold(model: Model, supports: Sequence[Support]) -> Model:
         groups={name: _block(part, kept) for name, part in model.groups.items()},
         mass_groups={name: _block(part, kept) for name, part in model.mass_groups.items()},
         powers=model.map_powers(*[lambda part: _block(part, kept)] * 2),
+        grounds={name: edge.take(kept) for name, edge in model.grounds.items()},
     )
 
 

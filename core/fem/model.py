@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import scipy.linalg as la
@@ -24,6 +24,30 @@ from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 # Stiffness and mass, (n, n) each, by the power of a value that they come with.
 Powers = Mapping[int, tuple[SparseArray, SparseArray]]
 _NEGLIGIBLE = 1e-14  # of the largest eigenvalue of a change
+
+
+class Edge(NamedTuple):
+    """What a part resists and weighs where it may move apart from what it meets.
+
+    Arguments:
+        part: a group of the stiffness.
+        near: rows of the model at the edge, (k,).
+        pulled, carried: stiffness and mass between all rows and the motions apart, (n, p).
+        stiff, heavy: those of the motions apart, (p, p).
+    """
+
+    part: str
+    near: IntArray
+    pulled: SparseArray
+    carried: SparseArray
+    stiff: SparseArray
+    heavy: SparseArray
+
+    def take(self, rows: IntArray) -> Edge:
+        """Return what some rows of the model have of it, (k,)."""
+        pulled, carried = (sp.csr_array(part)[rows] for part in (self.pulled, self.carried))
+        near = np.flatnonzero(np.isin(rows, self.near))
+        return self._replace(near=near, pulled=pulled, carried=carried)
 
 
 @dataclass(frozen=True)
@@ -150,6 +174,7 @@ class Model(Shown):
             rows begin with those of the whole; None where nobody knows better ones.
         powers: by a place, what comes with powers of a value there: of `group:NAME` (`all` where it
             is the only part) the thickness of its plates over that drawn.
+        grounds: by ``ground|NAME``, where nodes of a part are held, what it does when they give.
     """
 
     mass: SparseArray
@@ -167,6 +192,7 @@ class Model(Shown):
     group_kinds: Mapping[str, str] = field(default_factory=dict)
     finer: Callable[[], tuple[Model, Model]] | None = None
     powers: Mapping[str, Powers] = field(default_factory=dict)
+    grounds: Mapping[str, Edge] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return its fields alone: what was made of this very model stays with it."""

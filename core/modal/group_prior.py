@@ -62,16 +62,17 @@ class GroupPriors:
     def supports(self) -> frozenset[str]:
         """Return the groups of the stiffness that hold the structure to ground.
 
-        A group is a support where its matrix couples no two dofs, or where a rigid-body motion
+        What the case states; else a group is a support where its matrix couples no two dofs, or where a rigid-body motion
         costs it a tenth of the energy that its entries would have without cancelling each other.
         The latter is asked only where positions and directions of the dofs are known to be right:
-        where some group that couples dofs has no energy in any rigid-body motion.
+        where some group that couples dofs has no energy in any rigid-body motion. A part of which
+        it is known what its held nodes do is none.
 
         Examples:
             >>> modal.GroupPriors(model).supports
             frozenset()
         """
-        return _supports(self.model)
+        return frozenset(name for name in self.model.groups if self.kind(name) == "support")
 
     @property
     def interfaces(self) -> Interfaces:
@@ -126,7 +127,8 @@ class GroupPriors:
         """
         if name.startswith(Interfaces.PREFIX):
             return "joint"
-        return self.model.group_kinds.get(name, "support" if name in self.supports else "part")
+        found = "support" if name in _supports(self.model) else "part"
+        return self.model.group_kinds.get(name, found)
 
 
 @cache_by_model
@@ -140,4 +142,5 @@ def _supports(model: Model) -> frozenset[str]:
     energy = {name: _energy(part, rigid) for name, part in rest.items()}
     known = any(share < _FREE for share in energy.values())
     free = {name for name, share in energy.items() if not (known and share > _HELD)}
+    free |= {edge.part for edge in model.grounds.values()}
     return frozenset(set(model.groups) - free)

@@ -220,14 +220,12 @@ class _Patch:
 
     def __init__(self, model: Model, meet: Interfaces, place: str, shift: float) -> None:
         self.meet, self.place, self.shift = meet, place, shift
-        name, side = meet.sides[place]
-        stiffness = sp.csr_array(model.stiffness)
-        self.rows = _neighbourhood(stiffness, side, _SEAM)[-1]
+        edge, stiffness = meet.edges[place], sp.csr_array(model.stiffness)
+        self.rows = _neighbourhood(stiffness, edge.near, _SEAM)[-1]
         self._across = stiffness[self.rows], sp.csr_array(model.mass)[self.rows]
         whole = self._across[0] + shift * self._across[1]
         self._reach, self._whole = np.unique(whole.indices), whole[:, self.rows]
-        self._pulled = sp.csc_array(model.groups[name])[:, side][self.rows]
-        self._held = self._pulled[np.searchsorted(self.rows, side)].toarray()
+        self._pulled, self._held = sp.csc_array(edge.pulled)[self.rows], edge.stiff.toarray()
 
     def unbalance(
         self, span: _Substructures, vectors: FloatArray, shifted: FloatArray, mass: FloatArray,
@@ -309,7 +307,7 @@ def _enlarge(
 
 def _soften(whole: _Reduced, meet: Interfaces, place: str) -> _PartialMatrix:
     """Return what the softer part of an interface resists by it, in the coordinates."""
-    at = whole.blocks["stiffness", meet.sides[place][0]].at
+    at = whole.blocks["stiffness", meet.edges[place].part].at
     return _PartialMatrix(at, meet.powers(place, lambda f: whole.span.forces(f)[at])[1][0])
 
 
@@ -416,13 +414,13 @@ class _Substructures:
         self.shapes = sp.csr_array((found.data, places), shape=(self.size, found.shape[1]))
         self.insides: list[_Interior] = []
         inertia = sp.csr_array(model.mass)
-        sides = GroupPriors(model).interfaces.sides.values()
+        edges = GroupPriors(model).interfaces.edges.values()
         for i in range(len(parts)):
             rows = np.flatnonzero(~border & (owner == i))
             if len(rows):
                 softest = soft[i][0] if i < len(names) else 1.0
                 name = names[i] if i < len(names) else ""
-                loose = [self.shapes[own].indices for side, own in sides if side == name]
+                loose = [self.shapes[edge.near].indices for edge in edges if edge.part == name]
                 self._eliminate(
                     whole[rows], inertia[rows], rows, known, highest / softest,
                     np.concatenate([rows[:0], *loose]),

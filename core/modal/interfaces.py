@@ -8,6 +8,8 @@ what A resists by the interface,
     K(f) = K - (1 - f) K_a' K_aa^-1 K_a ,
 
 and the mass of A moves by d with it. At f = 1 the parts are one piece, at zero they touch no more.
+Where the nodes of A are held, the other part is the ground, and the same holds with what the model
+does not have of these nodes.
 
 Source: Guyan (1965), AIAA Journal 3, for motions that follow without inertia forces of their own.
 """
@@ -24,7 +26,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.model import Model, Powers
+from femubench.core.fem.model import Edge, Model, Powers
 from femubench.core.modal.eigen import cache_by_model
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
@@ -36,28 +38,31 @@ _LOOSE = 1e-10  # of the stiffness there: what resists no motion
 class Interfaces:
     """The places of a model from matrices where two parts share nodes: ``interface:A|B``.
 
+    Where nodes of a part are held it is ``interface:ground|A``.
+
     Arguments:
         model: any model; of a frame, or without groups, there are none.
-        parts: names of its groups between which there may be some.
+        parts: names of its groups between which, and under which, there may be some.
     """
 
     PREFIX: ClassVar[str] = "interface:"
+    GROUND: ClassVar[str] = "interface:ground"
 
     model: Model
     parts: tuple[str, ...]
 
     @property
-    def sides(self) -> dict[str, tuple[str, IntArray]]:
-        """Return the softer of two parts and the rows that both have, (p,), by interface.
+    def edges(self) -> dict[str, Edge]:
+        """Return what the softer of two parts, or one that is held, does apart, by interface.
 
         In a basis, where all groups have all coordinates, there are none to be found.
         """
-        return _sides(self.model, self.parts)
+        return _edges(self.model, self.parts)
 
     @property
     def places(self) -> tuple[str, ...]:
         """Return all interfaces; where the model is in a basis, those that it was given."""
-        return tuple(p for p in self.model.powers if p.startswith(self.PREFIX)) or tuple(self.sides)
+        return tuple(p for p in self.model.powers if p.startswith(self.PREFIX)) or tuple(self.edges)
 
     def powers(self, place: str, onto: Callable[[SparseArray], FloatArray] | None = None) -> Powers:
         """Return stiffness and mass that come with powers of f - 1.
@@ -72,24 +77,20 @@ class Interfaces:
         """
         if onto is None and place in self.model.powers:
             return self.model.powers[place]
-        if place not in self.sides:
+        if place not in self.edges:
             raise ModelError(f"no two parts meet at {place!r}")
-        name, rows = self.sides[place]
-        whole = self.model.groups[name]
-        stiff, heavy = (
-            sp.csr_array(sp.csc_array(part)[:, rows])
-            for part in (whole, self.model.mass_groups.get(name, 0.0 * whole))
-        )
+        edge = self.edges[place]
+        stiff, heavy = sp.csr_array(edge.pulled), sp.csr_array(edge.carried)
         near = np.flatnonzero(np.diff(stiff.indptr) + np.diff(heavy.indptr))
         pulled, carried = (
             part[near].toarray() if onto is None else onto(part) for part in (stiff, heavy)
         )
-        follow = pulled @ loose_inverse(stiff[rows].toarray())
-        cross, moved = carried @ follow.T, follow @ heavy[rows].toarray() @ follow.T
+        follow = pulled @ loose_inverse(edge.stiff.toarray())
+        cross, moved = carried @ follow.T, follow @ edge.heavy @ follow.T
         found = {1: (pulled @ follow.T, cross + cross.T), 2: (0.0 * moved, moved)}
         if onto is not None:
             return found
-        pick = sp.csr_array(sp.eye_array(len(whole.indptr) - 1, format="csc")[:, near])
+        pick = sp.csr_array(sp.eye_array(self.model.size, format="csc")[:, near])
         return {
             power: (sp.csc_array(pick @ k @ pick.T), sp.csc_array(pick @ m @ pick.T))
             for power, (k, m) in ((p, map(sp.csr_array, pair)) for p, pair in found.items())
@@ -99,18 +100,16 @@ class Interfaces:
         """Return what K x and M x grow by, by f, how much of an interface is left, and motions x.
 
         Arguments:
-            place: one of `sides`.
+            place: one of `edges`.
         """
-        name, rows = self.sides[place]
-        part = self.model.groups[name]
-        heavy, pulled = self.model.mass_groups.get(name, 0.0 * part), sp.csc_array(part)[:, rows]
-        whole = loose_inverse(pulled[rows].toarray())
+        edge = self.edges[place]
+        whole = loose_inverse(edge.stiff.toarray())
 
         def added(left: float, motions: FloatArray) -> tuple[FloatArray, FloatArray]:
-            inverse, apart = (left - 1.0) * whole, np.zeros_like(motions)
-            apart[rows] = inverse @ (pulled.T @ motions)
-            carried = heavy @ (motions + apart)
-            return part @ apart, heavy @ apart + pulled @ (inverse @ carried[rows])
+            inverse = (left - 1.0) * whole
+            apart = inverse @ (edge.pulled.T @ motions)
+            carried = edge.carried.T @ motions + edge.heavy @ apart
+            return edge.pulled @ apart, edge.carried @ apart + edge.pulled @ (inverse @ carried)
 
         return added
 
@@ -123,7 +122,7 @@ def loose_inverse(stiffness: FloatArray) -> FloatArray:
 
 
 @cache_by_model
-def _sides(model: Model, parts: tuple[str, ...]) -> dict[str, tuple[str, IntArray]]:
+def _edges(model: Model, parts: tuple[str, ...]) -> dict[str, Edge]:
     size = {name: model.groups[name].diagonal() for name in parts}
     found = {}
     for pair in combinations(parts, 2):
@@ -131,5 +130,14 @@ def _sides(model: Model, parts: tuple[str, ...]) -> dict[str, tuple[str, IntArra
         least = min(np.count_nonzero(size[name]) for name in pair)
         if 0 < len(rows) <= _MOST and 2 * len(rows) < least:
             softer = min(pair, key=lambda name: float(size[name][rows].sum()))
-            found[f"{Interfaces.PREFIX}{'|'.join(pair)}"] = softer, rows
-    return found
+            found[f"{Interfaces.PREFIX}{'|'.join(pair)}"] = _edge(model, softer, rows)
+    held = {name: edge for name, edge in model.grounds.items() if edge.part in parts}
+    return found | {f"{Interfaces.PREFIX}{name}": edge for name, edge in held.items()}
+
+
+def _edge(model: Model, name: str, rows: IntArray) -> Edge:
+    whole = model.groups[name]
+    columns = [
+        sp.csc_array(part)[:, rows] for part in (whole, model.mass_groups.get(name, 0.0 * whole))
+    ]
+    return Edge(name, rows, *columns, *(part[rows] for part in columns))

@@ -209,7 +209,8 @@ def _in_another_order(model: Model, geometry: MatrixGeometry, names: Disguise) -
         stiffness=turned(model.stiffness),
         groups={groups[name]: turned(part) for name, part in model.groups.items()},
         mass_groups={groups[name]: turned(part) for name, part in model.mass_groups.items()},
-        powers={},  # no disguise has plates
+        powers={},  # no disguise has plates, nor knows what is held
+        grounds={},
         group_priors={groups[name]: prior for name, prior in model.group_priors.items()},
         group_kinds={groups[name]: kind for name, kind in model.group_kinds.items()},
         dofs=moved,

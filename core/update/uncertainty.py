@@ -89,7 +89,7 @@ class Uncertainty:
                 made = make(draw)
                 if made.groups or made.mass_groups:
                     # Each is as large as the whole, and nothing is asked of them any more.
-                    made = replace(made, groups={}, mass_groups={}, powers={})
+                    made = replace(made, groups={}, mass_groups={}, powers={}, grounds={})
                 models.append(made)
         return cls(tuple(models), discrepancy_std)
 

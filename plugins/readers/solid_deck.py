@@ -11,9 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from femubench import InputError, Model
-from femubench.fem import FloatArray, Groups, MatrixGeometry, SparseArray, matrix_model
+from femubench.fem import Edge, FloatArray, Groups, MatrixGeometry, SparseArray, matrix_model
 from femubench.modal import GroupPriors
 from femubench.plugins.readers import nodes, shells, solid_elements
 from femubench.plugins.readers.attachments import NodeMotions, rigid
@@ -28,6 +29,7 @@ _BETTER = {**solid_elements.BETTER, **shells.BETTER}
 _TIED = 100.0  # times what holds the nodes of a coupling as a body: how its reference node is
 _SAME = 1e-9  # of the largest entry: what rounding leaves of a factor
 _POWERS, _THICKNESSES = (1, 3, 5), np.array([1.0, 0.75, 1.3])  # over that drawn
+_MOST_HELD = 1500  # directions of nodes under one part
 _SOLVED = 10_000  # degrees of freedom up to which better elements are tried: four times as many
 
 
@@ -142,6 +144,7 @@ def _model_of(
     coated = {n for name in deck.coated for n in deck.sets[name]}
     swells = [solid.swell(row, factor) for factor in _THICKNESSES[1:] if solid.lines]
     plates: dict[str, Powers] = {}
+    grounds: dict[str, Edge] = {}
     parts: dict[str, SparseArray] = {}
     masses: dict[str, SparseArray] = {}
     mass = sp.csc_array(_point_masses(deck, found) + hung.mass(deck.attached.masses))
@@ -150,6 +153,7 @@ def _model_of(
         parts[name] = hung.reduced(stiffness)
         masses[name] = hung.reduced(inertia)
         mass += masses[name]
+        grounds |= _grounds(name, stiffness, inertia, hung.moved)
         heavy[name] = float(inertia.sum())
         if all(deck.elements[n][0] in shells.SHELLS and n not in coated for n in numbers):
             pairs = [(parts[name], masses[name])]
@@ -185,6 +189,7 @@ def _model_of(
             name: {p: (k[left][:, left], m[left][:, left]) for p, (k, m) in own.items()}
             for name, own in plates.items()
         }
+        grounds = {name: edge.take(np.array(left)) for name, edge in grounds.items()}
         found, axes = [found[i] for i in left], axes[left]
     labels = [names.get(motion.node, str(motion.node)) for motion in found]
     parts = {name: part for name, part in parts.items() if part.count_nonzero()}
@@ -198,7 +203,7 @@ def _model_of(
     )
     prefix = Groups.PREFIX
     powers = {f"{prefix}{n}" if len(parts) > 1 else "all": own for n, own in plates.items()}
-    model = replace(model, powers=powers)
+    model = replace(model, powers=powers, grounds=grounds if len(parts) > 1 else {})
     dofs = replace(model.dofs, axes=axes)
     if solid.lines:
         geometry = MatrixGeometry(tuple(dict.fromkeys(labels)), dofs)
@@ -214,6 +219,34 @@ def _model_of(
     grounds = GroupPriors(model).supports - heavy.keys()
     kinds = dict.fromkeys(small - grounds, "joint")
     return replace(model, mass_groups=masses if len(masses) > 1 else {}, group_kinds=kinds)
+
+
+def _grounds(
+    part: str, stiffness: SparseArray, mass: SparseArray, moved: SparseArray
+) -> dict[str, Edge]:
+    """Return what a part does where its nodes are held: one a patch, ``ground|PART``.
+
+    Of several under one part the words are ``ground 1|PART`` and so on.
+
+    Arguments:
+        stiffness, mass: of the part, of the translations of all nodes, (3 N, 3 N) each.
+        moved: what the degrees of freedom do to these, (3 N, n), by rows.
+    """
+    held = np.diff(moved.indptr).reshape(-1, 3).max(axis=1) == 0
+    own = np.flatnonzero(held & (stiffness.diagonal().reshape(-1, 3).max(axis=1) > 0.0))
+    rows = (3 * own[:, None] + np.arange(3)).ravel()
+    count, patch = connected_components(stiffness[rows][:, rows], directed=False)
+    found: dict[str, Edge] = {}
+    for i in range(count):
+        at = rows[patch == i]
+        if len(at) > _MOST_HELD:
+            continue
+        pulled, carried = (sp.csr_array(moved.T @ part[:, at]) for part in (stiffness, mass))
+        own_matrices = (sp.csc_array(part[at][:, at]) for part in (stiffness, mass))
+        near = np.flatnonzero(np.diff(pulled.indptr))
+        word = f"ground {i + 1}|{part}" if count > 1 else f"ground|{part}"
+        found[word] = Edge(part, near, pulled, carried, *own_matrices)
+    return found
 
 
 def _find_powers(pairs: Sequence[tuple[SparseArray, SparseArray]]) -> Powers:
