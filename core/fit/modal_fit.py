@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any
+from functools import cached_property, partial
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.linalg as la
@@ -27,6 +27,7 @@ _LONGEST = 1.5  # prior deviations a step
 # Two modes closer than this share of an eigenvalue turn into each other at the least change; a
 # linear rule has no more to say there.
 _CLOSE = 1e-3
+_Kept = TypeVar("_Kept")
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,40 @@ class Problem:
         """Return how many of the lowest modes are compared with the measured ones."""
         return self.space.rigid + 2 * len(self.data.measurement) + _SPARE
 
+    def keep(
+        self, what: str, parts: Sequence[Projection], x: FloatArray, make: Callable[[], _Kept]
+    ) -> _Kept:
+        """Return what was made before of some hypotheses at the same coordinates, or make it.
+
+        Searches with other scales of the model error come by the same points.
+        """
+        key = what, id(self.data), x.tobytes(), *map(id, parts)
+        if key not in self.kept:
+            # With what it is of, so that an id in the key is no other's.
+            self.kept[key] = make(), self.data, tuple(parts)
+        value: _Kept = self.kept[key][0]
+        return value
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Modes in the coordinates of a space: the lowest ones, and above them what follows causes.
+
+    Arguments:
+        eigenvalues: (q,).
+        again: solves for the modes once more, which are too large to be kept for long.
+        first: the modes, (N, q), where they have just been solved.
+    """
+
+    eigenvalues: FloatArray
+    again: Callable[[], FloatArray]
+    first: FloatArray | None = None
+
+    @cached_property
+    def vectors(self) -> FloatArray:
+        """Return the modes, (N, q)."""
+        return self.again() if self.first is None else self.first
+
 
 @dataclass(frozen=True)
 class State:
@@ -59,8 +94,7 @@ class State:
     Arguments:
         parts: the hypotheses; none for the model as it is.
         x: coordinates, (k,).
-        eigenvalues, vectors: modes in the coordinates of the space, (q,) and (N, q): the lowest
-            ones, and above them what follows the hypotheses.
+        solution: modes in the coordinates of the space.
         partner: of every measured mode, (m,).
         mass: total mass in kg.
         raw: residuals in standard deviations of the measurement, (n_data,).
@@ -69,11 +103,20 @@ class State:
     problem: Problem = field(repr=False)
     parts: tuple[Projection, ...]
     x: FloatArray
-    eigenvalues: FloatArray = field(repr=False)
-    vectors: FloatArray = field(repr=False)
+    solution: Solution = field(repr=False)
     partner: IntArray = field(repr=False)
     mass: float
     raw: FloatArray = field(repr=False)
+
+    @property
+    def eigenvalues(self) -> FloatArray:
+        """Return the eigenvalues of the modes, (q,)."""
+        return self.solution.eigenvalues
+
+    @property
+    def vectors(self) -> FloatArray:
+        """Return the modes in the coordinates of the space, (N, q)."""
+        return self.solution.vectors
 
     @cached_property
     def residual(self) -> FloatArray:
@@ -118,6 +161,9 @@ class State:
         """Return d prediction / d x in standard deviations of the measurement, (n_data, k)."""
         if not self.parts:
             return np.zeros((len(self.raw), 0))
+        return self.problem.keep("slopes", self.parts, self.x, self._worked_out)
+
+    def _worked_out(self) -> FloatArray:
         near, values = self.vectors[:, self.partner], self.eigenvalues[self.partner]
         return self.rows(*self.problem.space.forces(self.parts, self.x, near, values))
 
@@ -175,6 +221,26 @@ def state_at(
     Raises:
         ModelError: when they make the mass indefinite.
     """
+    first: list[FloatArray] = []
+
+    def make() -> tuple[FloatArray, IntArray, float, FloatArray]:
+        values, vectors, weight = _modes(problem, parts, x, every)
+        first.append(vectors)
+        raw, partner = _compared(problem.data, *_predicted(problem, values, vectors), weight)
+        return values, partner, weight, raw
+
+    what = "every mode" if every else "modes"
+    found = problem.keep(what, parts, x, make) if parts else make()
+    values, partner, weight, raw = found
+    again = partial(_vectors, problem, parts, x, every)
+    solution = Solution(values, again, first[0] if first else None)
+    return State(problem, tuple(parts), x, solution, partner, weight, raw + problem.offset)
+
+
+def _modes(
+    problem: Problem, parts: Sequence[Projection], x: FloatArray, every: bool
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return eigenvalues (q,), modes (N, q) and the total mass in kg."""
     data = problem.data
     if parts:
         few = problem.space.condense(parts, len(problem.space) if every else problem.compared)
@@ -191,8 +257,13 @@ def state_at(
     for group, turn in data.turns(hertz, seen, problem.space.zero) if data.closeness else ():
         vectors[:, group] = vectors[:, group] @ turn
         seen[:, group] = seen[:, group] @ turn
-    raw, partner = _compared(problem.data, *_predicted(problem, values, vectors), weight)
-    return State(problem, tuple(parts), x, values, vectors, partner, weight, raw + problem.offset)
+    return values, vectors, weight
+
+
+def _vectors(
+    problem: Problem, parts: Sequence[Projection], x: FloatArray, every: bool
+) -> FloatArray:
+    return _modes(problem, parts, x, every)[1]
 
 
 def _predicted(

@@ -50,6 +50,12 @@ class Data:
     def __len__(self) -> int:
         return len(self.measurement) + len(self.shape_rows[0]) + (self.mass is not None)
 
+    def is_as(self, other: Data) -> bool:
+        """Tell whether other data are of the same measurement and compared in the same way."""
+        own, others = ((d.still, d.shape_label) for d in (self, other))
+        same = self.measurement is other.measurement and own == others
+        return same and np.array_equal(self.bias, other.bias)
+
     @property
     def mass(self) -> tuple[float, float] | None:
         """Return the weighed mass and its standard deviation in kg."""

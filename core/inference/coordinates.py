@@ -7,6 +7,7 @@ matrices in groups when they are read, a frame by fewer elements a member.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from femubench.core.change.hypothesis import Hypothesis
 from femubench.core.errors import NotApplicable
@@ -14,6 +15,7 @@ from femubench.core.fem.model import Model
 from femubench.core.fit.modal_basis import nominal_space, rigid_first
 from femubench.core.fit.modal_fit import Problem
 from femubench.core.fit.noise import Noise
+from femubench.core.fit.projection import Projection
 from femubench.core.fit.residuals import Data
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import Modes, all_modes, once_for
@@ -43,5 +45,17 @@ def place_data(model: Model, data: Data, noise: Noise, hypotheses: Sequence[Hypo
     Raises:
         NotApplicable, ModelError: as `modes_for`.
     """
-    space = nominal_space(model, modes_for(model), data.measurement.sensors, hypotheses)
-    return Problem(model, space, data, noise)
+    sensors = data.measurement.sensors
+    # Data are examined as they are and as they may be, next to one cause and next to several.
+    last: list[Any] = once_for(model, place_data, list)
+    if not last or last[0] is not sensors or not _are(hypotheses, last[1].projections):
+        last[:] = sensors, nominal_space(model, modes_for(model), sensors, hypotheses), data, {}
+    if not data.is_as(last[2]):
+        last[2:] = data, {}
+    return Problem(model, last[1], last[2], noise, kept=last[3])
+
+
+def _are(hypotheses: Sequence[Hypothesis], projections: Sequence[Projection]) -> bool:
+    """Tell whether projections are those of just these hypotheses."""
+    pairs = zip(hypotheses, projections, strict=False)
+    return len(hypotheses) == len(projections) and all(h is p.hypothesis for h, p in pairs)

@@ -19,6 +19,7 @@ import numpy as np
 import scipy.linalg as la
 from scipy.optimize import minimize
 
+from femubench.core.change.terms import MatrixOperator, heaviest_translation
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.discrepancy import Discrepancy
@@ -171,7 +172,7 @@ def _groups(nominal: State | ZeroRows, shapes: FloatArray) -> dict[str, FloatArr
         shapes: of its modes, in the order of the coordinates, (n, N).
     """
     model, near = nominal.problem.model, nominal.vectors[: shapes.shape[1], nominal.partner]
-    values = nominal.eigenvalues[nominal.partner]
+    values, motion = nominal.eigenvalues[nominal.partner], heaviest_translation(model)
     sure = {n: GroupPriors(model).std(n) < 2.0 * STRUCTURE_STD for n in model.groups}
     classes = {
         "group stiffness": [part for name, part in model.groups.items() if sure[name]],
@@ -183,10 +184,9 @@ def _groups(nominal: State | ZeroRows, shapes: FloatArray) -> dict[str, FloatArr
         heavy = name == "group mass"
         forces = np.zeros((len(nominal.vectors), len(values), len(parts)))
         for i, part in enumerate(parts):
-            own = shapes.T @ (part @ (shapes @ near))
+            own = shapes.T @ MatrixOperator(part).apply(shapes @ near)
             forces[: len(own), :, i] = -values * own if heavy else own
-        bare = [replace(model, mass=part, mass_change=None) for part in parts if heavy]
-        mass = [own.total_mass for own in bare] or [0.0] * len(parts)
+        mass = [motion @ (part @ motion) if heavy else 0.0 for part in parts]
         if parts:
             found[name] = nominal.rows(forces, np.array(mass))
     return found

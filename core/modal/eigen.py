@@ -225,6 +225,7 @@ def _solved(model: Model, count: int | None, sparsely: bool) -> Modes:
     if lowest is not None and lowest.count >= wanted:
         return lowest.first(wanted)
     count_evaluation()
+    stiffness: SparseArray | FloatArray = model.stiffness
     if not sparsely:
         mass, stiffness = dense_matrices(model)
         if not (np.isfinite(mass).all() and np.isfinite(stiffness).all()):
@@ -237,7 +238,7 @@ def _solved(model: Model, count: int | None, sparsely: bool) -> Modes:
     # phi' K phi sums terms of the size of |phi|' |K| |phi|, so that is what its rounding error
     # scales with; on fine meshes it exceeds any fixed share of the first elastic eigenvalue.
     small = np.abs(shapes)
-    bound = np.einsum("ij,ij->j", small, np.abs(model.stiffness) @ small)
+    bound = np.einsum("ij,ij->j", small, np.abs(stiffness) @ small)
     eigenvalues = np.where(np.abs(eigenvalues) <= _ROUNDOFF * bound, 0.0, eigenvalues)
     return Modes(eigenvalues, shapes, share > _RIGID_SHARE)
 

@@ -127,8 +127,8 @@ class GroupPriors:
         """
         if name.startswith(Interfaces.PREFIX):
             return "joint"
-        found = "support" if name in _supports(self.model) else "part"
-        return self.model.group_kinds.get(name, found)
+        stated = self.model.group_kinds.get(name)
+        return stated or ("support" if name in _supports(self.model) else "part")
 
 
 @cache_by_model

@@ -93,10 +93,9 @@ def orthonormal(vectors: FloatArray, gram: FloatArray, apart: float = 1e-10) -> 
 
 
 def rigid_share(model: Model, shapes: FloatArray, rigid: FloatArray) -> FloatArray:
-    """Return the share of each shape's kinetic energy that is rigid-body motion, 0..1, (m,)."""
-    if rigid.shape[1] == 0:
-        return np.zeros(shapes.shape[1])
-    weighted = model.mass_times(shapes)
-    norm = np.einsum("ij,ij->j", shapes, weighted)
-    share = np.square(rigid.T @ weighted).sum(axis=0)
-    return np.asarray(share / np.where(norm > 0.0, norm, 1.0))
+    """Return the share of each shape's kinetic energy that is rigid-body motion, 0..1, (m,).
+
+    Arguments:
+        shapes, rigid: mass-normalised, (n, m) and (n, r).
+    """
+    return np.asarray(np.square(model.mass_times(rigid).T @ shapes).sum(axis=0))
