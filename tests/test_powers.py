@@ -328,6 +328,7 @@ def test_thirty_frequencies_of_a_basis_hold_with_an_interface_a_thousandth(
     assert 0.4 * most < found.moved < 1e-3  # an estimate from below, by the softest and by others
 
 
+@pytest.mark.slow(5)
 def test_a_thinner_sheet_is_told_from_another_material(tmp_path: Path) -> None:
     """A hat on a strip bends as a beam by its membranes, and its flats as plates."""
     profile = 0.06 * np.array(
