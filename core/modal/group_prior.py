@@ -62,11 +62,11 @@ class GroupPriors:
     def supports(self) -> frozenset[str]:
         """Return the groups of the stiffness that hold the structure to ground.
 
-        What the case states; else a group is a support where its matrix couples no two dofs, or where a rigid-body motion
-        costs it a tenth of the energy that its entries would have without cancelling each other.
-        The latter is asked only where positions and directions of the dofs are known to be right:
-        where some group that couples dofs has no energy in any rigid-body motion. A part of which
-        it is known what its held nodes do is none.
+        What the case states; else a group is a support where its matrix couples no two dofs, or
+        where a rigid-body motion costs it a tenth of the energy that its entries would have without
+        cancelling each other. The latter is asked only where positions and directions of the dofs
+        are known to be right: where some group that couples dofs has no energy in any rigid-body
+        motion. A part of which it is known what its held nodes do is none.
 
         Examples:
             >>> modal.GroupPriors(model).supports
