@@ -36,6 +36,7 @@ from femubench.effect import FrameEffect
 from femubench.fem import FloatArray, MatrixGeometry, Place, Support
 from femubench.modal import GroupPriors
 from femubench.plugins.effects.powers import InterfaceSoftness, PlateThickness
+from femubench.plugins.readers.nodes import read_nodes
 from tests.simulated import modes_at
 
 THICK, SOFT = PlateThickness(), InterfaceSoftness()
@@ -382,3 +383,34 @@ def test_what_is_wrong_with_sheets_leads_from_files_alone(
     assert (said, {*places}) == (verdict, {cause[1]})
     found = json.loads(Path("found.json").read_text())
     assert found["causes"][0]["effect"] == cause[0]
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("modulus", "verdict", "places"),
+    [(210e3, "none", []), (20.0, "named", ["interface:ground|PLATE2"])],
+)
+def test_ground_that_gives_leads_from_files_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, modulus: float, verdict: str,
+    places: list[str],
+) -> None:  # fmt: skip
+    """The truth is of finer bricks on pads of 2 mm, of which the deck has none."""
+    monkeypatch.chdir(tmp_path)
+    frame: Boxes = {
+        "PLATE1": ((0, 0, 0), (80, 60, 10)), "POST1": ((30, 20, 10), (50, 40, 320)),
+        "HEAD": ((30, 20, 320), (450, 40, 345)), "POST2": ((430, 20, 10), (450, 40, 320)),
+        "PLATE2": ((400, 0, 0), (480, 60, 10)),
+    }  # fmt: skip
+    pads: Boxes = {"PAD1": ((0, 0, -2), (80, 60, 0)), "PAD2": ((400, 0, -2), (480, 60, 0))}
+    model = write_deck(Path("model.inp"), "C3D8I", 10.0, 1.0, frame)
+    held = [f"{node}, 1, 3" for node, (_, _, z) in read_nodes(model).items() if z == 0.0]
+    model.write_text("\n".join([model.read_text(), "*BOUNDARY", *held, ""]))
+    truth = write_deck(
+        Path("truth.inp"), "C3D20R", 14.0, 1.0, frame | pads, {"PAD1": 210e3, "PAD2": modulus}
+    )
+    sides = [(x, 30.0, z, "x") for x in (30, 450) for z in (80.0, 160.0, 240.0)]
+    fronts = [(x, 20.0, z, "y") for x in (40, 440) for z in (90.0, 200.0, 310.0)]
+    tops = [(x, 30.0, 345.0, "z") for x in (60.0, 160.0, 260.0, 340.0, 430.0)]
+    ridge = [(x, 20.0, 332.0, "y") for x in (120.0, 240.0, 360.0)]
+    write_responses(Path("test.uff"), truth, [*sides, *fronts, *tops, *ridge], first=0)
+    assert diagnose_files("model.inp", "test.uff") == (verdict, places)

@@ -29,7 +29,7 @@ _BETTER = {**solid_elements.BETTER, **shells.BETTER}
 _TIED = 100.0  # times what holds the nodes of a coupling as a body: how its reference node is
 _SAME = 1e-9  # of the largest entry: what rounding leaves of a factor
 _POWERS, _THICKNESSES = (1, 3, 5), np.array([1.0, 0.75, 1.3])  # over that drawn
-_MOST_HELD = 1500  # directions of nodes under one part
+_MOST_HELD, _MOST_PATCHES = 1500, 12  # directions of held nodes; patches, or all give together
 _SOLVED = 10_000  # degrees of freedom up to which better elements are tried: four times as many
 
 
@@ -216,8 +216,8 @@ def _model_of(
     model = replace(model, geometry=replace(model.geometry, outlines=drawn))
     least = JOINT_SHARE * sum(heavy.values())
     small = {name for name in model.groups if heavy.get(name, 0.0) < least}
-    grounds = GroupPriors(model).supports - heavy.keys()
-    kinds = dict.fromkeys(small - grounds, "joint")
+    springs = GroupPriors(model).supports - heavy.keys()
+    kinds = dict.fromkeys(small - springs, "joint")
     return replace(model, mass_groups=masses if len(masses) > 1 else {}, group_kinds=kinds)
 
 
@@ -226,7 +226,7 @@ def _grounds(
 ) -> dict[str, Edge]:
     """Return what a part does where its nodes are held: one a patch, ``ground|PART``.
 
-    Of several under one part the words are ``ground 1|PART`` and so on.
+    Of several under one part the words are ``ground 1|PART`` and so on; many give together.
 
     Arguments:
         stiffness, mass: of the part, of the translations of all nodes, (3 N, 3 N) each.
@@ -236,16 +236,17 @@ def _grounds(
     own = np.flatnonzero(held & (stiffness.diagonal().reshape(-1, 3).max(axis=1) > 0.0))
     rows = (3 * own[:, None] + np.arange(3)).ravel()
     count, patch = connected_components(stiffness[rows][:, rows], directed=False)
+    if count > _MOST_PATCHES:
+        count, patch = 1, 0 * patch
     found: dict[str, Edge] = {}
     for i in range(count):
         at = rows[patch == i]
-        if len(at) > _MOST_HELD:
-            continue
-        pulled, carried = (sp.csr_array(moved.T @ part[:, at]) for part in (stiffness, mass))
-        own_matrices = (sp.csc_array(part[at][:, at]) for part in (stiffness, mass))
-        near = np.flatnonzero(np.diff(pulled.indptr))
+        across = [sp.csr_array(moved.T @ matrix[:, at]) for matrix in (stiffness, mass)]
+        inside = [sp.csc_array(matrix[at][:, at]) for matrix in (stiffness, mass)]
+        near = np.flatnonzero(np.diff(across[0].indptr))
         word = f"ground {i + 1}|{part}" if count > 1 else f"ground|{part}"
-        found[word] = Edge(part, near, pulled, carried, *own_matrices)
+        if len(near) and len(at) <= _MOST_HELD:
+            found[word] = Edge(part, near, *across, *inside)
     return found
 
 
