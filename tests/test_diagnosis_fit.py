@@ -16,8 +16,10 @@ from femubench import Model
 from femubench.core.challenge.structures import structure_named
 from femubench.core.diagnosis.tables import find_passengers
 from femubench.core.errors import ModelError
+from femubench.core.fit import modal_fit
 from femubench.core.fit.modal_basis import solve_pencil
 from femubench.core.fit.modal_fit import Fit, Problem, State, bounds_of, fit, state_at
+from femubench.core.fit.noise import Noise
 from femubench.core.fit.projection import Projection
 from femubench.core.modal.eigen import natural_shift, solve_dense
 from femubench.fem import FloatArray, Frame
@@ -148,6 +150,29 @@ def test_all_modes_make_the_modal_coordinates_exact(problems: dict[str, Problem]
     high = np.finfo(float).eps * expected / natural_shift(dense["mass"], dense["stiffness"])
     error = np.abs(found / expected - 1.0)
     assert (error < 1e-10 + high)[elastic].all()
+
+
+def test_a_point_is_solved_once_whatever_the_noise(
+    problems: dict[str, Problem], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = problems["ladder"]
+    part = of_each_kind(problem)[0]
+    x, solved = inside(part), []
+    first = state_at(problem, (part,), x)
+    slopes, vectors = first.slopes, first.vectors
+    monkeypatch.setattr(
+        modal_fit, "solve_pencil", lambda *pair: solved.append(pair) or solve_pencil(*pair)
+    )
+    louder = replace(problem, noise=Noise(2.0 * np.eye(len(problem.data))))
+    again = state_at(louder, (part,), x)
+    assert again.chi2 == pytest.approx(first.raw @ first.raw / 4.0)
+    assert again.slopes is slopes
+    assert solved == []
+    np.testing.assert_array_equal(again.vectors, vectors)
+    assert len(solved) == 1
+    other = replace(problem, data=replace(problem.data, bias=np.full(3, 0.01)))
+    assert (state_at(other, (part,), x).raw != first.raw).any()
+    assert len(solved) == 2
 
 
 def test_few_coordinates_give_what_all_do(problems: dict[str, Problem]) -> None:

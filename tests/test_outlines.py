@@ -41,6 +41,11 @@ def test_a_group_is_a_place_of_the_drawing(tmp_path: Path) -> None:
     place = find_wireframe(model, ["group:far"]).place("group:far")
     assert place.kind == "outline"
     assert np.array(place.points)[:, 0].min() == pytest.approx(0.25)
+    seam = find_wireframe(model, ["interface:near|far"]).place("interface:near|far")
+    np.testing.assert_allclose(np.array(seam.points)[:, 0], 0.25)
+    assert length_of(np.reshape(seam.points, (-1, 2, 3))) == pytest.approx(0.3)
+    ground = find_wireframe(model, ["interface:ground|far"]).place("interface:ground|far")
+    assert ground.points == place.points
     item = {"name": "E of far", "before": 1.0, "after": 0.7, "unit": "", "places": "group:far"}
     (found,) = changes_found(model, [item])
     assert length_of(np.reshape(found.points, (-1, 2, 3))) == pytest.approx(0.5 + 2 * 0.3)

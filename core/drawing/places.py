@@ -10,12 +10,20 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from femubench.core.case.case import Case
-from femubench.core.drawing.wireframe import Point, Wireframe, check_within, to_point, wireframe_of
+from femubench.core.drawing.wireframe import (
+    Point,
+    Wireframe,
+    check_within,
+    to_point,
+    wireframe_of,
+)
 from femubench.core.effect.places import ALL, Places, bare_place, split_direction
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame, Place
+from femubench.core.fem.group_factors import GROUP
 from femubench.core.fem.mesh import place_xyz
 from femubench.core.fem.model import Model
+from femubench.core.modal.interfaces import Interfaces
 
 PlaceKind = Literal[
     "all", "joint", "member", "element", "end", "point", "pair", "outline", "elsewhere"
@@ -88,10 +96,8 @@ def _plain_place(wireframe: Wireframe, word: str, head: str) -> DrawnPlace:
     """Return the place of a joint, a member, an element or a sensor by its name alone."""
     if head == ALL:
         return DrawnPlace(word, "all")
-    for outline in wireframe.outlines:
-        if outline.place == head:
-            ends = tuple(end for line in outline.lines for end in line)
-            return DrawnPlace(word, "outline", points=ends)
+    if lines := _lines(wireframe, head):
+        return DrawnPlace(word, "outline", points=tuple(end for line in lines for end in line))
     for joint in wireframe.joints:
         if joint.name == head:
             return DrawnPlace(word, "joint", points=(joint.xyz,))
@@ -106,6 +112,23 @@ def _plain_place(wireframe: Wireframe, word: str, head: str) -> DrawnPlace:
     named = word.removeprefix(_SENSOR).split("+") if word.startswith(_SENSOR) else [word]
     at = {s.label: s.xyz for s in reversed(wireframe.sensors) if s.label in named}
     return DrawnPlace(word, "point" if at else "elsewhere", points=tuple(at.values()))
+
+
+def _lines(wireframe: Wireframe, head: str) -> list[tuple[Point, Point]]:
+    """Return the edges of a group, or of an interface: those that both parts have.
+
+    Where they have none in common, as with the ground, all of the part with fewer.
+    """
+    names = [head]
+    if head.startswith(Interfaces.PREFIX):
+        names = [f"{GROUP}{name}" for name in head.removeprefix(Interfaces.PREFIX).split("|")]
+    found = sorted(
+        (list(o.lines) for o in wireframe.outlines if o.place in names and o.lines), key=len
+    )
+    if len(found) < 2:
+        return found[0] if found else []
+    few, other = found[0], {end for line in found[1] for end in line}
+    return [line for line in few if other.issuperset(line)] or few
 
 
 def _place(wireframe: Wireframe, frame: Frame | None, word: str) -> DrawnPlace:

@@ -59,17 +59,17 @@ class Problem:
 
         Searches with other scales of the model error come by the same points.
         """
-        key = what, id(self.data), x.tobytes(), *map(id, parts)
+        key = what, id(self.space), id(self.data), x.tobytes(), *map(id, parts)
         if key not in self.kept:
             # With what it is of, so that an id in the key is no other's.
-            self.kept[key] = make(), self.data, tuple(parts)
+            self.kept[key] = make(), self.space, self.data, tuple(parts)
         value: _Kept = self.kept[key][0]
         return value
 
 
 @dataclass(frozen=True)
-class Solution:
-    """Modes in the coordinates of a space: the lowest ones, and above them what follows causes.
+class SolvedModes:
+    """The modes in the coordinates of a space: the lowest ones, and above them what follows causes.
 
     Arguments:
         eigenvalues: (q,).
@@ -94,7 +94,7 @@ class State:
     Arguments:
         parts: the hypotheses; none for the model as it is.
         x: coordinates, (k,).
-        solution: modes in the coordinates of the space.
+        modes: modes in the coordinates of the space.
         partner: of every measured mode, (m,).
         mass: total mass in kg.
         raw: residuals in standard deviations of the measurement, (n_data,).
@@ -103,7 +103,7 @@ class State:
     problem: Problem = field(repr=False)
     parts: tuple[Projection, ...]
     x: FloatArray
-    solution: Solution = field(repr=False)
+    modes: SolvedModes = field(repr=False)
     partner: IntArray = field(repr=False)
     mass: float
     raw: FloatArray = field(repr=False)
@@ -111,12 +111,12 @@ class State:
     @property
     def eigenvalues(self) -> FloatArray:
         """Return the eigenvalues of the modes, (q,)."""
-        return self.solution.eigenvalues
+        return self.modes.eigenvalues
 
     @property
     def vectors(self) -> FloatArray:
         """Return the modes in the coordinates of the space, (N, q)."""
-        return self.solution.vectors
+        return self.modes.vectors
 
     @cached_property
     def residual(self) -> FloatArray:
@@ -233,8 +233,8 @@ def state_at(
     found = problem.keep(what, parts, x, make) if parts else make()
     values, partner, weight, raw = found
     again = partial(_vectors, problem, parts, x, every)
-    solution = Solution(values, again, first[0] if first else None)
-    return State(problem, tuple(parts), x, solution, partner, weight, raw + problem.offset)
+    modes = SolvedModes(values, again, first[0] if first else None)
+    return State(problem, tuple(parts), x, modes, partner, weight, raw + problem.offset)
 
 
 def _modes(
