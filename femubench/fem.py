@@ -36,7 +36,7 @@ if TYPE_CHECKING:
         Support as Support,
     )
     from femubench.core.fem.group_factors import Groups as Groups
-    from femubench.core.fem.model import Edge as Edge, LowRank as LowRank
+    from femubench.core.fem.model import LowRank as LowRank
     from femubench.core.fem.parameters import Property as Property
     from femubench.core.fem.preload import GeometricStiffness as GeometricStiffness
     from femubench.core.fem.sections import Section as Section

@@ -211,6 +211,39 @@ class Model(Shown):
         model = cls(mass, stiffness, dofs_of(structure), structure, structure)
         return replace(model, free=free, damping=damping)
 
+    def with_ground(
+        self,
+        part: str,
+        pulled: SparseArray,
+        carried: SparseArray,
+        stiff: SparseArray,
+        heavy: SparseArray,
+    ) -> Model:
+        """Return the model with what a part does where its nodes are held: the ground may give.
+
+        It is at ``ground|PART``; with several of one part, at ``ground 1|PART`` and so on.
+
+        Arguments:
+            part: a group of the stiffness.
+            pulled, carried: its stiffness and mass between all rows and the held motions, (n, p).
+            stiff, heavy: those of the held motions, (p, p).
+
+        Examples:
+            >>> from dataclasses import replace
+            >>> deck = replace(model, structure=None, groups={"deck": model.stiffness})
+            >>> held = deck.stiffness[:, :3], deck.mass[:, :3]
+            >>> inside = deck.stiffness[:3, :3], deck.mass[:3, :3]
+            >>> list(deck.with_ground("deck", *held, *inside).grounds)
+            ['ground|deck']
+        """
+        near = np.flatnonzero(np.diff(sp.csr_array(pulled).indptr))
+        own = [edge for edge in self.grounds.values() if edge.part == part]
+        own.append(Edge(part, near, pulled, carried, stiff, heavy))
+        found = {name: edge for name, edge in self.grounds.items() if edge.part != part}
+        for i, edge in enumerate(own, 1):
+            found[f"ground {i}|{part}" if len(own) > 1 else f"ground|{part}"] = edge
+        return replace(self, grounds=found)
+
     def map_powers(
         self, stiffness: Callable[[Any], Any], mass: Callable[[Any], Any]
     ) -> dict[str, Powers]:

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from femubench import InputError, Model
-from femubench.fem import Edge, FloatArray, Groups, MatrixGeometry, SparseArray, matrix_model
+from femubench.fem import FloatArray, Groups, MatrixGeometry, SparseArray, matrix_model
 from femubench.modal import GroupPriors
 from femubench.plugins.readers import nodes, shells, solid_elements
 from femubench.plugins.readers.attachments import NodeMotions, rigid
@@ -144,7 +144,7 @@ def _model_of(
     coated = {n for name in deck.coated for n in deck.sets[name]}
     swells = [solid.swell(row, factor) for factor in _THICKNESSES[1:] if solid.lines]
     plates: dict[str, Powers] = {}
-    grounds: dict[str, Edge] = {}
+    grounds: list[tuple[str, list[SparseArray]]] = []
     parts: dict[str, SparseArray] = {}
     masses: dict[str, SparseArray] = {}
     mass = sp.csc_array(_point_masses(deck, found) + hung.mass(deck.attached.masses))
@@ -153,7 +153,7 @@ def _model_of(
         parts[name] = hung.reduced(stiffness)
         masses[name] = hung.reduced(inertia)
         mass += masses[name]
-        grounds |= _grounds(name, stiffness, inertia, hung.moved)
+        grounds += [(name, edge) for edge in _grounds(stiffness, inertia, hung.moved)]
         heavy[name] = float(inertia.sum())
         if all(deck.elements[n][0] in shells.SHELLS and n not in coated for n in numbers):
             pairs = [(parts[name], masses[name])]
@@ -189,7 +189,7 @@ def _model_of(
             name: {p: (k[left][:, left], m[left][:, left]) for p, (k, m) in own.items()}
             for name, own in plates.items()
         }
-        grounds = {name: edge.take(np.array(left)) for name, edge in grounds.items()}
+        grounds = [(n, [*(m[left] for m in own[:2]), *own[2:]]) for n, own in grounds]
         found, axes = [found[i] for i in left], axes[left]
     labels = [names.get(motion.node, str(motion.node)) for motion in found]
     parts = {name: part for name, part in parts.items() if part.count_nonzero()}
@@ -203,7 +203,9 @@ def _model_of(
     )
     prefix = Groups.PREFIX
     powers = {f"{prefix}{n}" if len(parts) > 1 else "all": own for n, own in plates.items()}
-    model = replace(model, powers=powers, grounds=grounds if len(parts) > 1 else {})
+    model = replace(model, powers=powers)
+    for name, edge in grounds if len(parts) > 1 else ():
+        model = model.with_ground(name, *edge)
     dofs = replace(model.dofs, axes=axes)
     if solid.lines:
         geometry = MatrixGeometry(tuple(dict.fromkeys(labels)), dofs)
@@ -222,11 +224,9 @@ def _model_of(
 
 
 def _grounds(
-    part: str, stiffness: SparseArray, mass: SparseArray, moved: SparseArray
-) -> dict[str, Edge]:
-    """Return what a part does where its nodes are held: one a patch, ``ground|PART``.
-
-    Of several under one part the words are ``ground 1|PART`` and so on; many give together.
+    stiffness: SparseArray, mass: SparseArray, moved: SparseArray
+) -> Iterator[list[SparseArray]]:
+    """Yield what a part does where its nodes are held, patch by patch; many give together.
 
     Arguments:
         stiffness, mass: of the part, of the translations of all nodes, (3 N, 3 N) each.
@@ -238,16 +238,11 @@ def _grounds(
     count, patch = connected_components(stiffness[rows][:, rows], directed=False)
     if count > _MOST_PATCHES:
         count, patch = 1, 0 * patch
-    found: dict[str, Edge] = {}
     for i in range(count):
         at = rows[patch == i]
         across = [sp.csr_array(moved.T @ matrix[:, at]) for matrix in (stiffness, mass)]
-        inside = [sp.csc_array(matrix[at][:, at]) for matrix in (stiffness, mass)]
-        near = np.flatnonzero(np.diff(across[0].indptr))
-        word = f"ground {i + 1}|{part}" if count > 1 else f"ground|{part}"
-        if len(near) and len(at) <= _MOST_HELD:
-            found[word] = Edge(part, near, *across, *inside)
-    return found
+        if len(at) <= _MOST_HELD and across[0].nnz:
+            yield [*across, *(sp.csc_array(matrix[at][:, at]) for matrix in (stiffness, mass))]
 
 
 def _find_powers(pairs: Sequence[tuple[SparseArray, SparseArray]]) -> Powers:
