@@ -46,7 +46,7 @@ def truth_in_groups(truth: KnownCase, model: Model) -> KnownCase:
     """
     groups = {*model.groups, *model.mass_groups}
     plates = plates_held(truth.structure)
-    grounds = [p for p in GroupPriors(model).interfaces.places if Interfaces.GROUND in p]
+    grounds = [p for p in GroupPriors(model).interfaces.places if p.startswith(Interfaces.GROUND)]
     causes = tuple(_in_groups(cause, groups, plates, grounds) for cause in truth.causes)
     return replace(truth, causes=causes)
 

@@ -265,7 +265,9 @@ def test_words_of_another_encoding_arrive_in_one_that_can_be_written() -> None:
     found = read_report(pack_outcome(JobOutcome("failed", diagnostics={"\udfff": 1.0})))
     assert list(found.diagnostics) == ["?"]
     forged = sent({**HEAD, "reason": "???"}, status=b"f").replace(b"???", b"\xed\xa0\x80")
-    with pytest.raises(AnswerError, match=r"(?i)cannot be read: the head cannot be read: .*utf-8"):
+    # In the words of msgspec before 0.22, and from then on.
+    words = "cannot be read: the head cannot be read: ('utf-8' codec|Invalid UTF-8 encoded string)"
+    with pytest.raises(AnswerError, match=words):
         read_report(forged)
 
 

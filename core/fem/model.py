@@ -45,7 +45,7 @@ class Edge(NamedTuple):
 
     def take(self, rows: IntArray) -> Edge:
         """Return what some rows of the model have of it, (k,)."""
-        pulled, carried = (sp.csr_array(part)[rows] for part in (self.pulled, self.carried))
+        pulled, carried = (sp.csr_array(own)[rows] for own in (self.pulled, self.carried))
         near = np.flatnonzero(np.isin(rows, self.near))
         return self._replace(near=near, pulled=pulled, carried=carried)
 
