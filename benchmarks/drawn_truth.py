@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from femubench.core.challenge.outcome import Same, same_place
 from femubench.core.challenge.truth_file import KnownCase, TrueCause
 from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.places import split_direction
+from femubench.core.errors import ModelError
 from femubench.core.fem.group_factors import GROUP
 from femubench.core.fem.mesh import place_xyz
 from femubench.core.modal.group_prior import GroupPriors
@@ -81,7 +83,7 @@ def _in_groups(
 def same_in_groups(model: Model, beams: Model) -> Same:
     """Return what tells whether two words stand for one place of a drawing, or of its beams.
 
-    A node of the drawing is the nearest point of the beams.
+    A node of the drawing is the nearest point of the beams, and so are the two of a strut.
 
     Arguments:
         model: the drawing.
@@ -92,11 +94,13 @@ def same_in_groups(model: Model, beams: Model) -> Same:
     points = np.array([place_xyz(frame, ModelPlaces(beams).point(word)) for word in words])
 
     def on_beams(place: str) -> str:
-        head, direction = split_direction(place)
-        if head not in places:
-            return place
-        near = np.linalg.norm(points - places[head], axis=1)
-        return words[int(near.argmin())] + (f":{direction}" if direction else "")
+        (head, direction), nodes = split_direction(place), ()
+        with suppress(ModelError):
+            (nodes,) = ModelPlaces(model).node_pairs(head)
+        nodes = (head,) if head in places else nodes
+        near = (np.linalg.norm(points - places[node], axis=1).argmin() for node in nodes)
+        found = "-".join(words[int(i)] for i in near)
+        return found + (f":{direction}" if direction else "") if found else place
 
     def is_same(first: str, second: str) -> bool:
         return first == second or same(on_beams(first), on_beams(second))

@@ -229,7 +229,7 @@ def test_every_effect_can_be_hidden_and_putting_it_back_explains_the_data(effect
     if not fit:
         # None is slender enough to feel its weight, comes as matrices, or has parts side by side.
         elsewhere = ("gravity-stiffness", "group-mass", "group-material", "interface-softness")
-        elsewhere += ("interface-spring", "plate-thickness")
+        elsewhere += ("interface-spring", "plate-thickness", "preload-force")
         assert getattr(effects[effect], "needs", "") or effect in elsewhere
         return
     shares = []

@@ -292,7 +292,7 @@ def test_models_from_matrices(models: dict[str, Model]) -> None:
         np.testing.assert_allclose(extended.mass.toarray(), other.mass.toarray(), atol=1e-15)
     with pytest.raises(ModelError, match="no node"):
         AddedMass().change(model, "nowhere")
-    for other_effect in (JointMass, BraceSpring, AttachedOscillator, AxialPreload, Temperature):
+    for other_effect in (JointMass, AxialPreload, Temperature):
         assert not other_effect().places(model)
     with pytest.raises(NotApplicable):
         Temperature().extend(model, "all", [1.0])

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
-from diagnosis_problems import case_of
+from diagnosis_problems import case_of, clamped_portal
+from effect_checks import as_matrices
 from test_bulk_plates import bulk, converted
 from test_chain import (
     FLATS,
@@ -29,17 +30,26 @@ import femubench
 from femubench import Case, Model, Sensors, fem
 from femubench.core.case.reducing import expand_model, reduce_case
 from femubench.core.case.similarity import Similarity, similar_matrices
+from femubench.core.case.writing import write_case
 from femubench.core.fem.alteration import Alteration, alter_model
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.modal.grouped_reduction import reduce_groups
 from femubench.effect import FrameEffect
-from femubench.fem import FloatArray, MatrixGeometry, Place, Support
+from femubench.fem import (
+    FloatArray,
+    Material,
+    MatrixGeometry,
+    Place,
+    Preload,
+    Section,
+    Support,
+)
 from femubench.modal import GroupPriors
-from femubench.plugins.effects.powers import InterfaceSoftness, PlateThickness
+from femubench.plugins.effects.powers import InterfaceSoftness, PlateThickness, PreloadForce
 from femubench.plugins.readers.nodes import read_nodes
 from tests.simulated import modes_at
 
-THICK, SOFT = PlateThickness(), InterfaceSoftness()
+THICK, SOFT, PRELOAD = PlateThickness(), InterfaceSoftness(), PreloadForce()
 SEAM = "interface:far|near"
 
 
@@ -281,6 +291,58 @@ def test_a_basis_holds_what_powers_do(
     for kind in ("stiffness", "mass"):
         gap = abs(getattr(back, kind) - getattr(whole, kind)).max()
         assert gap < 1e-6 * abs(getattr(whole, kind)).max()
+
+
+def taut(model: Model, part: str, force: float) -> sp.csc_array:
+    """Return what the nodes of a part, under tension between each other, resist across, (n, n)."""
+    rows = np.flatnonzero(model.groups[part].diagonal() > 0.0)
+    rows = rows[[model.dofs.direction[row] == "z" for row in rows]]
+    near = sp.coo_array(sp.triu(model.groups[part][rows][:, rows], 1))
+    ends = rows[np.column_stack([near.row, near.col])]
+    long = np.linalg.norm(np.diff(model.dofs.xyz[ends], axis=1)[:, 0], axis=1)
+    ends, long = ends[long > 0.0], long[long > 0.0]
+    at = (np.repeat(np.arange(len(ends)), 2), ends.ravel())
+    apart = sp.csr_array((np.tile([1.0, -1.0], len(ends)), at), shape=(len(ends), model.size))
+    return sp.csc_array(apart.T @ sp.diags_array(force / long) @ apart)
+
+
+def test_a_basis_holds_what_a_preload_does(folded: Model) -> None:
+    added = taut(folded, "UPRIGHT", 300.0)
+    given = {**folded.powers, "preload:sail": {1: (added, sp.csc_array(added.shape))}}
+    drawn = replace(folded, stiffness=sp.csc_array(folded.stiffness + added), powers=given)
+    small = reduce_case(made(drawn))
+    assert small.whole is drawn
+    assert PRELOAD.places(small.model) == ("preload:sail",)
+    for value in (-1.0, 0.5):
+        own, whole = (PRELOAD.extend(m, "preload:sail", [value]) for m in (small.model, drawn))
+        np.testing.assert_allclose(hertz(own, 12), hertz(whole, 12), rtol=1e-3)
+        assert abs(hertz(whole, 12)[-1] / hertz(drawn, 12)[-1] - 1.0) > 5e-4
+    back = expand_model(small, own)
+    assert abs(back.stiffness - whole.stiffness).max() < 1e-6 * abs(whole.stiffness).max()
+
+
+def test_a_preload_is_that_of_a_frame_and_stays_in_its_case(tmp_path: Path) -> None:
+    section, material = Section.rectangular_tube(0.04, 0.03, 0.002), Material(70e9, 0.3, 2700.0)
+    frame = clamped_portal(4, section, material)
+    plain, drawn, truth = (
+        Model.of(replace(frame, preloads=(Preload("beam", p),) if p else ()))
+        for p in (0.0, 4e4, 6e4)
+    )
+    added = sp.csc_array(drawn.stiffness - plain.stiffness)
+    powers = {"preload:beam": {1: (added, sp.csc_array(added.shape))}}
+    model = replace(as_matrices(drawn), powers=powers)
+    at = model.dofs.xyz[model.dofs.node == model.dofs.node[0]][:1]
+    case = case_of(model, modes_at(model, Sensors(("a",), at, ("x",)), 4), 3)
+    write_case(tmp_path / "case", case)
+    model = femubench.read_case(tmp_path / "case").model
+    assert PRELOAD.places(model) == ("preload:beam",)
+    assert not model.groups
+    assert PRELOAD.parameters(model, "preload:beam")[0].scale == 0.5
+    found = hertz(PRELOAD.extend(model, "preload:beam", [0.5]))
+    np.testing.assert_allclose(found, hertz(truth), rtol=1e-7)
+    assert abs(found / hertz(drawn) - 1.0).max() > 1e-3
+    lost = hertz(PRELOAD.extend(model, "preload:beam", [-1.0]))
+    np.testing.assert_allclose(lost, hertz(plain), rtol=1e-7)
 
 
 SUITE = Path(__file__).parents[1] / "scenarios" / "suite"

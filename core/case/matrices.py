@@ -21,6 +21,7 @@ from femubench.core.case.files import LARGEST_FILE, CaseFiles
 from femubench.core.case.nodes import MatrixGeometry, read_dofs
 from femubench.core.case.schema import LARGEST, GroupSpec, MatricesSpec
 from femubench.core.errors import FemubenchError, InputError, ModelError
+from femubench.core.fem.group_factors import PRELOAD
 from femubench.core.fem.model import Model
 from femubench.core.files import MIB, limit_memory, open_regular
 from femubench.core.roles import Reader
@@ -78,17 +79,20 @@ _ASYMMETRY = 1e-8  # of the largest entry
 _MATRIX_MARKET = (".mtx", ".mtx.gz", ".mtx.bz2")
 
 
-def read_matrix(file: Path, size: int, readers: Collection[Reader]) -> SparseArray:
+def read_matrix(
+    file: Path, size: int, readers: Collection[Reader], *, signed: bool = False
+) -> SparseArray:
     """Return a symmetric matrix of a file.
 
     Arguments:
         file: Matrix Market, or whatever one of the readers knows by its suffix.
         size: the number of rows that it must have.
+        signed: whether it may have negative entries on its diagonal, as geometric stiffness has.
 
     Raises:
         InputError: when it is not real, square, of that size, finite and symmetric.
     """
-    return check_symmetric(matrix_of(file, readers, size), file, size)
+    return check_symmetric(matrix_of(file, readers, size), file, size, signed=signed)
 
 
 def matrix_of(file: Path, readers: Collection[Reader], size: int | None = None) -> SparseArray:
@@ -118,8 +122,10 @@ def is_matrix_market(file: Path) -> bool:
     return start.startswith(b"%%") or not start.lstrip()[:1].isdigit()
 
 
-def check_symmetric(matrix: SparseArray, file: Path, size: int) -> SparseArray:
-    """Return what a file gave as a symmetric matrix.
+def check_symmetric(
+    matrix: SparseArray, file: Path, size: int, *, signed: bool = False
+) -> SparseArray:
+    """Return what a file gave as a symmetric matrix, positive on its diagonal if not `signed`.
 
     Raises:
         InputError: when it is not real, square, of that size, finite and symmetric.
@@ -144,7 +150,7 @@ def check_symmetric(matrix: SparseArray, file: Path, size: int) -> SparseArray:
         what = f"the matrix is not symmetric at ({i}, {j})"
         raise InputError(what, file=file, expected="A = A'")
     largest = np.abs(matrix.data).max(initial=0.0)
-    if largest == 0.0 or matrix.diagonal().min() < 0.0:
+    if largest == 0.0 or (not signed and matrix.diagonal().min() < 0.0):
         what = "the matrix is zero" if largest == 0.0 else "a diagonal entry is negative"
         raise InputError(what, file=file, expected="a positive semidefinite matrix")
     return sp.csc_array(0.5 * (matrix + matrix.T))
@@ -233,6 +239,7 @@ def with_groups(
     assert isinstance(geometry, MatrixGeometry)
     check_unique((("groups", i, "name"), spec.name) for i, spec in enumerate(specs))
     groups, mass_groups = dict(model.groups), dict(model.mass_groups)
+    powers = dict(model.powers)
     for i, spec in enumerate(specs):
         with at_key("groups", i):
             if spec.dofs is not None and (spec.stiffness is not None or spec.mass is not None):
@@ -240,6 +247,11 @@ def with_groups(
             known = spec.name in {*model.groups, *model.mass_groups}
             if not known and spec.stiffness is None and spec.mass is None and spec.dofs is None:
                 raise BadKey((), "a group without a part", "stiffness, mass or dofs")
+            if spec.kind == "preload" and (
+                known or spec.stiffness is None or spec.mass is not None
+            ):
+                expected = "the geometric stiffness, which is no group of a deck and has no mass"
+                raise BadKey(("kind",), "a preload without its stiffness alone", expected)
             if spec.dofs is not None:
                 inside = np.zeros(len(geometry.dofs))
                 for i, entry in enumerate(spec.dofs):
@@ -253,10 +265,14 @@ def with_groups(
                 if (file := getattr(spec, key)) is not None:
                     with at_key(key):
                         path = files.path(file)
-                    found[spec.name] = read_matrix(path, model.size, readers)
+                    signed = spec.kind == "preload"
+                    found[spec.name] = read_matrix(path, model.size, readers, signed=signed)
+            if spec.kind == "preload":  # lies in other groups, and is none of its own
+                added = groups.pop(spec.name)
+                powers[f"{PRELOAD}{spec.name}"] = {1: (added, sp.csc_array(added.shape))}
     priors = {spec.name: spec.prior for spec in specs if spec.prior is not None}
     kinds = {spec.name: spec.kind for spec in specs if spec.kind is not None}
-    model = replace(model, groups=groups, mass_groups=mass_groups)
+    model = replace(model, groups=groups, mass_groups=mass_groups, powers=powers)
     return replace(model, group_priors=priors, group_kinds={**model.group_kinds, **kinds})
 
 

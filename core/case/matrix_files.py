@@ -17,6 +17,7 @@ from femubench.core.case.nodes import DOF_COLUMNS, INTERNAL, MatrixGeometry
 from femubench.core.case.table_text import csv_bytes, number
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Place
+from femubench.core.fem.group_factors import PRELOAD
 from femubench.core.fem.kinematics import node_at
 from femubench.core.fem.mesh import SAME_STATION
 from femubench.core.fem.model import LowRank, Model
@@ -171,11 +172,16 @@ def matrix_keys(
     files = _three(mass, stiffness, geometry)
     keys: Keys = {"kind": "matrices", **{file.partition(".")[0]: file for file in files}}
     tables = []
-    names = dict.fromkeys((*model.groups, *model.mass_groups))
+    preloads = {
+        place.removeprefix(PRELOAD): own[1][0]
+        for place, own in model.powers.items()
+        if place.startswith(PRELOAD)
+    }
+    names = dict.fromkeys((*model.groups, *model.mass_groups, *preloads))
     for i, name in enumerate(names, start=1):
         table: Keys = {"name": name}
         for key, suffix, parts in (
-            ("stiffness", "", model.groups),
+            ("stiffness", "", {**model.groups, **preloads}),
             ("mass", "-mass", model.mass_groups),
         ):
             if name in parts:
@@ -183,8 +189,8 @@ def matrix_keys(
                 files[table[key]] = matrix_market(parts[name])
         if name in model.group_priors:
             table["prior"] = float(model.group_priors[name])
-        if name in model.group_kinds:
-            table["kind"] = model.group_kinds[name]
+        if kind := "preload" if name in preloads else model.group_kinds.get(name):
+            table["kind"] = kind
         tables.append(table)
     return (keys | {"groups": tables} if tables else keys), files
 

@@ -19,7 +19,7 @@ from femubench.core.fem.frame import GroundSpring, Place, PointMass, Vector
 from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.model import Dofs, Model
-from femubench.core.fem.sensors import DIRECTIONS, Sensors, moved_names
+from femubench.core.fem.sensors import DIRECTIONS, Sensors, moved_names, unit_motions
 from femubench.core.typing import BoolArray, FloatArray, SparseArray
 
 _MOST_DOFS = 1_000_000
@@ -39,6 +39,7 @@ class MatrixGeometry:
         dofs: the rows; `dofs.node` counts the names.
         first_row: the number that the dofs file gives to the first row, 0 or 1.
         mesh: which nodes share an element, sparse (k, k); None where a sensor sits at nodes alone.
+        spans: numbers of nodes that a strut may tie, where those between are gone; None elsewhere.
         outlines: ends in m of edges that draw a group, (e, 2, 3), by its name; "" of all.
     """
 
@@ -46,6 +47,7 @@ class MatrixGeometry:
     dofs: Dofs
     first_row: int = 1
     mesh: SparseArray | None = None
+    spans: tuple[tuple[int, int], ...] | None = None
     outlines: Mapping[str, FloatArray] = field(default_factory=dict, compare=False)
 
     @cached_property
@@ -355,6 +357,31 @@ def with_mesh(model: Model) -> Model:
     pairs = (mesh.row[alike], mesh.col[alike])
     mesh = sp.csr_array((np.ones(alike.sum()), pairs), shape=mesh.shape)
     return replace(model, geometry=replace(geometry, mesh=mesh))
+
+
+def add_node(model: Model, name: str, direction: str, xyz: FloatArray) -> Model:
+    """Return a model from files with a further node, which moves in one direction, its last row.
+
+    Arguments:
+        name: of the node, which no other one has.
+        direction: one of x y z.
+        xyz: where it is in m, (3,).
+    """
+    geometry, own = model.geometry, model.dofs
+    assert isinstance(geometry, MatrixGeometry)
+    number = len(geometry.names)
+    dofs = Dofs(
+        np.append(own.node, number),
+        (*own.direction, direction),
+        np.vstack([own.xyz, xyz]),
+        np.vstack([own.motions, unit_motions([direction])]),
+    )
+    names, mesh = (*geometry.names, name), geometry.mesh
+    if mesh is not None:
+        mesh = mesh.copy()
+        mesh.resize((len(names), len(names)))
+    geometry = replace(geometry, names=names, dofs=dofs, mesh=mesh)
+    return model.with_dofs(dofs, geometry)
 
 
 def mark_internal(dofs: Dofs, internal: BoolArray) -> Dofs:

@@ -9,9 +9,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.case.case import Case
-from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.case.nodes import MatrixGeometry, add_node
+from femubench.core.case.spans import find_spans
 from femubench.core.errors import ModelError
-from femubench.core.fem.group_factors import Groups
+from femubench.core.fem.group_factors import PRELOAD, Groups
 from femubench.core.fem.model import Dofs, Model
 from femubench.core.modal.eigen import ALL_MODES_LIMIT, DENSE_LIMIT
 from femubench.core.modal.group_prior import GroupPriors
@@ -87,6 +88,12 @@ def _small_model(model: Model, found: GroupedReduction) -> Model:
         mesh = sp.csr_array(near @ near.T)
         mesh.resize((len(names), len(names)))
 
+    place = {name: i for i, name in enumerate(names)}
+    kept = MatrixGeometry(names, small).rows_of
+    whole = (n for n in geometry.placed if n in kept and len(kept[n]) == len(geometry.rows_of[n]))
+    pairs = find_spans(model, whole)
+    spans = tuple((place[a], place[b]) for a, b in pairs)
+
     def sparse(parts: dict[str, FloatArray]) -> dict[str, SparseArray]:
         return {name: sp.csc_array(part) for name, part in parts.items()}
 
@@ -95,7 +102,7 @@ def _small_model(model: Model, found: GroupedReduction) -> Model:
         mass=sp.csc_array(found.mass),
         stiffness=sp.csc_array(found.stiffness),
         dofs=small,
-        geometry=MatrixGeometry(names, small, mesh=mesh),
+        geometry=MatrixGeometry(names, small, mesh=mesh, spans=spans),
         # What holds to ground, and what not, is not to be seen in coordinates that lie nowhere.
         group_kinds={
             name: GroupPriors(model).kind(name) for name in {**model.groups, **model.mass_groups}
@@ -122,16 +129,19 @@ def expand_model(case: Case, updated: Model) -> Model:
     whole, small = case.whole, case.model
     if whole is None or updated is small:
         return updated if whole is None else whole
+    geometry, dofs = updated.geometry, updated.dofs
+    assert isinstance(geometry, MatrixGeometry)
+    for row in range(small.size, updated.size):  # what hangs on the structure and swings
+        added = geometry.names[dofs.node[row]], dofs.direction[row], dofs.xyz[row]
+        small, whole = (add_node(model, *added) for model in (small, whole))
     if updated.size != small.size or updated.mass_change or updated.stiffness_change:
         raise ModelError(_AS_A_WHOLE)
-    geometry = small.geometry
-    assert isinstance(geometry, MatrixGeometry)
     assert isinstance(whole.geometry, MatrixGeometry)
     outer = np.flatnonzero(~small.dofs.internal)
     rows = np.array([whole.geometry.rows[key] for key in geometry.rows if key[0] != _INNER])
     # What comes with the first power of a thickness is the rest of its group.
     keys = [(place, power) for place, own in small.powers.items() for power in own
-            if power > 1 or place.startswith(Interfaces.PREFIX)]  # fmt: skip
+            if power > 1 or place.startswith((Interfaces.PREFIX, PRELOAD))]  # fmt: skip
     found: dict[str, Any] = {"powers": {}}
     for i, (matrix, kind) in enumerate((("stiffness", "groups"), ("mass", "mass_groups"))):
         before, parts = getattr(small, matrix), getattr(small, kind)

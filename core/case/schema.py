@@ -350,8 +350,8 @@ class GroupSpec(TomlTable):
     prior: Annotated[float, Field(strict=True, gt=1, le=1e6, allow_inf_nan=False)] | None = Field(
         None, description="a number > 1: a factor of so much up or down is as likely as not"
     )
-    kind: Literal["part", "joint", "support"] | None = Field(
-        None, description="'part', 'joint' or 'support': what is known of it without a prior"
+    kind: Literal["part", "joint", "support", "preload"] | None = Field(
+        None, description="'part', 'joint', 'support' or 'preload': what is known of it"
     )
 
 

@@ -15,9 +15,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 
 from femubench.core.change.parameter import Parameter
-from femubench.core.change.terms import Term
+from femubench.core.change.terms import Term, sparse_matrix
+from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
 from femubench.core.roles import EffectParameter
 from femubench.core.typing import FloatArray
@@ -85,6 +87,26 @@ class Change:
         up, down = np.minimum(x + step, high), np.maximum(x - step, low)
         width = (up - down).diagonal()
         return np.asarray((self.factors(up) - self.factors(down)) / width[:, None])
+
+    def add_to(self, model: Model, values: Sequence[float]) -> Model:
+        """Return a model of matrices with the terms added; its groups stay as they are.
+
+        Arguments:
+            model: with all dofs that the terms act on, `extra` behind its own.
+            values: of the parameters.
+
+        Examples:
+            >>> mass = effect.ModelPlaces(model).mass_term([fem.Place(joint="J1")])
+            >>> heavier = effect.Change.proportional(mass).add_to(model, [0.5])
+            >>> round(heavier.total_mass - model.total_mass, 9)
+            0.5
+        """
+        factors = self.coefficients(np.array([values], dtype=float))[0]
+        found = {"mass": model.mass, "stiffness": model.stiffness}
+        for term, factor in zip(self.terms, factors, strict=True):
+            own = sparse_matrix(term.operator, model.size)
+            found[term.matrix] = found[term.matrix] + sp.csc_array(factor * own)
+        return replace(model, **found)
 
     def without_prior(self) -> Change:
         """Return the same with nothing known of its values but their range.

@@ -154,7 +154,7 @@ class Term:
 
 
 def sparse_matrix(operator: Operator, size: int) -> SparseArray:
-    """Return an operator without added dofs on those of a model as a sparse matrix, (n, n)."""
+    """Return an operator as a sparse matrix, (n, n); of any other class, on those of a model."""
     if isinstance(operator, MatrixOperator):
         return sp.csr_array(operator.matrix)
     if isinstance(operator, RowOperator):

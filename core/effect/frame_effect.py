@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import ClassVar
 
 from femubench.core.change.change import Change
@@ -88,9 +89,13 @@ class FrameEffect(Effect):
         return self.frame if type(self).extend is FrameEffect.extend else None
 
     def extend_matrices(self, model: Model, place: str, values: Sequence[float]) -> Model:
-        """Return a model that came as matrices with the effect in it.
+        """Return a model that came as matrices with the effect in it: the terms of its `change`.
 
         Raises:
-            NotApplicable: here, where it needs a frame.
+            NotApplicable: where it needs a frame.
         """
+        change: Callable[[Model, str], Change] | None = getattr(self, "change", None)
+        with suppress(NotApplicable):
+            if change is not None:
+                return change(model, place).add_to(model, values)
         raise NotApplicable(f"{self.name} needs a frame, not a pair of matrices")

@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.case.nodes import MatrixGeometry, add_node
+from femubench.core.case.spans import find_spans
 from femubench.core.change.terms import RowOperator, Term
 from femubench.core.effect.places import Places, bare_place, split_direction
 from femubench.core.errors import ModelError
@@ -28,6 +29,7 @@ _RIGID = 6
 _SUSPENDED = 0.95
 _HELD = 1e-9
 _FEW = 4
+_OFF = 0.01  # of the size of the structure
 
 
 @dataclass(frozen=True)
@@ -208,7 +210,7 @@ class ModelPlaces:
         return Term("mass", RowOperator(together, np.eye(together.shape[0])))
 
     def elongation(self, ends: tuple[str, str]) -> SparseArray:
-        """Return how much further apart two joints get along their line, sparse (1, n).
+        """Return how much further apart two joints or nodes get along their line, sparse (1, n).
 
         Raises:
             ModelError: when there are no such joints, or they lie at one point.
@@ -217,14 +219,44 @@ class ModelPlaces:
             >>> effect.ModelPlaces(model).elongation(("J1", "J7")).shape
             (1, 81)
         """
-        frame = self.model.frame_structure.frame
         first, last = (Place(joint=name) for name in ends)
         motion = self.motion(last)[:3] - self.motion(first)[:3]
-        along = np.array(frame.joint(ends[1]).xyz) - np.array(frame.joint(ends[0]).xyz)
+        along = self.nodes[ends[1]] - self.nodes[ends[0]]
         length = float(np.linalg.norm(along))
         if length < ON_MEMBER:
-            raise ModelError(f"joints {ends[0]!r} and {ends[1]!r} lie at one point")
+            raise ModelError(f"{ends[0]!r} and {ends[1]!r} lie at one point")
         return sp.csr_array(sp.csr_array(along[None, :] / length) @ motion)
+
+    def spans(self) -> tuple[tuple[str, str], ...]:
+        """Return the pairs of nodes of matrices to which the body leads by a detour, of up to 25.
+
+        Examples:
+            >>> effect.ModelPlaces(model).spans()
+            ()
+        """
+        geometry = self.model.geometry
+        if not isinstance(geometry, MatrixGeometry):
+            return ()
+        if geometry.spans is None:
+            return _spans(self.model)
+        return tuple((geometry.names[a], geometry.names[b]) for a, b in geometry.spans)
+
+    def add_node(self, at: Place, direction: str) -> Model:
+        """Return matrices with a further node, their last row, that moves in one direction.
+
+        It lies off a node along that direction, where it turns with it as if it were there, and has
+        neither mass nor stiffness yet.
+
+        Arguments:
+            at: a node.
+            direction: one of x, y, z.
+        """
+        xyz, points = self.nodes[str(at)].copy(), np.array(list(self.nodes.values()))
+        xyz[TRANSLATIONS.index(direction)] += _OFF * float(np.ptp(points, axis=0).max())
+        name = f"{at}~{direction}"
+        while name in self.nodes:
+            name += "~"
+        return add_node(self.model, name, direction, xyz)
 
     def node_pairs(self, place: str) -> tuple[tuple[str, str], ...]:
         """Return the pairs of ``A-B``, or of ``A+B-C+D``, where A faces C and B faces D.
@@ -293,6 +325,11 @@ def _motion(model: Model, at: Place) -> SparseArray:
     entries = [(i, row) for i, row in found if row is not None]
     index = ([i for i, _ in entries], [row for _, row in entries])
     return sp.csr_array((np.ones(len(entries)), index), shape=(6, model.size))
+
+
+@cache_by_model
+def _spans(model: Model) -> tuple[tuple[str, str], ...]:
+    return find_spans(model, ModelPlaces(model).points())
 
 
 @cache_by_model

@@ -17,6 +17,7 @@ from femubench.core.fem.slopes import Matrix, TermSlopes
 from femubench.core.typing import FloatArray, SparseArray
 
 GROUP = "group:"
+PRELOAD = "preload:"  # what a preload adds to the stiffness, which lies in other groups
 _ALL = "all"
 _MATRIX: dict[str, Matrix] = {"E": "stiffness", "density": "mass"}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -48,6 +48,13 @@ class Edge(NamedTuple):
         pulled, carried = (sp.csr_array(own)[rows] for own in (self.pulled, self.carried))
         near = np.flatnonzero(np.isin(rows, self.near))
         return self._replace(near=near, pulled=pulled, carried=carried)
+
+    def grown(self, size: int) -> Edge:
+        """Return it for a model with further rows behind its own, (size,)."""
+        pulled, carried = (sp.csr_array(own) for own in (self.pulled, self.carried))
+        for own in (pulled, carried):
+            own.resize((size, own.shape[1]))
+        return self._replace(pulled=pulled, carried=carried)
 
 
 @dataclass(frozen=True)
@@ -173,7 +180,8 @@ class Model(Shown):
         finer: of a model from files, gives the whole of it and the same with better elements, whose
             rows begin with those of the whole; None where nobody knows better ones.
         powers: by a place, what comes with powers of a value there: of `group:NAME` (`all` where it
-            is the only part) the thickness of its plates over that drawn.
+            is the only part) the thickness of its plates over that drawn, of `preload:NAME` its
+            force over that drawn.
         grounds: by ``ground|NAME``, where nodes of a part are held, what it does when they give.
     """
 
@@ -243,6 +251,32 @@ class Model(Shown):
         for i, edge in enumerate(own, 1):
             found[f"ground {i}|{part}" if len(own) > 1 else f"ground|{part}"] = edge
         return replace(self, grounds=found)
+
+    def with_dofs(self, dofs: Dofs, geometry: Geometry) -> Model:
+        """Return a model from files on more dofs, which have neither mass nor stiffness yet.
+
+        Arguments:
+            dofs: its own, and those behind them.
+            geometry: of all of them.
+        """
+        size, own = len(dofs), np.arange(self.size)
+
+        def grow(parts: Mapping[str, SparseArray]) -> dict[str, SparseArray]:
+            return {name: grow_matrix(part, size) for name, part in parts.items()}
+
+        whole = grow({"mass": self.mass, "stiffness": self.stiffness})
+        return replace(
+            self,
+            **whole,
+            dofs=dofs,
+            geometry=geometry,
+            mass_change=_spread_low_rank(self.mass_change, own, size),
+            stiffness_change=_spread_low_rank(self.stiffness_change, own, size),
+            groups=grow(self.groups),
+            mass_groups=grow(self.mass_groups),
+            powers=self.map_powers(*(partial(grow_matrix, size=size) for _ in range(2))),
+            grounds={name: edge.grown(size) for name, edge in self.grounds.items()},
+        )
 
     def map_powers(
         self, stiffness: Callable[[Any], Any], mass: Callable[[Any], Any]

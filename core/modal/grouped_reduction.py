@@ -34,7 +34,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import ArpackError, LinearOperator, cg, eigsh
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.group_factors import GROUP
+from femubench.core.fem.group_factors import GROUP, PRELOAD
 from femubench.core.fem.model import Model, Powers
 from femubench.core.modal.eigen import DENSE_LIMIT, solve_modes
 from femubench.core.modal.factorisation import factorise_definite
@@ -47,6 +47,7 @@ from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 JOINT_FACTORS = (1e-3, 0.03, 3.0)
 PART_FACTORS = (0.3, 3.0)
 INTERFACE_FACTORS = (1e-3, 0.03, 0.3)  # drawn as one piece, it is never stiffer
+PRELOAD_FACTORS = (0.0, 1.5)  # lost, or three deviations of bolts more
 _UNKNOWN = 1.0  # deviation of the logarithm of a group from which on it is one of the former
 _SHIFT = 0.5  # of the first elastic eigenvalue, below zero
 _FLOATING = 1e-11  # of the largest k/m: a shift that makes what floats definite
@@ -61,6 +62,7 @@ _FAINT = 1e-5  # of the strongest motion of a border
 _HELD = 3.0  # times the highest eigenvalue: modes of a group whose border is held
 _MOST_HELD = 64
 _DENSE = 300  # rows that are solved densely
+_DISTINCT = 0.01  # of the strongest rigid motion at the kept rows: the weakest one
 _STRONG = 1e-3  # of the energy of a mode, its root, from which on an inside has it
 _SHARE = 1e-4  # of the energy of an answer to forces on a group that the group itself has
 _WEAK = 1e-6  # of the energy of a mode, below which a group adds no motion
@@ -111,7 +113,7 @@ def reduce_groups(
             modes, or a factor on a group leaves no model.
     """
     rigid = rigid_body_vectors(model.dofs)
-    kept = _hold_rigid(kept, rigid)
+    kept = _hold_rigid(kept, rigid, model.dofs.node)
     meet = GroupPriors(model).interfaces
     try:
         whole, highest = _reduce_to_borders(model, kept, rigid, count, most)
@@ -126,8 +128,9 @@ def reduce_groups(
     for place in meet.places:
         whole.blocks[_POWERS, place] = _soften(whole, meet, place)
     for place, given in model.powers.items():
-        bending = sum(k for power, (k, _) in given.items() if power > 1)
-        whole.blocks[_POWERS, place] = span.reduce(bending)
+        first = 0 if place.startswith(PRELOAD) else 1  # of a thickness the rest of the group
+        varied = sum(k for power, (k, _) in given.items() if power > first)
+        whole.blocks[_POWERS, place] = span.reduce(varied)
     pieces: list[FloatArray] = []
     settled: dict[tuple[_Name, float], FloatArray] = {}
     for name, block in whole.blocks.items():
@@ -177,6 +180,11 @@ def reduce_groups(
             bent = {p: _loose(span.reduce(pairs[p][0]).within(vectors), free) for p in pairs}
             bent[1] = small[key] - sum(part for p, part in bent.items() if p > 1)
             powers[place] = {p: (bent[p], masses[p]) for p in pairs}
+    for place in (p for p in model.powers if p.startswith(PRELOAD)):
+        force, inertia = model.powers[place][1]
+        free = rigid_modes_of(replace(model, stiffness=force))[kept]
+        pair = (span.reduce(part).within(vectors) for part in (force, inertia))
+        powers[place] = {1: (_loose(next(pair), free), next(pair))}
     stiffness, mass = (
         {name: small[kind, name] for name in own}
         for kind, own in (("stiffness", model.groups), ("mass", model.mass_groups))
@@ -319,6 +327,8 @@ def _factors(model: Model, name: str) -> tuple[float, ...]:
     """Return what a group of the stiffness or an interface may turn out to be, softest first."""
     if name.startswith(Interfaces.PREFIX):
         return INTERFACE_FACTORS
+    if name.startswith(PRELOAD):
+        return PRELOAD_FACTORS
     return PART_FACTORS if GroupPriors(model).std(name) < _UNKNOWN else JOINT_FACTORS
 
 
@@ -764,12 +774,18 @@ def _ritz(
     return values[elastic], x / np.sqrt(np.einsum("ij,ij->j", x, mass @ x))
 
 
-def _hold_rigid(kept: IntArray, rigid: FloatArray) -> IntArray:
-    """Return rows with as many more as it takes for them to tell all rigid motions apart."""
-    if rigid.shape[1] == 0:
+def _hold_rigid(kept: IntArray, rigid: FloatArray, node: IntArray) -> IntArray:
+    """Return rows with those of more nodes, where it takes them to tell all rigid motions apart.
+
+    Arguments:
+        node: of every row, (n,).
+    """
+    count = rigid.shape[1]
+    strength = la.svdvals(rigid[kept]) if len(kept) >= max(count, 1) else np.zeros(1)
+    if count == 0 or strength[-1] > _DISTINCT * strength[0]:
         return np.unique(kept)
-    pivots = la.qr(rigid.T, mode="economic", pivoting=True)[2][: rigid.shape[1]]
-    return np.unique(np.concatenate([kept, pivots]).astype(np.int64))
+    pivots = la.qr(rigid.T, mode="economic", pivoting=True)[2][:count]
+    return np.unique(np.concatenate([kept, np.flatnonzero(np.isin(node, node[pivots]))]))
 
 
 def _loose(stiffness: FloatArray, free: FloatArray) -> FloatArray:

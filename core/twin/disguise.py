@@ -218,5 +218,6 @@ def _in_another_order(model: Model, geometry: MatrixGeometry, names: Disguise) -
             tuple(names.joints[geometry.names[node]] for node in numbers),
             moved,
             mesh=None if geometry.mesh is None else geometry.mesh[list(numbers)][:, list(numbers)],
+            spans=geometry.spans and tuple((numbers[a], numbers[b]) for a, b in geometry.spans),
         ),
     )

@@ -27,6 +27,7 @@ CLASSES = {
     "group-material": "material:GroupMaterial",
     "plate-thickness": "powers:PlateThickness",
     "interface-softness": "powers:InterfaceSoftness",
+    "preload-force": "powers:PreloadForce",
     "wall-thickness": "wall_thickness:WallThickness",
     "local-stiffness-loss": "local_stiffness_loss:LocalStiffnessLoss",
     "axial-preload": "axial_preload:AxialPreload",

@@ -41,10 +41,6 @@ class AddedMass(FrameEffect):
         mass = PointMass(Places(frame).point(place), values[0])
         return replace(frame, masses=(*frame.masses, mass))
 
-    def extend_matrices(self, model: Model, place: str, values: Sequence[float]) -> Model:
-        """Return the model with the mass in it."""
-        return model.attach([PointMass(ModelPlaces(model).point(place), values[0])], [])
-
     def change(self, model: Model, place: str) -> Change:
         """Return the mass matrix of 1 kg at the point."""
         return Change.proportional(ModelPlaces(model).mass_term([ModelPlaces(model).point(place)]))

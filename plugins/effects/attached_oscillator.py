@@ -47,9 +47,9 @@ class AttachedOscillator(FrameEffect):
     )
 
     def places(self, model: Model) -> Sequence[str]:
-        """Return joints and the middles of members in each direction that they can move in."""
+        """Return joints and middles of members, or nodes, in each direction that they move in."""
         if model.structure is None:
-            return ()
+            return ModelPlaces(model).directed(ModelPlaces(model).points())
         frame = model.structure.frame
         # The mesh node nearest to the middle of a member.
         middle = {m.name: m.elements // 2 / m.elements or 0.5 for m in frame.members}
@@ -82,6 +82,13 @@ class AttachedOscillator(FrameEffect):
             *at, values[0], values[1], crosswise=not place.endswith(Places.FREE)
         )
         return replace(frame, oscillators=(*frame.oscillators, oscillator))
+
+    def extend_matrices(self, model: Model, place: str, values: Sequence[float]) -> Model:
+        """Return the model with a node of its own that the oscillator swings on."""
+        if not values[0]:
+            return model
+        grown = ModelPlaces(model).add_node(*ModelPlaces(model).directed_point(place))
+        return self.change(model, place).add_to(grown, values)
 
     def change(self, model: Model, place: str) -> Change:
         """Return 1 kg on a dof of its own and the spring of 1 N/m that carries it."""

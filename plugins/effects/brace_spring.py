@@ -1,4 +1,4 @@
-"""A strut, a cable or a stiff strap between two joints that no member joins."""
+"""A strut, a cable or a stiff strap between two joints, or nodes, that nothing else joins."""
 
 from __future__ import annotations
 
@@ -22,12 +22,15 @@ from femubench.effect import (
     Site,
     Size,
     Term,
+    elastic_band,
     once_for,
 )
 from femubench.fem import Brace, Frame
 
 _SHARE = 0.01  # of the mean EA / L of the members
+_FIRST = 0.1  # of what the first frequency and the mass make a stiffness of, for matrices
 _MOST = 300
+_FELT = 1e-9
 _STRAIGHT = np.cos(np.radians(5.0))
 
 
@@ -43,9 +46,14 @@ class BraceSpring(FrameEffect):
 
         Joints that rigid links make one body are one joint, and of those that stand off members
         by links, a straight run of members joins all that it passes: a brace next to it would be
-        a stiffener of these members.
+        a stiffener of these members. Of matrices they are nodes that the body joins by a detour.
         """
-        if model.structure is None or model.structure.frame.plane == "out-of-plane":
+        if model.structure is None:
+            places = ModelPlaces(model)
+            # What is held, or moves across alone, feels nothing of it.
+            felt = (ends for ends in places.spans() if abs(places.elongation(ends)).max() > _FELT)
+            return [f"{first}-{last}" for first, last in felt]
+        if model.structure.frame.plane == "out-of-plane":
             return ()
         frame = model.structure.frame
         body = dict(frame.joint_index)  # the number of the rigid body that links make of joints
@@ -68,9 +76,12 @@ class BraceSpring(FrameEffect):
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the stiffness along the line of the joints."""
-        frame = model.frame_structure.frame
 
-        def rigidity() -> float:  # of the members along themselves in the mean, N/m
+        def rigidity() -> float:  # N/m, of the members along themselves in the mean
+            if model.structure is None:
+                first = 2.0 * np.pi * float(elastic_band(model)[0])
+                return _FIRST * model.total_mass * first**2
+            frame = model.structure.frame
             each = [m.material.E * m.section.A / frame.member_length(m.name) for m in frame.members]
             return _SHARE * float(np.mean(each))
 
@@ -85,7 +96,7 @@ class BraceSpring(FrameEffect):
 
     def change(self, model: Model, place: str) -> Change:
         """Return the stiffness matrix of 1 N/m."""
-        row = ModelPlaces(model).elongation(Places(model.frame_structure.frame).pair(place))
+        row = ModelPlaces(model).elongation(ModelPlaces(model).node_pairs(place)[0])
         return Change.proportional(Term("stiffness", RowOperator(row, np.eye(1))))
 
 

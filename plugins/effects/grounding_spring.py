@@ -52,11 +52,6 @@ class GroundingSpring(FrameEffect):
         at, direction = Places(frame).directed_point(place)
         return replace(frame, springs=(*frame.springs, GroundSpring(at, direction, values[0])))
 
-    def extend_matrices(self, model: Model, place: str, values: Sequence[float]) -> Model:
-        """Return the model with the spring in it."""
-        at, direction = ModelPlaces(model).directed_point(place)
-        return model.attach([], [GroundSpring(at, direction, values[0])])
-
     def change(self, model: Model, place: str) -> Change:
         """Return the stiffness matrix of 1 N/m."""
         at, direction = ModelPlaces(model).directed_point(place)

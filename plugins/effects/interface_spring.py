@@ -62,11 +62,6 @@ class InterfaceSpring(FrameEffect):
         )
         return replace(frame, braces=(*frame.braces, *found))
 
-    def extend_matrices(self, model: Model, place: str, values: Sequence[float]) -> Model:
-        """Return the model with the springs in it."""
-        rows = _rows(model, place)
-        return replace(model, stiffness=model.stiffness + values[0] * (rows.T @ rows))
-
     def change(self, model: Model, place: str) -> Change:
         """Return the stiffness matrix of springs of 1 N/m."""
         rows = _rows(model, place)

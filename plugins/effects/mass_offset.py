@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations_with_replacement
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -27,6 +28,7 @@ from femubench.plugins.effects.mass_eccentricity import section_size
 
 _SHARE = 0.005  # of the structure's mass
 _SPREAD, _BOUND = 1.0, 5.0  # of the size of the section
+_REACH = 0.02  # of the size of the structure: an arm on matrices, which know no sections
 _FELT = 1e-9
 _ALIKE = 0.999  # cosine of the angle between axes
 
@@ -34,7 +36,8 @@ _ALIKE = 0.999  # cosine of the angle between axes
 class MassOffset(FrameEffect):
     """Put a point mass on an arm across a member: along local z, out of plane along local y.
 
-    The arm is rigid and massless. It tells more of what `added-mass` finds at that point.
+    On a node of matrices that has rotations the arm points anywhere. It is rigid and massless. It
+    tells more of what `added-mass` finds at that point.
     """
 
     name: ClassVar[str] = "mass-offset"
@@ -46,29 +49,33 @@ class MassOffset(FrameEffect):
     )
 
     def places(self, model: Model) -> Sequence[str]:
-        """Return the points of members and of straight beams at which an arm can be felt."""
-        if model.structure is None:
-            return ()
-        frame = model.structure.frame
-        along = [at for at in ModelPlaces(model).points() if _is_straight(frame, at)]
+        """Return the points of members and of straight beams, or nodes, at which an arm is felt."""
+        points, structure = ModelPlaces(model).points(), model.structure
         # Asked for with every likely added mass, and the same for all of them.
         return once_for(
             model,
             "points with an arm",
-            lambda: [at for at in along if abs(_arm_rows(model, at)).max() > _FELT],
+            lambda: [
+                at
+                for at in points
+                if (structure is None or _is_straight(structure.frame, at)) and _arms(model, at)
+            ],
         )
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
-        """Return the mass, and the arm, whose scale is the section's size that way."""
-        frame = model.frame_structure.frame
-        axis: Literal["y", "z"] = "y" if frame.plane == "out-of-plane" else "z"
-        size = section_size(_members_at(frame, place)[0].section, axis)
+        """Return the mass and its arms, whose scale is the section's size that way."""
         mass = Parameter(
             "mass", "kg", _SHARE * model.total_mass, scaling="exponential", one_sided=True
         )
-        return mass, Parameter(
-            "offset", "m", _SPREAD * size, lower=-_BOUND * size, upper=_BOUND * size
-        )
+        if model.structure is None:
+            points = np.array(list(ModelPlaces(model).nodes.values()))
+            size = _REACH * float(np.linalg.norm(np.ptp(points, axis=0)))
+        else:
+            frame = model.structure.frame
+            axis: Literal["y", "z"] = "y" if frame.plane == "out-of-plane" else "z"
+            size = section_size(_members_at(frame, place)[0].section, axis)
+        given = "m", _SPREAD * size, 0.0, -_BOUND * size, _BOUND * size
+        return mass, *(Parameter(name, *given) for name in _arms(model, place))
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the mass on its arm."""
@@ -79,29 +86,30 @@ class MassOffset(FrameEffect):
         return replace(frame, masses=(*frame.masses, mass))
 
     def change(self, model: Model, place: str) -> Change:
-        """Return what 1 kg does at the point, what is linear and what is quadratic in the arm."""
+        """Return what 1 kg does at the point, what is linear and what is quadratic in the arms."""
         at = ModelPlaces(model).point(place)
-        own = ModelPlaces(model).translations(at, _directions(model))
-        turned = _arm_rows(model, place)
-        rows = sp.csr_array(sp.vstack([own, turned]))
-        p = own.shape[0]
-        both = np.zeros((2 * p, 2 * p))
-        both[:p, p:] = both[p:, :p] = np.eye(p)
-        terms = (
-            Term("mass", RowOperator(own, np.eye(p))),
-            Term("mass", RowOperator(rows, both), weight=0.0),
-            Term("mass", RowOperator(turned, np.eye(p)), weight=0.0),
-        )
+        rows = [
+            ModelPlaces(model).translations(at, _directions(model)),
+            *_arms(model, place).values(),
+        ]
+        eye = np.eye(rows[0].shape[0])
+        pairs = list(combinations_with_replacement(range(len(rows)), 2))
+        terms = []
+        for i, k in pairs:
+            core = np.kron(np.array([[0.0, 1.0], [1.0, 0.0]]), eye)
+            both = sp.csr_array(sp.vstack([rows[i], rows[k]]))
+            operator = RowOperator(rows[i], eye) if i == k else RowOperator(both, core)
+            terms.append(Term("mass", operator, weight=0.0 if k else None))
 
         def factors(values: FloatArray) -> FloatArray:
-            mass, offset = values.T
-            return np.column_stack([mass, mass * offset, mass * offset**2])
+            mass, arms = values[:, 0], np.column_stack([np.ones(len(values)), values[:, 1:]])
+            return np.column_stack([mass * arms[:, i] * arms[:, k] for i, k in pairs])
 
-        return Change(terms, factors)
+        return Change(tuple(terms), factors)
 
 
 def _directions(model: Model) -> list[str]:
-    return [d for d in model.frame_structure.frame.active if d in "xyz"]
+    return [d for d in (model.structure.frame.active if model.structure else "xyz") if d in "xyz"]
 
 
 def _members_at(frame: Frame, place: str) -> list[Member]:
@@ -122,10 +130,19 @@ def _across(frame: Frame, place: str) -> FloatArray:
     return np.asarray(axes[1] if frame.plane == "out-of-plane" else axes[2])
 
 
-def _arm_rows(model: Model, place: str) -> SparseArray:
-    """Return how much more than its point the end of an arm of 1 m moves, sparse (p, n)."""
-    at = ModelPlaces(model).point(place)
-    x, y, z = _across(model.frame_structure.frame, place)
-    lever = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+def _arms(model: Model, place: str) -> dict[str, SparseArray]:
+    """Return how much more than its point the end of an arm of 1 m moves, sparse (p, n).
+
+    By the names of offsets, without those that nothing turns.
+    """
+    at, structure = ModelPlaces(model).point(place), model.structure
     kept = ["xyz".index(direction) for direction in _directions(model)]
-    return sp.csr_array(sp.csr_array(lever[kept]) @ ModelPlaces(model).motion(at)[3:])
+    turns, found = ModelPlaces(model).motion(at)[3:], {}
+    arms = dict(zip(("offset x", "offset y", "offset z"), np.eye(3), strict=True))
+    for name, arm in (
+        arms.items() if structure is None else [("offset", _across(structure.frame, place))]
+    ):
+        rows = sp.csr_array(sp.csr_array(np.cross(np.eye(3), arm).T[kept]) @ turns)
+        if abs(rows).max() > _FELT:
+            found[name] = rows
+    return found

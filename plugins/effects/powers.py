@@ -13,6 +13,8 @@ from femubench.effect import Change, FrameEffect, Parameter, Size, Term
 from femubench.fem import FloatArray, Frame, Groups
 from femubench.modal import GroupPriors
 
+_PRELOAD = "preload:"
+
 
 class PowersEffect(FrameEffect):
     """Base class of effects of which every matrix comes with a power of one value.
@@ -63,13 +65,32 @@ class PlateThickness(PowersEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the groups of plates alone."""
-        meet = GroupPriors(model).interfaces
-        return tuple(place for place in model.powers if not place.startswith(meet.PREFIX))
+        return tuple(place for place in model.powers if not place.startswith(_PRELOAD))
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the relative change, of which the mass of a rolled sheet scatters as much."""
         std = GroupPriors(model).std(place.removeprefix(Groups.PREFIX), "mass")
         return (Parameter("change of thickness", "", std, lower=-0.9, wording="change"),)
+
+
+class PreloadForce(PowersEffect):
+    """Scale what a preload adds to the stiffness: cables, bolts, a part fitted under stress."""
+
+    name: ClassVar[str] = "preload-force"
+    summary: ClassVar[str] = "a preload is other than drawn"
+    softens: ClassVar[bool] = True
+    sizes: ClassVar[Sequence[Size]] = (Size(0.2, 0.9, signed=True),)
+    nominal: ClassVar[float] = 1.0
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return the preloads of which the geometric stiffness is known."""
+        return tuple(place for place in model.powers if place.startswith(_PRELOAD))
+
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
+        """Return the change of the force over that drawn; lost, it is -1."""
+        std = GroupPriors(model).std(place.removeprefix(_PRELOAD))
+        given = std, 0.0, -1.0, 2.0
+        return (Parameter("change of preload", "", *given, wording="change"),)
 
 
 class InterfaceSoftness(PowersEffect):
