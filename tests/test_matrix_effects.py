@@ -14,6 +14,8 @@ from test_chain import write_shells
 import femubench
 from femubench import Case, Model, Sensors, fem, solve_modes
 from femubench.core.case.reducing import expand_model, reduce_case
+from femubench.core.drawing.places import find_wireframe
+from femubench.core.drawing.wireframe import to_point
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.effect import FrameEffect, ModelPlaces
 from femubench.fem import FloatArray, Frame, Material, MatrixGeometry, Section
@@ -128,6 +130,18 @@ def test_a_strut_ties_no_two_nodes_of_one_bar() -> None:
         along = {name for name, xyz in nodes.items() if abs(xyz[axis] - at) < 1e-9}
         assert len(along) == 5
         assert not [pair for pair in found if pair <= along]
+
+
+def test_nodes_and_pairs_of_them_are_drawn(pair: tuple[Model, Model]) -> None:
+    matrices = pair[1]
+    at = {name: to_point(xyz) for name, xyz in ModelPlaces(matrices).nodes.items()}
+    drawn = find_wireframe(matrices, ["n1-n4", "n2:y", "n2:y:free", "group:none"])
+    for word, kind, ends in (
+        ("n1-n4", "pair", ("n1", "n4")), ("n2:y", "joint", ("n2",)),
+        ("n2:y:free", "joint", ("n2",)), ("group:none", "elsewhere", ()),
+    ):  # fmt: skip
+        place = drawn.place(word)
+        assert (place.kind, place.points) == (kind, tuple(at[end] for end in ends))
 
 
 @pytest.fixture(scope="module")

@@ -17,6 +17,7 @@ from femubench.core.drawing.wireframe import (
     to_point,
     wireframe_of,
 )
+from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.places import ALL, Places, bare_place, split_direction
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame, Place
@@ -86,9 +87,8 @@ def find_wireframe(source: Case | Model, words: Iterable[str]) -> PlacedWirefram
         words: in the grammar of places.
     """
     wireframe = wireframe_of(source)
-    structure = (source.model if isinstance(source, Case) else source).structure
-    frame = None if structure is None else structure.frame
-    places = tuple(_place(wireframe, frame, word) for word in dict.fromkeys(words))
+    model = source.model if isinstance(source, Case) else source
+    places = tuple(_place(wireframe, model, word) for word in dict.fromkeys(words))
     return PlacedWireframe(**{n: getattr(wireframe, n) for n in Wireframe.__slots__}, places=places)
 
 
@@ -131,11 +131,18 @@ def _lines(wireframe: Wireframe, head: str) -> list[tuple[Point, Point]]:
     return [line for line in few if other.issuperset(line)] or few
 
 
-def _place(wireframe: Wireframe, frame: Frame | None, word: str) -> DrawnPlace:
+def _place(wireframe: Wireframe, model: Model, word: str) -> DrawnPlace:
     head, _ = split_direction(bare_place(word))
     plain = _plain_place(wireframe, word, head)
-    if frame is None or plain.kind == "all":
+    if plain.kind == "all" or (model.structure is None and plain.kind != "elsewhere"):
         return plain
+    if model.structure is None:
+        with suppress(ModelError):
+            pairs = ModelPlaces(model).node_pairs(head)
+            ends = [to_point(ModelPlaces(model).nodes[name]) for pair in pairs for name in pair]
+            return DrawnPlace(word, "pair", points=tuple(ends))
+        return plain
+    frame = model.structure.frame
     # A budget has free ends and feet by their type, which is none of the grammar of places.
     alike = [joint.name for joint in frame.joints if joint.family == head]
     if joints := Places(frame).joints_of(head) or alike:

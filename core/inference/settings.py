@@ -187,7 +187,8 @@ class Settings:
     tolerance_of_groups: tuple[float, ...] = _prior(
         tuple(s for kind in KINDS.values() for s in (kind.std, kind.mass_std)),
         "of ln(factor)",
-        "stiffness and mass of parts, joints, supports: within tolerances, loose, hardly known",
+        "stiffness and mass of parts, joints, supports: within tolerances, loose, hardly known; "
+        "change of the force of preloads, which have no mass",
     )
     stiffest_joint: float = _prior(
         KINDS["joint"].most, "factor", "a joint is drawn whole and stiffens by a fillet at most"

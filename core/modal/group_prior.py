@@ -39,7 +39,7 @@ KINDS = {
     "joint": GroupKind(_LOOSE, 2.0, 0.5, "a joint is drawn whole: it gapes or slips, stiffens by "
                        "no more than a fillet, and is as heavy as what nobody drew on it"),
     "support": GroupKind(_LOOSE, np.inf, _LOOSE, "ground and clamps are hardly ever known"),
-    "preload": GroupKind(0.5, np.inf, 0.03, "bolts tightened by torque scatter by a third, cords "
+    "preload": GroupKind(0.5, np.inf, 0.0, "bolts tightened by torque scatter by a third, cords "
                          "creep; it may be lost, and of what presses little more would buckle"),
 }  # fmt: skip
 STRUCTURE_STD = KINDS["part"].std
