@@ -19,7 +19,7 @@ import pytest
 from frf_problems import write_universal
 
 import femubench
-from femubench import Sensors
+from femubench import Model, Sensors
 from femubench.core.case.nodes import with_mesh
 from femubench.modal import FrequencyResponses, receptance
 from femubench.plugins.readers.solid_elements import KINDS
@@ -122,14 +122,15 @@ def write_shells(file: Path) -> Path:
 
 
 def write_responses(
-    file: Path, deck: Path, points: Sequence[Point] = FACES, first: int = 6
+    file: Path, deck: Path | Model, points: Sequence[Point] = FACES, first: int = 6
 ) -> None:
     """Write accelerances of a deck at points, x, y, z and direction, with 1 % of noise.
 
     Arguments:
+        deck: or the model of one.
         first: of the ten modes that the lines cover.
     """
-    model = with_mesh(femubench.read_model(deck, unit="mm"))
+    model = with_mesh(deck if isinstance(deck, Model) else femubench.read_model(deck, unit="mm"))
     rng = np.random.default_rng(4)
     modes = femubench.solve_modes(model, 40)
     xyz = 1e-3 * np.array([point[:3] for point in points])

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import test_chain
 from diagnosis_problems import case_of, clamped_portal
 from effect_checks import as_matrices
-from test_chain import write_shells
+from test_chain import Boxes, Point, diagnose_files, write_deck, write_responses, write_shells
 
 import femubench
 from femubench import Case, Model, Sensors, fem, solve_modes
+from femubench.core.case.nodes import with_mesh
 from femubench.core.case.reducing import expand_model, reduce_case
 from femubench.core.drawing.places import find_wireframe
 from femubench.core.drawing.wireframe import to_point
@@ -76,6 +80,19 @@ def test_an_oscillator_is_that_of_the_frame(
     assert found.observe(sensors).shape == (1, found.size)
     twice = OSCILLATOR.extend(found, f"{at}:{direction}{free}", values)
     assert twice.size == model.size + 2 > shapes.shape[1]
+
+
+def test_a_sensor_between_nodes_does_not_read_what_hangs_next_to_it(
+    pair: tuple[Model, Model],
+) -> None:
+    matrices = with_mesh(pair[1])
+    found = OSCILLATOR.extend(matrices, "n2:x", [0.02, 40.0])
+    assert isinstance(found.geometry, MatrixGeometry)
+    assert isinstance(matrices.geometry, MatrixGeometry)
+    near = found.geometry.places["n2~x"][None] + 1e-4
+    (at, foot), (own, drawn) = (g.nearest(near)[0] for g in (found.geometry, matrices.geometry))
+    assert at == own
+    np.testing.assert_array_equal(foot, drawn)
 
 
 def test_a_mass_on_an_arm_is_that_of_the_frame(pair: tuple[Model, Model]) -> None:
@@ -161,7 +178,7 @@ def test_in_a_basis_it_is_as_in_the_whole_and_goes_back(folded: Case, effect: Fr
     small = reduce_case(folded)
     model = folded.model
     places = effect.places(small.model)
-    if effect is not BRACE:  # which of a whole model is offered at few nodes
+    if effect is OFFSET:  # the others are offered at few nodes of a whole model
         assert set(places) <= set(effect.places(model))
     for place in (places[0], places[-1]):
         values = [0.3 * p.scale + (p.neutral or 0.0) for p in effect.parameters(model, place)]
@@ -172,3 +189,42 @@ def test_in_a_basis_it_is_as_in_the_whole_and_goes_back(folded: Case, effect: Fr
             gap = abs(getattr(back, kind) - getattr(whole, kind)).max()
             assert gap < 1e-6 * abs(getattr(whole, kind)).max()
         np.testing.assert_allclose(hertz(back, 8), hertz(whole, 8), rtol=1e-7)
+
+
+TIED: Boxes = {  # mm
+    "FOOT": ((0, 0, 0), (60, 60, 20)), "POST": ((20, 20, 20), (40, 40, 300)),
+    "HEAD": ((20, 20, 300), (340, 40, 320)), "LEG": ((320, 20, 20), (340, 40, 300)),
+    "FOOT2": ((300, 0, 0), (360, 60, 20)),
+}  # fmt: skip
+RUBBER = {"FOOT": 7e4, "FOOT2": 7e4}
+SEEN: list[Point] = [
+    (20, 30, 230, "x"), (60, 20, 310, "y"),
+    *((x, 30, z, "x") for x in (20, 340) for z in (90, 160)), (340, 30, 230, "x"),
+    *((x, 20, z, "y") for x in (30, 330) for z in (90, 160, 230)),
+    *((x, 30, 320, "z") for x in (60, 120, 180, 240, 300)),
+    *((x, 20, 310, "y") for x in (180, 300)),
+]  # fmt: skip
+
+
+@pytest.mark.nightly
+def test_a_rod_between_two_posts_leads_from_files_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(test_chain, "FACES", SEEN)  # the hammer hits the first two
+    write_deck(Path("model.inp"), "C3D20", 20.0, 1.0, TIED, RUBBER)
+    write_deck(Path("truth.inp"), "C3D20", 10.0, 1.0, TIED, RUBBER)
+    truth = femubench.read_model(Path("truth.inp"), unit="mm")
+    ends = {name for name, xyz in ModelPlaces(truth).nodes.items()
+            if any(np.allclose(xyz, (x, 0.03, 0.16)) for x in (0.04, 0.32))}  # fmt: skip
+    stiffness = 210e9 * 16e-6 / 0.28
+    truth = BRACE.extend(truth, "-".join(sorted(ends)), [stiffness])
+    write_responses(Path("test.uff"), truth, SEEN, 0)
+    assert diagnose_files("model.inp", "test.uff")[0] == "named"
+    (found,) = json.loads(Path("found.json").read_text())["causes"]
+    assert found["effect"] == "brace-spring"
+    nodes = ModelPlaces(femubench.read_case("case").model).nodes
+    at = np.array([nodes[name] for name in found["place"].split("-")])
+    np.testing.assert_allclose(at[:, 2], 0.16)
+    value = found["parameters"][0]
+    assert abs(value["value"] - stiffness) < 2.0 * value["std"] < stiffness

@@ -269,6 +269,14 @@ def made(model: Model) -> Case:
     return case_of(model, modes_at(model, sensors, 8), 6)
 
 
+def test_in_a_basis_seams_have_no_thickness(folded: Model) -> None:
+    small = reduce_case(made(folded)).model
+    assert set(THICK.places(small)) == set(THICK.places(folded)) == {
+        "group:BASE", "group:UPRIGHT", "group:RIB"
+    }  # fmt: skip
+    assert set(SOFT.places(small)) == set(SOFT.places(folded))
+
+
 @pytest.mark.parametrize(
     ("effect", "place", "values"),
     [

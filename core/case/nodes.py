@@ -20,7 +20,7 @@ from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.model import Dofs, Model
 from femubench.core.fem.sensors import DIRECTIONS, Sensors, moved_names, unit_motions
-from femubench.core.typing import BoolArray, FloatArray, SparseArray
+from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 _MOST_DOFS = 1_000_000
 DOF_COLUMNS = ("row", "node", "direction", "x", "y", "z")
@@ -90,8 +90,14 @@ class MatrixGeometry:
         return {number: i for i, number in enumerate(numbers)}
 
     @cached_property
+    def _joined(self) -> IntArray:
+        """Return the places that a sensor may sit at: not those that hang on a node alone."""
+        every = np.arange(len(self.placed))
+        return every if self.mesh is None else every[np.diff(self.mesh.indptr)[list(self._at)] > 0]
+
+    @cached_property
     def _tree(self) -> cKDTree:
-        return cKDTree(self.points)
+        return cKDTree(self.points[self._joined])
 
     def nearest(self, xyz: FloatArray) -> list[tuple[str, FloatArray]]:
         """Return the nearest place of every point and where it is in m: a node, or amid some.
@@ -108,7 +114,8 @@ class MatrixGeometry:
         They are those of the simplex of Delaunay among the nodes of the elements there: exact for
         motions of a body and, as are linear elements, for constant strains; no share is negative.
         """
-        starts = np.atleast_1d(self._tree.query(point, min(_STARTS, len(self.placed)))[1])
+        near = self._tree.query(point, min(_STARTS, len(self._joined)))[1]
+        starts = self._joined[np.atleast_1d(near)]
         first = self.points[starts[0]]
         best: tuple[dict[str, float], FloatArray] = ({self.placed[starts[0]]: 1.0}, first)
         gap = float(np.linalg.norm(first - point))

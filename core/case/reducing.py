@@ -14,7 +14,7 @@ from femubench.core.case.spans import find_spans
 from femubench.core.errors import ModelError
 from femubench.core.fem.group_factors import PRELOAD, Groups
 from femubench.core.fem.model import Dofs, Model
-from femubench.core.modal.eigen import ALL_MODES_LIMIT, DENSE_LIMIT
+from femubench.core.modal.eigen import DENSE_LIMIT
 from femubench.core.modal.group_prior import GroupPriors
 from femubench.core.modal.grouped_reduction import GroupedReduction, reduce_groups
 from femubench.core.modal.interfaces import Interfaces
@@ -27,7 +27,7 @@ _SAME = 1e-9  # of the diagonal: what rounding makes of an unchanged entry
 _TOLERANCE = 1e-3
 
 
-def reduce_case(case: Case, above: int = ALL_MODES_LIMIT) -> Case:
+def reduce_case(case: Case, above: int = DENSE_LIMIT) -> Case:
     """Return a case with a small model of the same groups, where its own is large and has some.
 
     The nodes of sensors and of attached masses and springs stay; what strategies and effects

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from femubench.core.case.nodes import MatrixGeometry, with_mesh
 from femubench.core.fem.model import Model
-from femubench.core.typing import FloatArray, IntArray, SparseArray
+from femubench.core.typing import SparseArray
 
 _MOST = 25  # nodes: 300 pairs
 # The way through the body over the straight line: along a bar or across a plate it is up to 1.1 by
@@ -33,24 +33,25 @@ def find_spans(model: Model, names: Iterable[str]) -> tuple[tuple[str, str], ...
         geometry = with_mesh(model).geometry
         assert isinstance(geometry, MatrixGeometry)
     points, place = geometry.points, {name: i for i, name in enumerate(geometry.placed)}
-    chosen = _spread(points, np.array([place[name] for name in names], dtype=np.int64))
+    chosen = np.array([place[name] for name in spread_nodes(geometry, names)], dtype=np.int64)
     way = dijkstra(_edges(geometry), directed=False, indices=chosen)[:, chosen]
     straight = np.linalg.norm(points[chosen, None] - points[None, chosen], axis=2)
     pairs = zip(*np.nonzero(np.triu((way > _DETOUR * straight) & (straight > 0.0))), strict=True)
     return tuple((geometry.placed[chosen[a]], geometry.placed[chosen[b]]) for a, b in pairs)
 
 
-def _spread(points: FloatArray, known: IntArray) -> IntArray:
-    """Return some of the points that lie far from each other, in their order."""
+def spread_nodes(geometry: MatrixGeometry, names: Iterable[str]) -> tuple[str, ...]:
+    """Return nodes in their order, of more than 25 those that lie farthest from each other."""
+    known = tuple(names)
     if len(known) <= _MOST:
         return known
-    own = points[known]
+    own = np.array([geometry.places[name] for name in known])
     chosen = [int(np.linalg.norm(own - own.mean(axis=0), axis=1).argmax())]
     away = np.full(len(own), np.inf)
     while len(chosen) < _MOST:
         away = np.minimum(away, np.linalg.norm(own - own[chosen[-1]], axis=1))
         chosen.append(int(away.argmax()))
-    return np.asarray(known[np.sort(chosen)])
+    return tuple(known[i] for i in sorted(chosen))
 
 
 def _edges(geometry: MatrixGeometry) -> SparseArray:

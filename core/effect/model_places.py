@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.case.nodes import MatrixGeometry, add_node
-from femubench.core.case.spans import find_spans
+from femubench.core.case.spans import find_spans, spread_nodes
 from femubench.core.change.terms import RowOperator, Term
 from femubench.core.effect.places import Places, bare_place, split_direction
 from femubench.core.errors import ModelError
@@ -79,11 +79,14 @@ class ModelPlaces:
             raise ModelError(f"there is no place {place!r}")
         return rows
 
-    def points(self) -> tuple[str, ...]:
+    def points(self, *, few: bool = False) -> tuple[str, ...]:
         """Return where something may be attached: every joint, free ends too, and along members.
 
         A member of up to four elements offers its mesh nodes, a longer one those nearest to its
         quarter points; a model that came as matrices offers its nodes.
+
+        Arguments:
+            few: whether of more than 25 nodes of matrices those far from each other are enough.
 
         Examples:
             >>> effect.ModelPlaces(model).points()[-3:]
@@ -91,7 +94,9 @@ class ModelPlaces:
         """
         if self.model.structure is None:
             geometry = self.model.geometry
-            return geometry.placed if isinstance(geometry, MatrixGeometry) else ()
+            if not isinstance(geometry, MatrixGeometry):
+                return ()
+            return spread_nodes(geometry, geometry.placed) if few else geometry.placed
         frame = self.model.structure.frame
         points = [joint.name for joint in frame.joints]
         for member in frame.members:

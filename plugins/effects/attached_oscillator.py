@@ -49,7 +49,7 @@ class AttachedOscillator(FrameEffect):
     def places(self, model: Model) -> Sequence[str]:
         """Return joints and middles of members, or nodes, in each direction that they move in."""
         if model.structure is None:
-            return ModelPlaces(model).directed(ModelPlaces(model).points())
+            return ModelPlaces(model).directed(ModelPlaces(model).points(few=True))
         frame = model.structure.frame
         # The mesh node nearest to the middle of a member.
         middle = {m.name: m.elements // 2 / m.elements or 0.5 for m in frame.members}

@@ -65,7 +65,8 @@ class PlateThickness(PowersEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the groups of plates alone."""
-        return tuple(place for place in model.powers if not place.startswith(_PRELOAD))
+        others = GroupPriors(model).interfaces.PREFIX, _PRELOAD
+        return tuple(place for place in model.powers if not place.startswith(others))
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the relative change, of which the mass of a rolled sheet scatters as much."""
