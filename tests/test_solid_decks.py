@@ -176,6 +176,9 @@ def test_a_group_of_the_file_takes_a_kind_by_its_name_alone(tmp_path: Path) -> N
     assert set(found.groups) == {"upper", "rest"}
     with pytest.raises(BadKey, match="a group without a part"):
         with_groups(model, [GroupSpec(name="lower")], files, ())
+    for given in ({"name": "upper"}, {"name": "bolt", "mass": "m.mtx"}, {"name": "b", "dofs": [1]}):
+        with pytest.raises(BadKey, match="a preload without its stiffness alone"):
+            with_groups(model, [GroupSpec(kind="preload", **given)], files, ())
 
 
 def test_a_part_of_abaqus_is_read_like_a_flat_file(tmp_path: Path) -> None:

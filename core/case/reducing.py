@@ -23,11 +23,12 @@ from femubench.core.typing import FloatArray, IntArray, SparseArray
 _INNER = "~"  # the node of coordinates that lie nowhere
 _MODES = 6  # that have to be right in addition to the measured ones
 _MOST_KEPT = DENSE_LIMIT // 2
+_LARGE = 2 * DENSE_LIMIT  # dofs: a basis has up to half as many coordinates
 _SAME = 1e-9  # of the diagonal: what rounding makes of an unchanged entry
 _TOLERANCE = 1e-3
 
 
-def reduce_case(case: Case, above: int = DENSE_LIMIT) -> Case:
+def reduce_case(case: Case, above: int = _LARGE) -> Case:
     """Return a case with a small model of the same groups, where its own is large and has some.
 
     The nodes of sensors and of attached masses and springs stay; what strategies and effects
