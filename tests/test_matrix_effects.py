@@ -162,21 +162,21 @@ def test_nodes_and_pairs_of_them_are_drawn(pair: tuple[Model, Model]) -> None:
 
 
 @pytest.fixture(scope="module")
-def folded(tmp_path_factory: pytest.TempPathFactory) -> Case:
-    """Return shells in groups, base, upright and rib, with a test of ten nodes."""
+def small(tmp_path_factory: pytest.TempPathFactory) -> Case:
+    """Return shells in groups, base, upright and rib, in a basis, with a test of ten nodes."""
     file = write_shells(tmp_path_factory.mktemp("folded") / "model.inp")
     model = femubench.read_model(file, unit="mm")
     assert isinstance(model.geometry, MatrixGeometry)
     names = [str(n) for n in range(1, 600, 60)]
     xyz = np.array([model.geometry.places[name] for name in names])
     sensors = Sensors(tuple(names), xyz, ("z",) * len(names))
-    return case_of(model, modes_at(model, sensors, 8), 6)
+    return reduce_case(case_of(model, modes_at(model, sensors, 8), 6))
 
 
 @pytest.mark.parametrize("effect", [BRACE, OSCILLATOR, OFFSET], ids=lambda e: e.name)
-def test_in_a_basis_it_is_as_in_the_whole_and_goes_back(folded: Case, effect: FrameEffect) -> None:
-    small = reduce_case(folded)
-    model = folded.model
+def test_in_a_basis_it_is_as_in_the_whole_and_goes_back(small: Case, effect: FrameEffect) -> None:
+    model = small.whole
+    assert model is not None
     places = effect.places(small.model)
     if effect is OFFSET:  # the others are offered at few nodes of a whole model
         assert set(places) <= set(effect.places(model))
