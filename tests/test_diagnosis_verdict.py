@@ -16,6 +16,7 @@ from femubench import Case, Diagnosis, InputError, Measurement, Model, diagnose
 from femubench.core.case.modes import NO_SENSORS
 from femubench.core.challenge.structures import structure_named
 from femubench.core.challenge.truth import finer
+from femubench.core.change.change import Change
 from femubench.core.change.hypothesis import Hypothesis, by_themselves
 from femubench.core.diagnosis import proof, tables
 from femubench.core.diagnosis.scatter import scatter_rows
@@ -34,7 +35,9 @@ from femubench.core.inference.prior import outside_odds
 from femubench.core.inference.search import adequacy
 from femubench.core.inference.settings import overridden, settings
 from femubench.core.plugin.loader import load_plugins
+from femubench.core.schema.diagnosis import Cause
 from femubench.fem import Factor, Frame, Joint, Material, Member, Place, Section, Support
+from femubench.plugins.effects.mass_offset import MassOffset
 
 FRAME = structure_named("ladder").frame
 MODEL = Model.of(FRAME)
@@ -654,3 +657,12 @@ def test_a_diagnosis_leaves_nothing_behind_but_the_last() -> None:
         gc.collect()
         counts.append(sum(type(kept) in (Hypothesis, Explanation) for kept in gc.get_objects()))
     assert counts[2] == counts[1]
+
+
+def test_what_refines_a_shared_cause_is_said() -> None:
+    """A mass on an arm is weighed as `added-mass`: where that is shared it was left out."""
+    part = SimpleNamespace(hypothesis=Hypothesis(MassOffset(), Change(places=("B",)), 1))
+    explanation: Any = SimpleNamespace(parts=(part,))
+    found = [Cause("mass-offset", "B", (), 1.0, ""), Cause("density", "all", (), 1.0, "")]
+    assert tables.only_shared(found, explanation, ("added-mass",)) == found[:1]
+    assert tables.only_shared(found, explanation, ("density", "mass-offset")) == found[1:]

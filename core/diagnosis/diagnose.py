@@ -35,6 +35,7 @@ from femubench.core.diagnosis.tables import (
     list_causes,
     notes_left_out,
     odds_rows,
+    only_shared,
     residual_rows,
     rivals_of,
     smallest_visible,
@@ -291,7 +292,7 @@ def _written(
     causes = _group_causes(options)
     top = posterior.names[decision.group[0]] if decision.group else decision.nothing
     if decision.shared:
-        causes = [cause for cause in causes if cause.effect in decision.shared]
+        causes = only_shared(causes, best, decision.shared)
         top = sum(p for key, p in posterior.names.items() if set(decision.shared) <= set(key))
     top *= posterior.known if decision.group else 1.0
     stated = decision, causes, options, top, proof.gain_rms

@@ -194,6 +194,16 @@ def has_causes(examination: Examination, explanation: Explanation, names: Key) -
     return not own.isdisjoint(names) or not {*explanation.base.names}.isdisjoint(names)
 
 
+def only_shared(causes: Iterable[Cause], explanation: Explanation, shared: Key) -> list[Cause]:
+    """Return the causes that are weighed under some names: their own, or that of what they refine.
+
+    Arguments:
+        explanation: which they are of.
+    """
+    own = {p.hypothesis.effect.name: p.hypothesis.name for p in explanation.parts}
+    return [cause for cause in causes if own.get(cause.effect, cause.effect) in shared]
+
+
 def find_passengers(state: State, spread: FloatArray) -> list[bool]:
     """Return which causes may as well be left out, the rest as it is; never the only one.
 
