@@ -91,7 +91,7 @@ def test_a_moved_roller_is_named_and_nothing_where_nothing_moved() -> None:
     """The drawing may be wrong by 5 % in E and by 1 cm in the roller: the reference knows it."""
     drawn = beam(members=1, elements=10, stiffer=1.05)
     was = ROLLER - 0.01
-    for seed, (noise, shift) in enumerate([(0.002, 0.093), (0.002, -0.093), (0.02, 0.15)]):
+    for seed, (noise, shift) in enumerate([(0.002, -0.093), (0.02, 0.15)]):
         check_moved(tell(drawn, [was], [was + shift], noise, seed), "support:m0@0.6", shift)
         assert tell(drawn, [was], [was], noise, seed).verdict == "none"
 

@@ -269,8 +269,14 @@ def made(model: Model) -> Case:
     return case_of(model, modes_at(model, sensors, 8), 6)
 
 
-def test_in_a_basis_seams_have_no_thickness(folded: Model) -> None:
-    small = reduce_case(made(folded)).model
+@pytest.fixture(scope="module")
+def basis(folded: Model) -> Case:
+    """Return the case of the shells with its model reduced."""
+    return reduce_case(made(folded))
+
+
+def test_in_a_basis_seams_have_no_thickness(folded: Model, basis: Case) -> None:
+    small = basis.model
     assert set(THICK.places(small)) == set(THICK.places(folded)) == {
         "group:BASE", "group:UPRIGHT", "group:RIB"
     }  # fmt: skip
@@ -286,16 +292,15 @@ def test_in_a_basis_seams_have_no_thickness(folded: Model) -> None:
     ],
 )
 def test_a_basis_holds_what_powers_do(
-    folded: Model, effect: FrameEffect, place: str, values: Sequence[float]
+    folded: Model, basis: Case, effect: FrameEffect, place: str, values: Sequence[float]
 ) -> None:
-    small = reduce_case(made(folded))
-    assert small.whole is folded
-    assert place in effect.places(small.model)
+    assert basis.whole is folded
+    assert place in effect.places(basis.model)
     for value in values:
-        own = effect.extend(small.model, place, [value])
+        own = effect.extend(basis.model, place, [value])
         whole = effect.extend(folded, place, [value])
         np.testing.assert_allclose(hertz(own, 12), hertz(whole, 12), rtol=1e-3)
-    back = expand_model(small, own)
+    back = expand_model(basis, own)
     for kind in ("stiffness", "mass"):
         gap = abs(getattr(back, kind) - getattr(whole, kind)).max()
         assert gap < 1e-6 * abs(getattr(whole, kind)).max()

@@ -15,13 +15,13 @@ from typing import IO, Any
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.core.case.checks import check_unique
+from femubench.core.case.checks import check_known, check_unique
 from femubench.core.case.faults import BadKey, Misfit, at_key
 from femubench.core.case.files import LARGEST_FILE, CaseFiles
 from femubench.core.case.nodes import MatrixGeometry, read_dofs
-from femubench.core.case.schema import LARGEST, GroupSpec, MatricesSpec
+from femubench.core.case.schema import LARGEST, FileSpec, GroupSpec, MatricesSpec
 from femubench.core.errors import FemubenchError, InputError, ModelError
-from femubench.core.fem.group_factors import PRELOAD
+from femubench.core.fem.group_factors import MATERIAL, PRELOAD, SET
 from femubench.core.fem.model import Model
 from femubench.core.files import MIB, limit_memory, open_regular
 from femubench.core.roles import Reader
@@ -223,7 +223,8 @@ def model_of_matrices(spec: MatricesSpec, files: CaseFiles, readers: Collection[
     geometry = read_dofs(paths["dofs"])
     size = len(geometry.dofs)
     mass, stiffness = (read_matrix(paths[key], size, readers) for key in ("mass", "stiffness"))
-    return with_groups(Model(mass, stiffness, geometry.dofs, geometry), spec.groups, files, readers)
+    model = Model(mass, stiffness, geometry.dofs, geometry)
+    return with_families(with_groups(model, spec.groups, files, readers), spec)
 
 
 def with_groups(
@@ -274,6 +275,30 @@ def with_groups(
     kinds = {spec.name: spec.kind for spec in specs if spec.kind is not None}
     model = replace(model, groups=groups, mass_groups=mass_groups, powers=powers)
     return replace(model, group_priors=priors, group_kinds={**model.group_kinds, **kinds})
+
+
+def with_families(model: Model, spec: MatricesSpec | FileSpec) -> Model:
+    """Return a model from files with the sets and materials that its case states of its groups.
+
+    Raises:
+        BadKey: with a path below `model`.
+    """
+    known = {*model.groups, *model.mass_groups}
+    found = {word: [*own] for word, own in model.families.items()}
+    for i, group in enumerate(spec.groups):
+        if group.material is not None:
+            check_known("group", group.name, known, ("groups", i, "material"))
+            for word, own in found.items():
+                if word.startswith(MATERIAL) and group.name in own:
+                    own.remove(group.name)
+            found.setdefault(f"{MATERIAL}{group.material}", []).append(group.name)
+    check_unique((("sets", i, "name"), item.name) for i, item in enumerate(spec.sets))
+    for i, item in enumerate(spec.sets):
+        check_unique((("sets", i, "groups", j), name) for j, name in enumerate(item.groups))
+        for j, name in enumerate(item.groups):
+            check_known("group", name, known, ("sets", i, "groups", j))
+        found[f"{SET}{item.name}"] = [*item.groups]
+    return replace(model, families={word: tuple(own) for word, own in found.items() if own})
 
 
 def _rows(entry: int | str, geometry: MatrixGeometry) -> list[int]:

@@ -24,6 +24,7 @@ from femubench.core.case.matrices import (
     matrix_of,
     reader_of,
     reading_with,
+    with_families,
     with_groups,
 )
 from femubench.core.case.matrix_files import matrices_of, matrix_market
@@ -131,8 +132,8 @@ def model_of_file(spec: FileSpec, files: CaseFiles, readers: Collection[Reader])
                 files.path(os.path.relpath(further, files.folder))
     paths = ModelFiles(found["file"], found.get("mass"), found.get("dofs"))
     model = read_as_it_is(paths, readers)
-    if spec.groups and isinstance(model.geometry, MatrixGeometry):
-        model = with_groups(model, spec.groups, files, readers)
+    if isinstance(model.geometry, MatrixGeometry):
+        model = with_families(with_groups(model, spec.groups, files, readers), spec)
     return in_si(model, spec.unit)
 
 

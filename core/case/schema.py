@@ -353,6 +353,14 @@ class GroupSpec(TomlTable):
     kind: Literal["part", "joint", "support", "preload"] | None = Field(
         None, description="'part', 'joint', 'support' or 'preload': what is known of it"
     )
+    material: Name | None = Field(None, description="a name: groups of one material are a family")
+
+
+class GroupSetSpec(TomlTable):
+    """`[[model.sets]]` of matrices: groups that belong together."""
+
+    name: Name = Field(description=NAME)
+    groups: Many[Name] = Field(min_length=1, description="a list of names of groups")
 
 
 class MatricesSpec(TomlTable):
@@ -367,6 +375,7 @@ class MatricesSpec(TomlTable):
     groups: Many[GroupSpec] = Field(
         (), max_length=1000, description="tables [[model.groups]], 1000 at most"
     )
+    sets: Many[GroupSetSpec] = _tables("model.sets")
 
 
 class FileSpec(TomlTable):
@@ -384,6 +393,7 @@ class FileSpec(TomlTable):
     groups: Many[GroupSpec] = Field(
         (), max_length=1000, description="tables [[model.groups]], 1000 at most"
     )
+    sets: Many[GroupSetSpec] = _tables("model.sets")
 
 
 class WeightSpec(TomlTable):

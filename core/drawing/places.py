@@ -21,7 +21,7 @@ from femubench.core.effect.model_places import ModelPlaces
 from femubench.core.effect.places import ALL, Places, bare_place, split_direction
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame, Place
-from femubench.core.fem.group_factors import GROUP
+from femubench.core.fem.group_factors import GROUP, Groups
 from femubench.core.fem.mesh import place_xyz
 from femubench.core.fem.model import Model
 from femubench.core.modal.interfaces import Interfaces
@@ -137,6 +137,10 @@ def _place(wireframe: Wireframe, model: Model, word: str) -> DrawnPlace:
     if plain.kind == "all" or (model.structure is None and plain.kind != "elsewhere"):
         return plain
     if model.structure is None:
+        if names := Groups(model).names(head):
+            lines = [line for name in names for line in _lines(wireframe, f"{GROUP}{name}")]
+            ends = [end for line in lines for end in line]
+            return DrawnPlace(word, "outline" if ends else "elsewhere", points=tuple(ends))
         with suppress(ModelError):
             pairs = ModelPlaces(model).node_pairs(head)
             ends = [to_point(ModelPlaces(model).nodes[name]) for pair in pairs for name in pair]

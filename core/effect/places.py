@@ -18,7 +18,7 @@ import numpy as np
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import ACTIVE, Frame, Member, Place, halves_of, split_half
-from femubench.core.fem.group_factors import GROUP
+from femubench.core.fem.group_factors import GROUP, MATERIAL, SET
 from femubench.core.fem.joints import joint_groups
 from femubench.core.fem.mesh import member_axes
 from femubench.core.fem.sensors import DIRECTIONS
@@ -26,7 +26,7 @@ from femubench.core.typing import FloatArray
 
 ALL = "all"
 _TYPE, _BRANCH, _SUPPORT = "type:", ":branch", "support:"
-_SET, _SECTION, _MATERIAL = "set:", "section:", "material:"
+_SECTION = "section:"
 APART, FREE = ":apart", ":free"
 # Stations are written with six digits, mesh nodes have more.
 _SAME = 1e-5
@@ -41,7 +41,7 @@ def split_direction(place: str) -> tuple[str, str | None]:
     """Return a place without its suffix ``:z``, and the direction; None where it has none."""
     head, _, tail = place.rpartition(":")
     # "type:x" is the joint type x.
-    kinds = (_TYPE, _SUPPORT, _SET, _SECTION, _MATERIAL, GROUP)
+    kinds = (_TYPE, _SUPPORT, SET, _SECTION, MATERIAL, GROUP)
     if head and f"{head}:" not in kinds and tail.lstrip("+-") in DIRECTIONS:
         return head, tail
     return place, None
@@ -69,7 +69,7 @@ class Places:
             return (place,)
         if place == ALL:
             return tuple(self.frame.member_index)
-        sets = ((f"{_SET}{s.name}", s) for s in self.frame.sets)
+        sets = ((f"{SET}{s.name}", s) for s in self.frame.sets)
         listed = (*sets, *((f.name, f) for f in self.frame.families))
         return next((found.members for word, found in listed if word == place), ())
 
@@ -84,10 +84,10 @@ class Places:
             >>> effect.Places(frame).sets()
             ()
         """
-        words = [f"{_SET}{s.name}" for s in self.frame.sets] + [f.name for f in self.frame.families]
+        words = [f"{SET}{s.name}" for s in self.frame.sets] + [f.name for f in self.frame.families]
         known: set[frozenset[str]] = {frozenset(self.frame.member_index)}
         if "material" not in kinds:
-            materials = (f for f in self.frame.families if f.name.startswith(_MATERIAL))
+            materials = (f for f in self.frame.families if f.name.startswith(MATERIAL))
             known |= {frozenset(family.members) for family in materials}
         found = []
         for word in words:

@@ -16,7 +16,7 @@ from femubench.core.fem.parameters import Property
 from femubench.core.fem.slopes import Matrix, TermSlopes
 from femubench.core.typing import FloatArray, SparseArray
 
-GROUP = "group:"
+GROUP, SET, MATERIAL = "group:", "set:", "material:"
 PRELOAD = "preload:"  # what a preload adds to the stiffness, which lies in other groups
 _ALL = "all"
 _MATRIX: dict[str, Matrix] = {"E": "stiffness", "density": "mass"}
@@ -24,13 +24,15 @@ _MATRIX: dict[str, Matrix] = {"E": "stiffness", "density": "mass"}
 
 @dataclass(frozen=True)
 class Groups:
-    """The groups of a model from matrices, which are places: ``group:NAME``.
+    """The groups of a model from matrices, which are places: ``group:NAME``, and their families.
 
     Arguments:
         model: any model; one of a frame has none.
     """
 
     PREFIX: ClassVar[str] = GROUP
+    MATERIAL: ClassVar[str] = MATERIAL
+    PRELOAD: ClassVar[str] = PRELOAD
 
     model: Model
 
@@ -44,8 +46,36 @@ class Groups:
         groups = self.model.groups if matrix == "stiffness" else self.model.mass_groups
         return tuple(f"{GROUP}{name}" for name in groups)
 
+    def families(self, matrix: Matrix) -> tuple[str, ...]:
+        """Return ``set:NAME`` and ``material:NAME`` of two groups or more that are not all of them.
+
+        Of equal families only the first is there.
+
+        Examples:
+            >>> fem.Groups(model).families("mass")
+            ()
+        """
+        groups = self.model.groups if matrix == "stiffness" else self.model.mass_groups
+        found: dict[frozenset[str], str] = {}
+        for word, names in self.model.families.items():
+            own = groups.keys() & names
+            if 1 < len(own) < len(groups):
+                found.setdefault(frozenset(own), word)
+        return tuple(found.values())
+
+    def names(self, place: str) -> tuple[str, ...]:
+        """Return the groups at ``group:NAME`` or of a family; nothing elsewhere.
+
+        Examples:
+            >>> fem.Groups(model).names("group:deck")
+            ('deck',)
+        """
+        if place.startswith(GROUP):
+            return (place.removeprefix(GROUP),)
+        return self.model.families.get(place, ())
+
     def matrix(self, matrix: Matrix, place: str) -> SparseArray:
-        """Return the part of the stiffness or mass at ``all`` or ``group:NAME``, sparse (n, n).
+        """Return the part of the stiffness or mass at ``all``, a group or a family, sparse (n, n).
 
         Raises:
             ModelError: when there is no such group.
@@ -54,16 +84,7 @@ class Groups:
             >>> fem.Groups(model).matrix("mass", "all").shape
             (81, 81)
         """
-        model = self.model
-        groups, whole = model.groups, model.stiffness
-        if matrix == "mass":
-            groups, whole = model.mass_groups, model.mass
-        if place == _ALL:
-            return whole
-        name = place.removeprefix(GROUP)
-        if not place.startswith(GROUP) or name not in groups:
-            raise ModelError(f"the {matrix} has no group {place!r}")
-        return groups[name]
+        return _part(self.model, matrix, (place,))[1]
 
     def with_factors(
         self, parameters: Sequence[Property], values: Sequence[float] | FloatArray
@@ -71,7 +92,7 @@ class Groups:
         """Return a model from matrices with factors on its groups, which stay its groups.
 
         Arguments:
-            parameters: on E (the stiffness) or density (the mass), at ``all`` or groups.
+            parameters: on E (the stiffness) or density (the mass), at ``all``, groups or families.
             values: factors, (p,).
 
         Raises:
@@ -88,16 +109,16 @@ class Groups:
             matrix, places, factor = _matrix(parameter), parameter.places, float(value)
             own = "groups" if matrix == "stiffness" else "mass_groups"
             groups, change = dict(getattr(model, own)), getattr(model, f"{matrix}_change")
-            names = groups if _ALL in places else [place.removeprefix(GROUP) for place in places]
-            whole = getattr(model, matrix) + (factor - 1.0) * _part(model, matrix, places)
+            names, part = _part(model, matrix, places)
+            whole = getattr(model, matrix) + (factor - 1.0) * part
             groups |= {name: factor * groups[name] for name in names}
             if change is not None and _ALL in places:
                 change = replace(change, core=factor * change.core)
             scales = (factor, 1.0) if matrix == "stiffness" else (1.0, factor)
-            few = replace(
-                model, powers={p: k for p, k in model.powers.items() if {p, _ALL} & {*places}}
-            )
-            powers = {**model.powers, **few.map_powers(*(partial(mul, s) for s in scales))}
+            at = {f"{GROUP}{name}" for name in names}
+            few = {p: pairs for p, pairs in model.powers.items() if _ALL in places or p in at}
+            scaled = replace(model, powers=few).map_powers(*(partial(mul, s) for s in scales))
+            powers = {**model.powers, **scaled}
             changed = {matrix: whole, f"{matrix}_change": change, own: groups, "powers": powers}
             model = replace(model, **changed)
         return model
@@ -109,9 +130,21 @@ def _matrix(parameter: Property) -> Matrix:
     return _MATRIX[parameter.quantity]
 
 
-def _part(model: Model, matrix: Matrix, places: Sequence[str]) -> SparseArray:
-    parts = [Groups(model).matrix(matrix, place) for place in places]
-    return sum(parts[1:], start=parts[0])
+def _part(model: Model, matrix: Matrix, places: Sequence[str]) -> tuple[list[str], SparseArray]:
+    """Return the groups at some places, each once, and their sum."""
+    groups, whole = model.groups, model.stiffness
+    if matrix == "mass":
+        groups, whole = model.mass_groups, model.mass
+    if _ALL in places:
+        return list(groups), whole
+    found: dict[str, SparseArray] = {}
+    for place in places:
+        own = {name: groups[name] for name in Groups(model).names(place) if name in groups}
+        if not own:
+            raise ModelError(f"the {matrix} has no group {place!r}")
+        found |= own
+    first, *rest = found.values()
+    return list(found), sum(rest, start=first)
 
 
 def group_derivatives(model: Model, parameters: Sequence[Property]) -> TermSlopes:
@@ -120,7 +153,6 @@ def group_derivatives(model: Model, parameters: Sequence[Property]) -> TermSlope
     Raises:
         ModelError: as in `Groups.with_factors`.
     """
-    parts = tuple(
-        (_matrix(p), partial(matmul, _part(model, _matrix(p), p.places))) for p in parameters
-    )
+    own = [(_matrix(p), p.places) for p in parameters]
+    parts = tuple((m, partial(matmul, _part(model, m, at)[1])) for m, at in own)
     return TermSlopes(parts, np.eye(len(parts)))

@@ -183,6 +183,7 @@ class Model(Shown):
             is the only part) the thickness of its plates over that drawn, of `preload:NAME` its
             force over that drawn.
         grounds: by ``ground|NAME``, where nodes of a part are held, what it does when they give.
+        families: by ``set:NAME`` or ``material:NAME``, the groups that belong together.
     """
 
     mass: SparseArray
@@ -201,6 +202,7 @@ class Model(Shown):
     finer: Callable[[], tuple[Model, Model]] | None = None
     powers: Mapping[str, Powers] = field(default_factory=dict)
     grounds: Mapping[str, Edge] = field(default_factory=dict)
+    families: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return its fields alone: what was made of this very model stays with it."""

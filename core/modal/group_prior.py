@@ -94,13 +94,15 @@ class GroupPriors:
         kind (`KINDS`), stated or, for what holds to ground, found.
 
         Arguments:
-            name: of a group of the stiffness or the mass.
+            name: of a group of the stiffness or the mass; of a family, whose least known group
+                it is.
             matrix: of which of them.
 
         Examples:
             >>> modal.GroupPriors(model).std("deck")
             0.1
         """
+        name = self._least_known(name)
         if name in self.model.group_priors:
             return float(np.log(self.model.group_priors[name]) / QUARTILE)
         kind = KINDS[self.kind(name)]
@@ -110,13 +112,13 @@ class GroupPriors:
         """Return the largest factor on a group that is believed; infinite for most kinds.
 
         Arguments:
-            name: of a group of the stiffness or the mass.
+            name: of a group of the stiffness or the mass, or of a family.
 
         Examples:
             >>> modal.GroupPriors(model).largest_factor("deck")
             inf
         """
-        return KINDS[self.kind(name)].most
+        return KINDS[self.kind(self._least_known(name))].most
 
     def kind(self, name: str) -> str:
         """Return the kind of a group, a key of `KINDS`: what the case states, else what is found.
@@ -131,6 +133,11 @@ class GroupPriors:
             return "joint"
         stated = self.model.group_kinds.get(name)
         return stated or ("support" if name in _supports(self.model) else "part")
+
+    def _least_known(self, name: str) -> str:
+        groups = {**self.model.groups, **self.model.mass_groups}
+        family = () if name in groups else self.model.families.get(name, ())
+        return max(family, key=self.std, default=name)
 
 
 @cache_by_model

@@ -198,6 +198,7 @@ def _in_another_order(model: Model, geometry: MatrixGeometry, names: Disguise) -
         axes=None if dofs.axes is None else dofs.axes[rows],
     )
     groups = _renamed("g", (*model.groups, *model.mass_groups), rng)
+    families = _renamed("set:g", model.families, rng)
 
     def turned(matrix: SparseArray) -> SparseArray:
         found: SparseArray = matrix.tocsr()[rows][:, rows].asformat(matrix.format)
@@ -213,6 +214,9 @@ def _in_another_order(model: Model, geometry: MatrixGeometry, names: Disguise) -
         grounds={},
         group_priors={groups[name]: prior for name, prior in model.group_priors.items()},
         group_kinds={groups[name]: kind for name, kind in model.group_kinds.items()},
+        families={
+            families[word]: tuple(groups[n] for n in own) for word, own in model.families.items()
+        },
         dofs=moved,
         geometry=MatrixGeometry(
             tuple(names.joints[geometry.names[node]] for node in numbers),

@@ -13,7 +13,7 @@ from femubench.core.change.parametric_model import ParametricModel
 from femubench.core.change.tabulated import change_of
 from femubench.core.errors import InputError, NotApplicable, UnknownNameError
 from femubench.core.fem.frame import Frame
-from femubench.core.fem.group_factors import GROUP, Groups
+from femubench.core.fem.group_factors import GROUP, MATERIAL, SET, Groups
 from femubench.core.fem.joints import JointGroup, elements_at, joint_groups
 from femubench.core.fem.model import Model
 from femubench.core.fem.slopes import Matrix
@@ -27,10 +27,11 @@ OWN = "own"  # the changes that a strategy has by itself
 _MISSING = {
     "joints": "a frame whose members meet in joints",
     "sections": "a frame whose members have sections of the case",
-    "materials": "a frame whose members have materials of the case",
+    "materials": "a frame whose members, or groups that, have materials of the case",
     "sets": "`[[model.sets]]` in the case",
     "groups": "a model from matrices for which the case declares `[[model.groups]]`",
 }
+_KINDS = {"groups": GROUP, "sets": SET, "materials": MATERIAL}
 _WIDEST = 3.0  # prior deviations to either side of a group's factor
 
 
@@ -172,7 +173,7 @@ class Changes:
         return self.source if isinstance(self.source, Model) else Model.of(self.source)
 
     def parts(self, word: str, *, prior_std: float | None = None) -> list[Change]:
-        """Return one change a part: of a frame a factor on EA, EI, GJ and GA, or of a group.
+        """Return one change a part: a factor on EA, EI, GJ and GA of a frame, or on groups.
 
         Arguments:
             word: a `PartSet`.
@@ -187,10 +188,14 @@ class Changes:
                 Change.scale_property(f"E {name}", "E", elements, prior_std=prior_std)
                 for name, elements in element_sets(structure, word).items()
             ]
-        if word != "groups" or not self.model.groups:
+        groups, kind = Groups(self.model), _KINDS.get(word)
+        every = groups.places("stiffness") + groups.families("stiffness")
+        places = [place for place in every if kind and place.startswith(kind)]
+        if not places:
             need = _MISSING.get(word, "a frame of members")
             raise NotApplicable(f"the model has no {word} to scale: changes={word} needs {need}")
-        return self.groups("stiffness", own_prior=prior_std is not None)
+        _check_apart({place: groups.names(place) for place in places})
+        return self._factors("stiffness", places, own_prior=prior_std is not None)
 
     def groups(self, matrix: Matrix, *, own_prior: bool) -> list[Change]:
         """Return one change a group of the stiffness or of the mass.
@@ -203,9 +208,12 @@ class Changes:
             >>> update.Changes(model).groups("mass", own_prior=True)
             []
         """
+        return self._factors(matrix, Groups(self.model).places(matrix), own_prior=own_prior)
+
+    def _factors(self, matrix: Matrix, places: Sequence[str], *, own_prior: bool) -> list[Change]:
         model, quantity = self.model, "E" if matrix == "stiffness" else "density"
         found = []
-        for place in Groups(model).places(matrix):
+        for place in places:
             name, std = place.removeprefix(GROUP), None
             if own_prior:
                 std = GroupPriors(model).std(name, matrix)

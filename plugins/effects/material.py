@@ -47,15 +47,14 @@ class MaterialEffect(FrameEffect):
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the relative change; of a group with a prior of its own, that of a factor."""
         name = f"change of {self.constant}"
-        group = place.removeprefix(Groups.PREFIX)
-        stated = (name for name, kind in model.group_kinds.items() if kind != "part")
-        known = {*model.group_priors, *stated, *GroupPriors(model).supports}
-        if model.structure is None and place.startswith(Groups.PREFIX) and group in known:
+        known, group = GroupPriors(model), place.removeprefix(Groups.PREFIX)
+        parts = Groups(model).names(place)
+        if any(part in model.group_priors or known.kind(part) != "part" for part in parts):
             matrix: Literal["mass", "stiffness"] = "stiffness" if self.constant == "E" else "mass"
             # What a joint is stiffer by, as by a fillet, is no defect: the drawing lacks it.
-            soft = self.constant == "E" and np.isfinite(GroupPriors(model).largest_factor(group))
+            soft = self.constant == "E" and np.isfinite(known.largest_factor(group))
             most = 1.0 if soft else np.inf
-            given = GroupPriors(model).std(group, matrix), 0.0, -np.inf, most - 1.0
+            given = known.std(group, matrix), 0.0, -np.inf, most - 1.0
             return (Parameter(name, "", *given, scaling="factor", wording="change"),)
         return (Parameter(name, "", 0.1, lower=-0.9, wording="change"),)
 
@@ -144,7 +143,7 @@ class Density(MaterialEffect):
 
 
 class MemberStiffness(MaterialEffect):
-    """Scale Young's modulus of one member, or one stiffness group of matrices from files."""
+    """Scale Young's modulus of one member, or of one group or family of matrices from files."""
 
     name: ClassVar[str] = "member-stiffness"
     summary: ClassVar[str] = "a member has another stiffness"
@@ -155,7 +154,7 @@ class MemberStiffness(MaterialEffect):
     def places(self, model: Model) -> Sequence[str]:
         """Return members and families, or the groups; a single one is `youngs-modulus`."""
         if model.structure is None:
-            return Groups(model).places("stiffness")
+            return Groups(model).places("stiffness") + Groups(model).families("stiffness")
         parts = _parts(model.structure.frame)
         return parts if len(parts) > 1 else ()
 
@@ -177,7 +176,7 @@ class MemberMass(MaterialEffect):
 
 
 class GroupMass(MaterialEffect):
-    """Scale the mass of one group of a model from matrices."""
+    """Scale the mass of one group of a model from matrices, or of one family."""
 
     name: ClassVar[str] = "group-mass"
     summary: ClassVar[str] = "a group has another mass"
@@ -185,8 +184,8 @@ class GroupMass(MaterialEffect):
     constant: ClassVar[Literal["E", "rho"]] = "rho"
 
     def places(self, model: Model) -> Sequence[str]:
-        """Return the groups of the mass."""
-        return Groups(model).places("mass")
+        """Return the groups of the mass, and families of them."""
+        return Groups(model).places("mass") + Groups(model).families("mass")
 
 
 class GroupMaterial(GroupMass):
@@ -199,10 +198,10 @@ class GroupMaterial(GroupMass):
     summary: ClassVar[str] = "a group is of another material or thickness"
 
     def places(self, model: Model) -> Sequence[str]:
-        """Return the parts that have both matrices."""
-        kind_of, stiff = GroupPriors(model).kind, Groups(model).places("stiffness")
-        parts = [p for p in stiff if kind_of(p.removeprefix(Groups.PREFIX)) == "part"]
-        return [place for place in super().places(model) if place in parts]
+        """Return the parts that have both matrices, and families of such."""
+        parts = {name for name in model.groups if GroupPriors(model).kind(name) == "part"}
+        parts &= model.mass_groups.keys()
+        return [p for p in super().places(model) if parts.issuperset(Groups(model).names(p))]
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the relative changes of the mass and of the stiffness a mass."""

@@ -13,8 +13,6 @@ from femubench.effect import Change, FrameEffect, Parameter, Size, Term
 from femubench.fem import FloatArray, Frame, Groups
 from femubench.modal import GroupPriors
 
-_PRELOAD = "preload:"
-
 
 class PowersEffect(FrameEffect):
     """Base class of effects of which every matrix comes with a power of one value.
@@ -65,7 +63,7 @@ class PlateThickness(PowersEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the groups of plates alone."""
-        others = GroupPriors(model).interfaces.PREFIX, _PRELOAD
+        others = GroupPriors(model).interfaces.PREFIX, Groups.PRELOAD
         return tuple(place for place in model.powers if not place.startswith(others))
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
@@ -85,11 +83,11 @@ class PreloadForce(PowersEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the preloads of which the geometric stiffness is known."""
-        return tuple(place for place in model.powers if place.startswith(_PRELOAD))
+        return tuple(place for place in model.powers if place.startswith(Groups.PRELOAD))
 
     def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the change of the force over that drawn; lost, it is -1."""
-        std = GroupPriors(model).std(place.removeprefix(_PRELOAD))
+        std = GroupPriors(model).std(place.removeprefix(Groups.PRELOAD))
         given = std, 0.0, -1.0, 2.0
         return (Parameter("change of preload", "", *given, wording="change"),)
 

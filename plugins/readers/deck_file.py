@@ -40,6 +40,7 @@ class SolidDeck:
         sets, node_sets: numbers by name, in capitals.
         named: names as the file first writes them.
         materials: modulus, Poisson's ratio and density by name, nan where not given.
+        metals: by name of a material that is one property's own, the material that it is of.
         sections: material and thickness, nan of solids, by set of elements; the last one counts.
         masses: mass of the elements of a set.
         springs: direction, 0 to 5, and stiffness of the springs to ground of a set.
@@ -56,6 +57,7 @@ class SolidDeck:
     node_sets: dict[str, dict[int, None]] = field(default_factory=dict)
     named: dict[str, str] = field(default_factory=dict)
     materials: dict[str, list[float]] = field(default_factory=dict)
+    metals: dict[str, str] = field(default_factory=dict)
     sections: dict[str, tuple[str, float]] = field(default_factory=dict)
     masses: dict[str, float] = field(default_factory=dict)
     springs: dict[str, tuple[int, float]] = field(default_factory=dict)

@@ -220,7 +220,19 @@ def _model_of(
     small = {name for name in model.groups if heavy.get(name, 0.0) < least}
     springs = GroupPriors(model).supports - heavy.keys()
     kinds = dict.fromkeys(small - springs, "joint")
-    return replace(model, mass_groups=masses if len(masses) > 1 else {}, group_kinds=kinds)
+    model = replace(model, mass_groups=masses if len(masses) > 1 else {}, group_kinds=kinds)
+    return replace(model, families=_find_families(deck, material))
+
+
+def _find_families(deck: SolidDeck, material: Mapping[int, str]) -> dict[str, tuple[str, ...]]:
+    """Return the groups of every material of two or more; one of several materials is in none."""
+    found: dict[str, tuple[str, ...]] = {}
+    for name, numbers in deck.groups().items():
+        own = {deck.metals.get(material[n], material[n]) for n in numbers}
+        if len(own) == 1:
+            word = f"{Groups.MATERIAL}{own.pop()}"
+            found[word] = (*found.get(word, ()), name)
+    return {word: own for word, own in found.items() if len(own) > 1}
 
 
 def _grounds(

@@ -172,6 +172,7 @@ class BulkPlates(BulkData):
             raise material.error("no mass", f"RHO > 0{', or NSM of the plate' * of_plates}", "RHO")
         self.solid.sets[name], self.solid.named[name] = {}, name
         self.solid.materials[name] = [modulus, poisson, self.weight * density]
+        self.solid.metals[name] = f"MAT1 {material.text(1)}"
         self.solid.sections[name] = name, thickness
 
     def _mass(self, card: Card) -> None:
