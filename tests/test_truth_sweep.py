@@ -186,17 +186,17 @@ def test_a_fault_is_judged_by_the_faults_that_are_named(same: sweep.Same) -> Non
 def test_a_truth_of_beams_counts_in_the_groups_of_a_solid_drawing() -> None:
     """A soft foot is the zone of the clamp, water the member's mass, a node the nearest station."""
     suite = ROOT / "scenarios" / "suite"
-    foot = TrueCause("a soft foot", "support-flexibility", "support:J0")
-    water = TrueCause("water", "member-mass", "bar-2")
-    steel = TrueCause("another metal", "member-stiffness", "bar-2")
-    clamp = TrueCause("a clamp", "added-mass", "bar-4@0.43", ("added-mass@bar-4@0.5",))
+    foot = TrueCause("a soft foot", "support-flexibility", "support:root")
+    water = TrueCause("water", "member-mass", "thick")
+    steel = TrueCause("another metal", "member-stiffness", "thick")
+    clamp = TrueCause("a clamp", "added-mass", "thin@0.43", ("added-mass@thin@0.5",))
     for cause, right, wrong in (
-        (foot, "member-stiffness@group:joint-J0", "member-stiffness@group:bar-1"),
-        (water, "group-mass@group:bar-2", "member-stiffness@group:bar-2"),
-        (steel, "group-material@group:bar-2", "group-material@group:bar-1"),
-        (clamp, "added-mass@bar-4@0.5", "added-mass@J4"),
+        (foot, "member-stiffness@group:joint-root", "member-stiffness@group:thin"),
+        (water, "group-mass@group:thick", "member-stiffness@group:thick"),
+        (steel, "group-material@group:thick", "group-material@group:thin"),
+        (clamp, "added-mass@thin@0.5", "added-mass@tip"),
     ):
-        own = replace(truth("defect", cause), structure="tapered-cantilever")
+        own = replace(truth("defect", cause), structure="stepped-strip")
         places, own = sweep.words_of(suite, own, "solid")
         assert sweep.outcome(own, said("named", right), places) == "right"
         assert sweep.outcome(own, said("named", wrong), places) != "right"
