@@ -32,7 +32,7 @@ BUDGETS = {
     "core/fem": 5_706,
     "core/fit": 1_934,
     "core/identify": 1_717,
-    "core/inference": 3_950,
+    "core/inference": 3_965,
     "core/library": 2_875,
     "core/look": 1_172,
     "core/modal": 4_791,

@@ -365,7 +365,22 @@ def _causes(explanation: Explanation) -> tuple[object, ...]:
 def with_scales(
     error: Inadequacy, explanation: Explanation, near: Fitted, nothing: State
 ) -> Explanation:
-    """Return an explanation with the scales of model error that suit it best."""
+    """Return an explanation with the scales of model error that suit it best.
+
+    What is drawn wrong is that of the model with the causes in it, which other scales move: they
+    are sought until the causes stay where they are.
+    """
+    found = explanation
+    for _ in range(settings.few_steps):
+        x, found = found.fit.state.x, _with_scales_once(error, found, near, nothing)
+        if np.abs(found.fit.state.x - x).max(initial=0.0) < settings.coordinate_margin:
+            break
+    return found
+
+
+def _with_scales_once(
+    error: Inadequacy, explanation: Explanation, near: Fitted, nothing: State
+) -> Explanation:
     state = explanation.fit.state
     if state.parts:
         if len(error.residual) or _moves_error(state):

@@ -377,7 +377,7 @@ class Settings:
     faults_corrected: int = _cost(3, "faults", "more are no matter of mending")
     grid_points: int = _cost(13, "points", "on which the parameter of a fault is sought first")
     coordinate_margin: float = _cost(
-        0.02, "prior deviations", "step of a curvature, and what is off a bound"
+        0.02, "prior deviations", "step of a curvature, what is off a bound, what still moves"
     )
     advised: int = _cost(8, "rows", "of advice, and explanations that it parts")
     points: int = _cost(48, "points", "of a structure where a test is thought through")
