@@ -300,20 +300,29 @@ def test_groups_are_classes_of_model_error() -> None:
 
 
 def test_what_is_drawn_wrong_acts_on_the_modes_with_the_cause_in_them() -> None:
-    """Next to a head a hundred times softer, error of groups is that of a beam on such a head."""
+    """Next to a head a hundred times softer, error of groups is that of a beam on such a head.
+
+    It is taken where the cause is once it no longer moves, wherever it was sought from.
+    """
     there = changed({"head": 0.01})
     problem = problem_of(MODEL, measured(there, 4), effects_named("member-stiffness"))
     part = part_at(problem, "member-stiffness", "group:head")
     error, nothing = model_error_of(problem, None, 1.0, 0.0), state_at(problem, (), np.zeros(0))
-    x = np.array([part.hypothesis.parameters[0].coordinate(-0.99)])
-    found = fit(problem, (part,), x, steps=0)
-    assert found is not None
-    scaled = with_scales(error, Explanation(Base((), 0.0), found, 1), error.fit(nothing), nothing)
-    noise = scaled.fit.state.problem.noise
-    slopes = error_slopes(problem_of(there, problem.data.measurement, ()), modes_for(there))
-    slopes["general"] = general_slopes(found.state)
+    near, ends = error.fit(nothing), []
+    for softer in (-0.9, -0.99):
+        x = np.array([part.hypothesis.parameters[0].coordinate(softer)])
+        found = fit(problem, (part,), x, steps=0)
+        assert found is not None
+        scaled = with_scales(error, Explanation(Base((), 0.0), found, 1), near, nothing)
+        ends.append(scaled.fit.state)
+    assert abs(ends[0].x - ends[1].x) < 0.02
+    noise = with_scales(error, scaled, near, nothing).fit.state.problem.noise
+    (values,) = part.hypothesis.values(ends[1].x[None])
+    head = MemberStiffness().extend(MODEL, "group:head", values)
+    slopes = error_slopes(problem_of(head, problem.data.measurement, ()), modes_for(head))
+    slopes["general"] = general_slopes(ends[1])
     assert noise.scales is not None
-    own = error.moved(slopes).add_own_error(nothing, found.state).covariance(noise.scales)
+    own = error.moved(slopes).add_own_error(nothing, ends[1]).covariance(noise.scales)
     size = np.sqrt(own.diagonal())
     share = (noise.factor @ noise.factor.T - own) / np.outer(size, size)
     np.testing.assert_allclose(share, 0.0, atol=1e-6)

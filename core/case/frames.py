@@ -15,9 +15,8 @@ from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.schema import (
     DampingSpec,
     ExchangeSpec,
-    FileSpec,
     FrameSpec,
-    MatricesSpec,
+    GroupedSpec,
     ModificationSpec,
     RemovalSpec,
     SectionSpec,
@@ -254,9 +253,7 @@ def attachments(key: str, specs: Sequence[TomlTable], site: Site) -> tuple[Any, 
     return tuple(parts)
 
 
-def alteration_of(
-    spec: ModificationSpec, site: Site, model: FrameSpec | MatricesSpec | FileSpec
-) -> Alteration:
+def alteration_of(spec: ModificationSpec, site: Site, model: FrameSpec | GroupedSpec) -> Alteration:
     """Return what a modification changes apart from further masses and springs.
 
     Arguments:

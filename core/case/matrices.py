@@ -19,7 +19,7 @@ from femubench.core.case.checks import check_known, check_unique
 from femubench.core.case.faults import BadKey, Misfit, at_key
 from femubench.core.case.files import LARGEST_FILE, CaseFiles
 from femubench.core.case.nodes import MatrixGeometry, read_dofs
-from femubench.core.case.schema import LARGEST, FileSpec, GroupSpec, MatricesSpec
+from femubench.core.case.schema import LARGEST, GroupedSpec, GroupSpec, MatricesSpec
 from femubench.core.errors import FemubenchError, InputError, ModelError
 from femubench.core.fem.group_factors import MATERIAL, PRELOAD, SET
 from femubench.core.fem.model import Model
@@ -277,7 +277,7 @@ def with_groups(
     return replace(model, group_priors=priors, group_kinds={**model.group_kinds, **kinds})
 
 
-def with_families(model: Model, spec: MatricesSpec | FileSpec) -> Model:
+def with_families(model: Model, spec: GroupedSpec) -> Model:
     """Return a model from files with the sets and materials that its case states of its groups.
 
     Raises:

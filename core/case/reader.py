@@ -49,7 +49,7 @@ from femubench.core.case.schema import (
     DrawingSpec,
     FileSpec,
     FrameSpec,
-    MatricesSpec,
+    GroupedSpec,
     ModificationSpec,
     ScatterSpec,
 )
@@ -425,7 +425,7 @@ class _Building:
         return change
 
 
-def as_stated(model: Model, spec: MatricesSpec | FileSpec) -> Model:
+def as_stated(model: Model, spec: GroupedSpec) -> Model:
     """Return a model with what a case states of its damping, and whether it hangs free.
 
     Raises:

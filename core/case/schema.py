@@ -363,13 +363,9 @@ class GroupSetSpec(TomlTable):
     groups: Many[Name] = Field(min_length=1, description="a list of names of groups")
 
 
-class MatricesSpec(TomlTable):
-    """`[model]` with ``kind = "matrices"``."""
+class GroupedSpec(TomlTable):
+    """What `[model]` of both kinds without members may state."""
 
-    kind: Literal["matrices"] = Field(description="'frame', 'matrices' or 'file'")
-    mass: FileName = Field(description="a matrix file in the case folder")
-    stiffness: FileName = Field(description="a matrix file in the case folder")
-    dofs: FileName = Field(description="a CSV file: row,node,direction,x,y,z")
     free: bool = Field(False, strict=True, description="true or false")
     damping: DampingSpec | None = Field(None, description="{alpha, beta, eta}")
     groups: Many[GroupSpec] = Field(
@@ -378,7 +374,16 @@ class MatricesSpec(TomlTable):
     sets: Many[GroupSetSpec] = _tables("model.sets")
 
 
-class FileSpec(TomlTable):
+class MatricesSpec(GroupedSpec):
+    """`[model]` with ``kind = "matrices"``."""
+
+    kind: Literal["matrices"] = Field(description="'frame', 'matrices' or 'file'")
+    mass: FileName = Field(description="a matrix file in the case folder")
+    stiffness: FileName = Field(description="a matrix file in the case folder")
+    dofs: FileName = Field(description="a CSV file: row,node,direction,x,y,z")
+
+
+class FileSpec(GroupedSpec):
     """`[model]` with ``kind = "file"``."""
 
     kind: Literal["file"] = Field(description="'frame', 'matrices' or 'file'")
@@ -388,12 +393,6 @@ class FileSpec(TomlTable):
         None, description="a CSV file row,node,direction,x,y,z or node,x,y,z, or a file with nodes"
     )
     unit: LengthUnit = Field("m", description=f"one of {', '.join(get_args(LengthUnit))}")
-    free: bool = Field(False, strict=True, description="true or false")
-    damping: DampingSpec | None = Field(None, description="{alpha, beta, eta}")
-    groups: Many[GroupSpec] = Field(
-        (), max_length=1000, description="tables [[model.groups]], 1000 at most"
-    )
-    sets: Many[GroupSetSpec] = _tables("model.sets")
 
 
 class WeightSpec(TomlTable):

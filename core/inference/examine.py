@@ -370,31 +370,24 @@ def with_scales(
     What is drawn wrong is that of the model with the causes in it, which other scales move: they
     are sought until the causes stay where they are.
     """
-    found = explanation
     for _ in range(settings.few_steps):
-        x, found = found.fit.state.x, _with_scales_once(error, found, near, nothing)
-        if np.abs(found.fit.state.x - x).max(initial=0.0) < settings.coordinate_margin:
-            break
-    return found
-
-
-def _with_scales_once(
-    error: Inadequacy, explanation: Explanation, near: Fitted, nothing: State
-) -> Explanation:
-    state = explanation.fit.state
-    if state.parts:
-        if len(error.residual) or _moves_error(state):
-            error = error.moved(slopes_with(state))
-        error = error.add_own_error(nothing, state)
-    problem = replace(state.problem, noise=error.noise(error.fit(state, near)))
-    found: Fit | None
-    if state.parts:
+        state, own = explanation.fit.state, error
+        if state.parts:
+            moves = len(error.residual) or _moves_error(state)
+            own = error.moved(slopes_with(state)) if moves else error
+            own = own.add_own_error(nothing, state)
+        problem = replace(state.problem, noise=own.noise(own.fit(state, near)))
+        if not state.parts:
+            # A textbook set without causes is a state of its own, which no fit of nothing leads to.
+            there = replace(state, problem=problem)
+            return replace(explanation, fit=Fit(there, log_evidence(there)))
         found = fit(problem, state.parts, state.x, steps=settings.few_steps)
-    else:
-        # A textbook set without causes is a state of its own, which no fit of nothing leads to.
-        there = replace(state, problem=problem)
-        found = Fit(there, log_evidence(there))
-    return explanation if found is None else replace(explanation, fit=found)
+        if found is None:
+            return explanation
+        explanation = replace(explanation, fit=found)
+        if np.abs(found.state.x - state.x).max() < settings.coordinate_margin:
+            break
+    return explanation
 
 
 def _moves_error(state: State) -> bool:
