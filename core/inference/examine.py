@@ -351,10 +351,9 @@ def search_explanations(
     close = [i for i, e in enumerate(ranked) if e.log_weight > ranked[0].log_weight - settings.near]
     # One cause and its own error may do what otherwise takes a second one.
     few = [i for i, e in enumerate(ranked) if len(e.parts) < 2]
-    near = {*close[: settings.leading], *few[: settings.leading]}
-    return [
-        with_scales(error, e, scales, nothing) if i in near else e for i, e in enumerate(ranked)
-    ]
+    near = sorted({*close[: settings.leading], *few[: settings.leading]})
+    settled = settle(error, (ranked[i] for i in near), scales, nothing)
+    return [*settled, *(e for i, e in enumerate(ranked) if i not in near)]
 
 
 def _causes(explanation: Explanation) -> tuple[object, ...]:
@@ -365,29 +364,39 @@ def _causes(explanation: Explanation) -> tuple[object, ...]:
 def with_scales(
     error: Inadequacy, explanation: Explanation, near: Fitted, nothing: State
 ) -> Explanation:
-    """Return an explanation with the scales of model error that suit it best.
-
-    What is drawn wrong is that of the model with the causes in it, which other scales move: they
-    are sought until the causes stay where they are.
-    """
-    for _ in range(settings.few_steps):
-        state, own = explanation.fit.state, error
-        if state.parts:
-            moves = len(error.residual) or _moves_error(state)
-            own = error.moved(slopes_with(state)) if moves else error
-            own = own.add_own_error(nothing, state)
-        problem = replace(state.problem, noise=own.noise(own.fit(state, near)))
-        if not state.parts:
-            # A textbook set without causes is a state of its own, which no fit of nothing leads to.
-            there = replace(state, problem=problem)
-            return replace(explanation, fit=Fit(there, log_evidence(there)))
+    """Return an explanation with the scales of model error that suit it best."""
+    state = explanation.fit.state
+    if state.parts:
+        if len(error.residual) or _moves_error(state):
+            error = error.moved(slopes_with(state))
+        error = error.add_own_error(nothing, state)
+    problem = replace(state.problem, noise=error.noise(error.fit(state, near)))
+    found: Fit | None
+    if state.parts:
         found = fit(problem, state.parts, state.x, steps=settings.few_steps)
-        if found is None:
-            return explanation
-        explanation = replace(explanation, fit=found)
-        if np.abs(found.state.x - state.x).max() < settings.coordinate_margin:
-            break
-    return explanation
+    else:
+        # A textbook set without causes is a state of its own, which no fit of nothing leads to.
+        there = replace(state, problem=problem)
+        found = Fit(there, log_evidence(there))
+    return explanation if found is None else replace(explanation, fit=found)
+
+
+def settle(
+    error: Inadequacy, explanations: Iterable[Explanation], scales: Fitted, nothing: State
+) -> list[Explanation]:
+    """Return explanations with scales of their own, the likeliest where their causes settle.
+
+    The model error is that of the model with the causes in it, which other scales move: one that
+    leads where its causes no longer are may be far behind where they go.
+    """
+    found = [(e, with_scales(error, e, scales, nothing)) for e in explanations]
+    for _ in range(settings.few_steps - 1):
+        least = max(e.log_weight for _, e in found) - settings.near
+        for i, (before, e) in enumerate(found):
+            moved = np.abs(e.fit.state.x - before.fit.state.x).max(initial=0.0)
+            if moved > settings.coordinate_margin and e.log_weight > least:
+                found[i] = e, with_scales(error, e, scales, nothing)
+    return [e for _, e in found]
 
 
 def _moves_error(state: State) -> bool:
