@@ -22,7 +22,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 from statistics import median
 from types import FrameType
@@ -186,7 +186,6 @@ def diagnosed(task: Task, key: tuple[str, str]) -> Record:
 
 
 @cache
-@lru_cache(maxsize=1)  # a structure has several truths, one after the other
 def _same_in(suite: Path, structure: str, drawing: str) -> tuple[Same, Model | None]:
     """Return what compares places in a drawing of a structure, and that drawing in groups."""
     model = read_case(suite / structure).model

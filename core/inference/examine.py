@@ -386,15 +386,16 @@ def settle(
 ) -> list[Explanation]:
     """Return explanations with scales of their own, the likeliest where their causes settle.
 
-    The model error is that of the model with the causes in it, which other scales move: one that
-    leads where its causes no longer are may be far behind where they go.
+    Where the model error is that of the model with the causes in it, other scales move these: what
+    leads where they no longer are may be far behind where they go.
     """
     found = [(e, with_scales(error, e, scales, nothing)) for e in explanations]
     for _ in range(settings.few_steps - 1):
-        least = max(e.log_weight for _, e in found) - settings.near
         for i, (before, e) in enumerate(found):
             moved = np.abs(e.fit.state.x - before.fit.state.x).max(initial=0.0)
-            if moved > settings.coordinate_margin and e.log_weight > least:
+            least = max(other.log_weight for _, other in found) - settings.near
+            moves = len(error.residual) or _moves_error(e.fit.state)
+            if moves and moved > settings.coordinate_margin and e.log_weight > least:
                 found[i] = e, with_scales(error, e, scales, nothing)
     return [e for _, e in found]
 
