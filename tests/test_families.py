@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import test_chain
+from test_bulk_data import CLAMPED
 from test_bulk_plates import bulk, card, solid_block
 from test_chain import Boxes, Point, diagnose_files, write_deck, write_responses
 from test_groups import MODEL, changed, measured
@@ -67,8 +68,14 @@ def test_a_family_of_all_or_of_one_is_no_further_place() -> None:
 
 def test_a_family_is_known_as_its_least_known_group() -> None:
     assert GroupPriors(BEAM).std(SPAN) == GroupPriors(BEAM).std("left")
-    mixed = replace(BEAM, families={SPAN: ("left", "foot")}, group_priors={"left": 1.1})
-    assert GroupPriors(mixed).std(SPAN) == GroupPriors(mixed).std("foot")
+    mixed = replace(BEAM, families={SPAN: ("left", "head")}, group_priors={"left": 1.1})
+    known = GroupPriors(mixed)
+    assert known.std(SPAN) == known.std("head") > known.std("left")
+    assert known.std(SPAN, "mass") == known.std("left", "mass")  # the head has none
+    for pair in (("left", "foot"), ("foot", "left")):  # as wide, but a joint is stiffer by little
+        kinds = {"left": "joint", "foot": "support"}
+        either = replace(BEAM, families={SPAN: pair}, group_kinds=kinds)
+        assert GroupPriors(either).largest_factor(SPAN) == np.inf
     joints = replace(BEAM, group_kinds=dict.fromkeys(("left", "right"), "joint"))
     effect = MemberStiffness()
     assert effect.parameters(joints, SPAN) == effect.parameters(joints, "group:left")
@@ -82,7 +89,17 @@ def test_sets_and_materials_of_groups_are_parts_to_scale() -> None:
     result = Global(changes="materials").update(BEAM, data, rng)
     (found,) = result.parameters
     assert (found.name, found.after) == (f"stiffness {SPAN}", pytest.approx(1.3, rel=1e-4))
-    assert [c.places for c in Changes(BEAM).parts("sets")] == [(BEARINGS,)]
+    (held,) = Changes(BEAM).parts("sets")
+    foot = Changes(BEAM).parts("groups")[2]
+    assert held.places == (BEARINGS,)
+    assert held.parameters[0].range == foot.parameters[0].range
+    apart = {"set:one": ("left",), "set:rest": ("right", "foot")}
+    alone = replace(BEAM, families={**apart, SPAN: FAMILIES[SPAN]})
+    assert len(Changes(alone).parts("sets")) == 2
+    with pytest.raises(NotApplicable, match=r"left is in .*one and in .*larch"):
+        Changes(alone).listed("sets+materials")
+    with pytest.raises(NotApplicable, match=r"foot is in .*bearings and in .*foot"):
+        Changes(BEAM).listed("sets+groups")
     with pytest.raises(NotApplicable, match="groups that, have materials of the case"):
         Changes(MODEL).parts("materials")
     shared = {"set:a": ("left", "foot"), "set:b": ("foot", "head")}
@@ -101,7 +118,9 @@ def test_families_read_back_as_they_were_written_and_wrong_ones_are_one_line(
 ) -> None:
     write_case(tmp_path / "beam", case_with(BEAM))
     file = tmp_path / "beam" / "case.toml"
-    assert read_case(tmp_path / "beam").model.families == FAMILIES
+    # What is of one material by its deck is a set where no deck says it.
+    written = {BEARINGS: FAMILIES[BEARINGS], "set:larch": FAMILIES[SPAN]}
+    assert read_case(tmp_path / "beam").model.families == written
     text = file.read_text(encoding="utf-8")
     for old, new, says in (
         ('["foot", "head"]', '["foot", "hat"]', r"groups\[1\].*there is no group 'hat'"),
@@ -112,6 +131,20 @@ def test_families_read_back_as_they_were_written_and_wrong_ones_are_one_line(
         file.write_text(text.replace(old, new), encoding="utf-8")
         with pytest.raises(InputError, match=says):
             read_case(tmp_path / "beam")
+
+
+def test_a_file_of_members_has_no_groups(tmp_path: Path) -> None:
+    (tmp_path / "portal.bdf").write_text(CLAMPED)
+    for table in ("sets", "groups"):
+        rows = 'groups = ["a"]' if table == "sets" else 'kind = "joint"'
+        (tmp_path / "case.toml").write_text(
+            '[case]\nname = "a"\n[model]\nkind = "file"\nfile = "portal.bdf"\n'
+            f'[[model.{table}]]\nname = "a"\n{rows}\n'
+            '[measurement]\nmodes = "modes.csv"\nused = [1]\n'
+        )
+        (tmp_path / "modes.csv").write_text("mode,frequency\n1,10.0\n")
+        with pytest.raises(InputError, match=rf"{table}.*portal.bdf gives members"):
+            read_case(tmp_path)
 
 
 def test_a_basis_a_disguise_and_the_way_back_keep_families() -> None:
@@ -150,7 +183,11 @@ def test_a_deck_says_which_groups_are_of_one_material(tmp_path: Path) -> None:
     alloy = dict.fromkeys(("POST", "LEG"), ALUMINIUM)
     file = write_deck(tmp_path / "model.inp", "C3D20", 60.0, 1.0, GOAL, {}, alloy)
     model = femubench.read_model(file, unit="mm")
-    assert model.families == {"material:ALLOY": ("LEG", "POST")}
+    assert model.families["material:ALLOY"] == ("LEG", "POST")
+    assert set(model.families) == {"material:ALLOY", "material:HEAD", "material:SILL"}
+    text = file.read_text()
+    file.write_text(text.replace("alloy", "S355/J2@20"))
+    assert "material:S355-J2-20" in femubench.read_model(file, unit="mm").families
     assert Groups(model).families("mass") == ("material:ALLOY",)
     drawn = find_wireframe(model, ["material:ALLOY", "group:POST", "group:LEG"])
     whole, *parts = (drawn.place(word) for word in ("material:ALLOY", "group:POST", "group:LEG"))
@@ -168,7 +205,7 @@ def test_properties_of_nastran_of_one_material_are_a_family(tmp_path: Path) -> N
         text += "".join(card("GRID", n, "", *xyz) for n, xyz in zip(grids, at, strict=True))
         text += card("PSOLID", number, number - 1) + card("CHEXA", number, number, *grids)
     model = bulk(tmp_path, text + card("MAT1", 2, 7e10, "", 0.3, 2700.0))
-    assert model.families == {"material:MAT1 1": ("PSOLID 1", "PSOLID 2")}
+    assert model.families["material:MAT1 1"] == ("PSOLID 1", "PSOLID 2")
 
 
 @pytest.mark.nightly

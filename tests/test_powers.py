@@ -34,6 +34,7 @@ from femubench.core.case.writing import write_case
 from femubench.core.fem.alteration import Alteration, alter_model
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.modal.grouped_reduction import reduce_groups
+from femubench.core.twin.disguise import disguise_case
 from femubench.effect import FrameEffect
 from femubench.fem import (
     FloatArray,
@@ -323,9 +324,11 @@ def test_a_basis_holds_what_a_preload_does(folded: Model) -> None:
     added = taut(folded, "UPRIGHT", 300.0)
     given = {**folded.powers, "preload:sail": {1: (added, sp.csc_array(added.shape))}}
     drawn = replace(folded, stiffness=sp.csc_array(folded.stiffness + added), powers=given)
+    drawn = replace(drawn, group_kinds={**folded.group_kinds, "sail": "preload"})
     small = reduce_case(made(drawn))
     assert small.whole is drawn
     assert PRELOAD.places(small.model) == ("preload:sail",)
+    assert PRELOAD.parameters(small.model, "preload:sail")[0].scale == 0.5
     for value in (-1.0, 0.5):
         own, whole = (PRELOAD.extend(m, "preload:sail", [value]) for m in (small.model, drawn))
         np.testing.assert_allclose(hertz(own, 12), hertz(whole, 12), rtol=1e-3)
@@ -347,7 +350,9 @@ def test_a_preload_is_that_of_a_frame_and_stays_in_its_case(tmp_path: Path) -> N
     at = model.dofs.xyz[model.dofs.node == model.dofs.node[0]][:1]
     case = case_of(model, modes_at(model, Sensors(("a",), at, ("x",)), 4), 3)
     write_case(tmp_path / "case", case)
-    model = femubench.read_case(tmp_path / "case").model
+    read = femubench.read_case(tmp_path / "case")
+    assert disguise_case(read, np.random.default_rng(0)).model.powers == {}
+    model = read.model
     assert PRELOAD.places(model) == ("preload:beam",)
     assert not model.groups
     assert PRELOAD.parameters(model, "preload:beam")[0].scale == 0.5

@@ -21,7 +21,7 @@ from femubench.core.case.files import LARGEST_FILE, CaseFiles
 from femubench.core.case.nodes import MatrixGeometry, read_dofs
 from femubench.core.case.schema import LARGEST, GroupedSpec, GroupSpec, MatricesSpec
 from femubench.core.errors import FemubenchError, InputError, ModelError
-from femubench.core.fem.group_factors import MATERIAL, PRELOAD, SET
+from femubench.core.fem.group_factors import PRELOAD, SET
 from femubench.core.fem.model import Model
 from femubench.core.files import MIB, limit_memory, open_regular
 from femubench.core.roles import Reader
@@ -272,33 +272,25 @@ def with_groups(
                 added = groups.pop(spec.name)
                 powers[f"{PRELOAD}{spec.name}"] = {1: (added, sp.csc_array(added.shape))}
     priors = {spec.name: spec.prior for spec in specs if spec.prior is not None}
-    kinds = {spec.name: spec.kind for spec in specs if spec.kind is not None}
     model = replace(model, groups=groups, mass_groups=mass_groups, powers=powers)
-    return replace(model, group_priors=priors, group_kinds={**model.group_kinds, **kinds})
+    kinds = {**model.group_kinds, **{s.name: s.kind for s in specs if s.kind is not None}}
+    return replace(model, group_priors={**model.group_priors, **priors}, group_kinds=kinds)
 
 
 def with_families(model: Model, spec: GroupedSpec) -> Model:
-    """Return a model from files with the sets and materials that its case states of its groups.
+    """Return a model from files with the sets that its case states of its groups.
 
     Raises:
         BadKey: with a path below `model`.
     """
-    known = {*model.groups, *model.mass_groups}
-    found = {word: [*own] for word, own in model.families.items()}
-    for i, group in enumerate(spec.groups):
-        if group.material is not None:
-            check_known("group", group.name, known, ("groups", i, "material"))
-            for word, own in found.items():
-                if word.startswith(MATERIAL) and group.name in own:
-                    own.remove(group.name)
-            found.setdefault(f"{MATERIAL}{group.material}", []).append(group.name)
     check_unique((("sets", i, "name"), item.name) for i, item in enumerate(spec.sets))
     for i, item in enumerate(spec.sets):
         check_unique((("sets", i, "groups", j), name) for j, name in enumerate(item.groups))
         for j, name in enumerate(item.groups):
+            known = {*model.groups, *model.mass_groups}
             check_known("group", name, known, ("sets", i, "groups", j))
-        found[f"{SET}{item.name}"] = [*item.groups]
-    return replace(model, families={word: tuple(own) for word, own in found.items() if own})
+    sets = {f"{SET}{item.name}": tuple(item.groups) for item in spec.sets}
+    return replace(model, families={**model.families, **sets})
 
 
 def _rows(entry: int | str, geometry: MatrixGeometry) -> list[int]:

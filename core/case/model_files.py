@@ -134,6 +134,9 @@ def model_of_file(spec: FileSpec, files: CaseFiles, readers: Collection[Reader])
     model = read_as_it_is(paths, readers)
     if isinstance(model.geometry, MatrixGeometry):
         model = with_families(with_groups(model, spec.groups, files, readers), spec)
+    elif spec.groups or spec.sets:
+        key = "groups" if spec.groups else "sets"
+        raise BadKey((key,), f"{spec.file} gives members, which are no groups", f"no {key}")
     return in_si(model, spec.unit)
 
 

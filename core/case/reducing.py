@@ -106,7 +106,8 @@ def _small_model(model: Model, found: GroupedReduction) -> Model:
         geometry=MatrixGeometry(names, small, mesh=mesh, spans=spans),
         # What holds to ground, and what not, is not to be seen in coordinates that lie nowhere.
         group_kinds={
-            name: GroupPriors(model).kind(name) for name in {**model.groups, **model.mass_groups}
+            **model.group_kinds,  # of preloads, too
+            **{n: GroupPriors(model).kind(n) for n in {**model.groups, **model.mass_groups}},
         },
         groups=sparse(found.groups),
         mass_groups=sparse(found.mass_groups),

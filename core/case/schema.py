@@ -353,7 +353,6 @@ class GroupSpec(TomlTable):
     kind: Literal["part", "joint", "support", "preload"] | None = Field(
         None, description="'part', 'joint', 'support' or 'preload': what is known of it"
     )
-    material: Name | None = Field(None, description="a name: groups of one material are a family")
 
 
 class GroupSetSpec(TomlTable):

@@ -131,7 +131,7 @@ def has_place(model: Model, place: str) -> bool:
         return True
     bare = split_direction(bare_place(place).removesuffix(":branch"))[0]
     groups = (*Groups(model).places("stiffness"), *Groups(model).places("mass"))
-    if {bare, place} & set(groups):
+    if {bare, place} & {*groups, *model.families}:
         return True
     try:
         return bool(ModelPlaces(model).node_pairs(bare))

@@ -137,10 +137,9 @@ def _place(wireframe: Wireframe, model: Model, word: str) -> DrawnPlace:
     if plain.kind == "all" or (model.structure is None and plain.kind != "elsewhere"):
         return plain
     if model.structure is None:
-        if names := Groups(model).names(head):
-            lines = [line for name in names for line in _lines(wireframe, f"{GROUP}{name}")]
-            ends = [end for line in lines for end in line]
-            return DrawnPlace(word, "outline" if ends else "elsewhere", points=tuple(ends))
+        groups = (f"{GROUP}{name}" for name in Groups(model).names(head))
+        if drawn := [end for g in groups for line in _lines(wireframe, g) for end in line]:
+            return DrawnPlace(word, "outline", points=tuple(drawn))
         with suppress(ModelError):
             pairs = ModelPlaces(model).node_pairs(head)
             ends = [to_point(ModelPlaces(model).nodes[name]) for pair in pairs for name in pair]

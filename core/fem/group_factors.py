@@ -60,7 +60,7 @@ class Groups:
         for word, names in self.model.families.items():
             own = groups.keys() & names
             if 1 < len(own) < len(groups):
-                found.setdefault(frozenset(own), word)
+                found.setdefault(frozenset(names), word)
         return tuple(found.values())
 
     def names(self, place: str) -> tuple[str, ...]:

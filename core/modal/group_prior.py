@@ -102,7 +102,7 @@ class GroupPriors:
             >>> modal.GroupPriors(model).std("deck")
             0.1
         """
-        name = self._least_known(name)
+        name = self._least_known(name, matrix)
         if name in self.model.group_priors:
             return float(np.log(self.model.group_priors[name]) / QUARTILE)
         kind = KINDS[self.kind(name)]
@@ -118,7 +118,7 @@ class GroupPriors:
             >>> modal.GroupPriors(model).largest_factor("deck")
             inf
         """
-        return KINDS[self.kind(self._least_known(name))].most
+        return KINDS[self.kind(self._least_known(name, "stiffness"))].most
 
     def kind(self, name: str) -> str:
         """Return the kind of a group, a key of `KINDS`: what the case states, else what is found.
@@ -134,10 +134,11 @@ class GroupPriors:
         stated = self.model.group_kinds.get(name)
         return stated or ("support" if name in _supports(self.model) else "part")
 
-    def _least_known(self, name: str) -> str:
-        groups = {**self.model.groups, **self.model.mass_groups}
-        family = () if name in groups else self.model.families.get(name, ())
-        return max(family, key=self.std, default=name)
+    def _least_known(self, name: str, matrix: Matrix) -> str:
+        groups = self.model.groups if matrix == "stiffness" else self.model.mass_groups
+        family = [n for n in self.model.families.get(name, ()) if n in groups]
+        known = {n: (self.std(n, matrix), self.largest_factor(n)) for n in family}
+        return name if name in groups else max(family, key=lambda n: known[n], default=name)
 
 
 @cache_by_model

@@ -212,8 +212,8 @@ def _in_another_order(model: Model, geometry: MatrixGeometry, names: Disguise) -
         mass_groups={groups[name]: turned(part) for name, part in model.mass_groups.items()},
         powers={},  # no disguise has plates, nor knows what is held
         grounds={},
-        group_priors={groups[name]: prior for name, prior in model.group_priors.items()},
-        group_kinds={groups[name]: kind for name, kind in model.group_kinds.items()},
+        group_priors={groups[n]: prior for n, prior in model.group_priors.items() if n in groups},
+        group_kinds={groups[n]: kind for n, kind in model.group_kinds.items() if n in groups},
         families={
             families[word]: tuple(groups[n] for n in own) for word, own in model.families.items()
         },

@@ -189,8 +189,9 @@ class Changes:
                 for name, elements in element_sets(structure, word).items()
             ]
         groups, kind = Groups(self.model), _KINDS.get(word)
-        every = groups.places("stiffness") + groups.families("stiffness")
-        places = [place for place in every if kind and place.startswith(kind)]
+        every = (*groups.places("stiffness"), *self.model.families)
+        stiff = self.model.groups.keys()
+        places = [p for p in every if kind and p.startswith(kind) and stiff & groups.names(p)]
         if not places:
             need = _MISSING.get(word, "a frame of members")
             raise NotApplicable(f"the model has no {word} to scale: changes={word} needs {need}")
@@ -219,13 +220,11 @@ class Changes:
                 std = GroupPriors(model).std(name, matrix)
                 limit = max(20.0, float(np.exp(_WIDEST * std)))
             else:
-                limit = (
-                    100.0 if matrix == "stiffness" and name in GroupPriors(model).supports else 20.0
-                )
+                held = GroupPriors(model).supports.issuperset(Groups(model).names(place))
+                limit = 100.0 if matrix == "stiffness" and held else 20.0
             at = f"{matrix} {place}", quantity, (place,)
-            upper = min(
-                limit, GroupPriors(model).largest_factor(name) if matrix == "stiffness" else limit
-            )
+            most = GroupPriors(model).largest_factor(name) if matrix == "stiffness" else np.inf
+            upper = min(limit, most)
             found.append(Change.scale_property(*at, prior_std=std, lower=1.0 / limit, upper=upper))
         return found
 
@@ -361,7 +360,10 @@ class Changes:
             ]
             placed = [replace(c, name=f"{name} {c.places[0]}") for c in placed]
             found += placed if prior_std is not None else [c.without_prior() for c in placed]
-        _check_apart({change.name: change.places for change in found if change.quantity})
+        names = Groups(self.model).names
+        _check_apart(
+            {c.name: [n for p in c.places for n in names(p) or (p,)] for c in found if c.quantity}
+        )
         return found
 
     def parameterise(self, words: str) -> ParametricModel:

@@ -48,9 +48,10 @@ class MaterialEffect(FrameEffect):
         """Return the relative change; of a group with a prior of its own, that of a factor."""
         name = f"change of {self.constant}"
         known, group = GroupPriors(model), place.removeprefix(Groups.PREFIX)
-        parts = Groups(model).names(place)
+        matrix: Literal["mass", "stiffness"] = "stiffness" if self.constant == "E" else "mass"
+        own = model.groups if self.constant == "E" else model.mass_groups
+        parts = own.keys() & Groups(model).names(place)
         if any(part in model.group_priors or known.kind(part) != "part" for part in parts):
-            matrix: Literal["mass", "stiffness"] = "stiffness" if self.constant == "E" else "mass"
             # What a joint is stiffer by, as by a fillet, is no defect: the drawing lacks it.
             soft = self.constant == "E" and np.isfinite(known.largest_factor(group))
             most = 1.0 if soft else np.inf
@@ -155,8 +156,7 @@ class MemberStiffness(MaterialEffect):
         """Return members and families, or the groups; a single one is `youngs-modulus`."""
         if model.structure is None:
             return Groups(model).places("stiffness") + Groups(model).families("stiffness")
-        parts = _parts(model.structure.frame)
-        return parts if len(parts) > 1 else ()
+        return _parts(model.structure.frame)
 
 
 class MemberMass(MaterialEffect):
@@ -171,8 +171,7 @@ class MemberMass(MaterialEffect):
         """Return members and families; a single one is `density`."""
         if model.structure is None:
             return ()
-        members = _parts(model.structure.frame)
-        return members if len(members) > 1 else ()
+        return _parts(model.structure.frame)
 
 
 class GroupMass(MaterialEffect):
@@ -224,5 +223,5 @@ class GroupMaterial(GroupMass):
 
 
 def _parts(frame: Frame) -> tuple[str, ...]:
-    """Return the members, then sets and sections of more than one."""
-    return (*frame.member_index, *Places(frame).sets())
+    """Return the members, then sets and sections of more than one; nothing of a single member."""
+    return (*frame.member_index, *Places(frame).sets()) if len(frame.members) > 1 else ()

@@ -225,14 +225,15 @@ def _model_of(
 
 
 def _find_families(deck: SolidDeck, material: Mapping[int, str]) -> dict[str, tuple[str, ...]]:
-    """Return the groups of every material of two or more; one of several materials is in none."""
+    """Return the groups of every material; one of several materials is in none."""
     found: dict[str, tuple[str, ...]] = {}
     for name, numbers in deck.groups().items():
         own = {deck.metals.get(material[n], material[n]) for n in numbers}
         if len(own) == 1:
-            word = f"{Groups.MATERIAL}{own.pop()}"
+            # No name in a word for a place has one of these.
+            word = Groups.MATERIAL + re.sub("[@/:]", "-", own.pop())[:80]
             found[word] = (*found.get(word, ()), name)
-    return {word: own for word, own in found.items() if len(own) > 1}
+    return found
 
 
 def _grounds(
