@@ -144,7 +144,7 @@ def test_two_hidden_effects_are_both_found(seed: int) -> None:
     assert verdict.right, verdict.reason
 
 
-@pytest.mark.slow(20)
+@pytest.mark.nightly
 def test_an_oscillator_whose_frequency_no_grid_has_is_found_at_its_place() -> None:
     """It sits at R1 and resonates between two points of the grid, where others promise more."""
     verdict, answer, _ = judged(Blind(10_019, structure="table", hidden="pair"))

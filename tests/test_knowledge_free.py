@@ -82,7 +82,7 @@ def test_who_knows_the_truth_in_part_is_below_shifted_on_twins_and_marked() -> N
             assert name == "shifted" or board.loc[name, "twins"] < board.loc["shifted", "twins"]
 
 
-@pytest.mark.slow(20)
+@pytest.mark.nightly  # quicker of one strategy: tests/test_stretched_twins.py
 def test_ratios_that_are_known_by_heart_are_no_gain_on_a_stretched_twin() -> None:
     found = remember(["suite/gable"]).set_index("strategy")
     for share in ("25", "50", "100"):
