@@ -116,7 +116,8 @@ def case_with(model: Model) -> Case:
 def test_families_read_back_as_they_were_written_and_wrong_ones_are_one_line(
     tmp_path: Path,
 ) -> None:
-    write_case(tmp_path / "beam", case_with(BEAM))
+    own = {"material:oak": ("left",)}
+    write_case(tmp_path / "beam", case_with(replace(BEAM, families={**own, **FAMILIES})))
     file = tmp_path / "beam" / "case.toml"
     # What is of one material by its deck is a set where no deck says it.
     written = {BEARINGS: FAMILIES[BEARINGS], "set:larch": FAMILIES[SPAN]}

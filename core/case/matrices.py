@@ -284,10 +284,10 @@ def with_families(model: Model, spec: GroupedSpec) -> Model:
         BadKey: with a path below `model`.
     """
     check_unique((("sets", i, "name"), item.name) for i, item in enumerate(spec.sets))
+    known = {*model.groups, *model.mass_groups}
     for i, item in enumerate(spec.sets):
         check_unique((("sets", i, "groups", j), name) for j, name in enumerate(item.groups))
         for j, name in enumerate(item.groups):
-            known = {*model.groups, *model.mass_groups}
             check_known("group", name, known, ("sets", i, "groups", j))
     sets = {f"{SET}{item.name}": tuple(item.groups) for item in spec.sets}
     return replace(model, families={**model.families, **sets})

@@ -17,7 +17,7 @@ from femubench.core.case.nodes import DOF_COLUMNS, INTERNAL, MatrixGeometry
 from femubench.core.case.table_text import csv_bytes, number
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Place
-from femubench.core.fem.group_factors import PRELOAD
+from femubench.core.fem.group_factors import PRELOAD, SET
 from femubench.core.fem.kinematics import node_at
 from femubench.core.fem.mesh import SAME_STATION
 from femubench.core.fem.model import LowRank, Model
@@ -192,7 +192,8 @@ def matrix_keys(
         if kind := "preload" if name in preloads else model.group_kinds.get(name):
             table["kind"] = kind
         tables.append(table)
-    families = {word.partition(":")[2]: own for word, own in model.families.items()}
+    kept = {w: own for w, own in model.families.items() if w.startswith(SET) or own[1:]}
+    families = {word.partition(":")[2]: own for word, own in kept.items()}
     sets = [{"name": name, "groups": [*own]} for name, own in families.items()]
     listed: Keys = {"groups": tables, "sets": sets}
     return keys | {key: found for key, found in listed.items() if found}, files

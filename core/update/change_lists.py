@@ -212,19 +212,18 @@ class Changes:
         return self._factors(matrix, Groups(self.model).places(matrix), own_prior=own_prior)
 
     def _factors(self, matrix: Matrix, places: Sequence[str], *, own_prior: bool) -> list[Change]:
-        model, quantity = self.model, "E" if matrix == "stiffness" else "density"
+        known, quantity = GroupPriors(self.model), "E" if matrix == "stiffness" else "density"
         found = []
         for place in places:
             name, std = place.removeprefix(GROUP), None
             if own_prior:
-                std = GroupPriors(model).std(name, matrix)
+                std = known.std(name, matrix)
                 limit = max(20.0, float(np.exp(_WIDEST * std)))
             else:
-                held = GroupPriors(model).supports.issuperset(Groups(model).names(place))
+                held = known.supports.issuperset(Groups(self.model).names(place))
                 limit = 100.0 if matrix == "stiffness" and held else 20.0
             at = f"{matrix} {place}", quantity, (place,)
-            most = GroupPriors(model).largest_factor(name) if matrix == "stiffness" else np.inf
-            upper = min(limit, most)
+            upper = min(limit, known.largest_factor(name)) if matrix == "stiffness" else limit
             found.append(Change.scale_property(*at, prior_std=std, lower=1.0 / limit, upper=upper))
         return found
 
