@@ -42,7 +42,7 @@ def _check_braces(model: FrameSpec) -> None:
             what = f"nothing moves along {item.direction} in plane {model.plane!r}"
             raise BadKey(("braces", i, "direction"), what, ", ".join(moving))
         for j, end in enumerate(item.ends):
-            check_known("joint", end, joints, ("braces", i, "ends", j))
+            _check_known("joint", end, joints, ("braces", i, "ends", j))
         if item.ends[0] == item.ends[1]:
             raise BadKey(("braces", i, "ends"), "the brace has length zero", "two different joints")
 
@@ -74,17 +74,12 @@ def check_frame(model: FrameSpec) -> None:
     members = {member.name: member.elements for member in model.members}
     for key in ("preloads", "eccentricities", "couplings"):
         for i, item in enumerate(getattr(model, key)):
-            check_known("member", item.member, members, (key, i, "member"))
+            _check_known("member", item.member, members, (key, i, "member"))
     check_unique((("joint_kinds", i, "type"), k.type) for i, k in enumerate(model.joint_kinds))
     kinds = {joint.type or joint.name for joint in model.joints}
     for i, kind in enumerate(model.joint_kinds):
-        check_known("joint type", kind.type, kinds, ("joint_kinds", i, "type"))
-    check_unique((("sets", i, "name"), group.name) for i, group in enumerate(model.sets))
-    for i, group in enumerate(model.sets):
-        path = ("sets", i, "members")
-        check_unique(((*path, j), name) for j, name in enumerate(group.members))
-        for j, name in enumerate(group.members):
-            check_known("member", name, members, (*path, j))
+        _check_known("joint type", kind.type, kinds, ("joint_kinds", i, "type"))
+    check_sets([(group.name, group.members) for group in model.sets], "member", members)
     for i, factor in enumerate(model.factors):
         if factor.factor == 0.0 and factor.quantity not in MAY_VANISH:
             what = f"a factor 0 leaves no {factor.quantity}"
@@ -113,11 +108,11 @@ def check_frame(model: FrameSpec) -> None:
 def _check_links(model: FrameSpec) -> None:
     joints = {joint.name for joint in model.joints}
     for i, link in enumerate(model.links):
-        check_known("joint", link.leads, joints, ("links", i, "leads"))
+        _check_known("joint", link.leads, joints, ("links", i, "leads"))
         path: KeyPath = ("links", i, "follows")
         check_unique(((*path, j), name) for j, name in enumerate(link.follows))
         for j, name in enumerate(link.follows):
-            check_known("joint", name, joints, (*path, j))
+            _check_known("joint", name, joints, (*path, j))
             if name == link.leads:
                 raise BadKey((*path, j), f"joint {name!r} follows itself", "another joint")
         _check_directions(link.motions, model.plane, ("links", i, "motions"))
@@ -137,12 +132,23 @@ def _bodies(model: FrameSpec, *, members: bool) -> dict[str, set[str]]:
     return group
 
 
-def check_known(
+def _check_known(
     kind: str, name: str, known: Collection[str], path: KeyPath, expected: str | None = None
 ) -> None:
-    """Check that a name is one of those that there are."""
     if name not in known:
         raise BadKey(path, f"there is no {kind} {name!r}", expected or f"the name of a {kind}")
+
+
+def check_sets(
+    sets: Sequence[tuple[str, Sequence[str]]], kind: str, known: Collection[str]
+) -> None:
+    """Check that sets have names of their own and list each once what there is of a kind."""
+    check_unique((("sets", i, "name"), name) for i, (name, _) in enumerate(sets))
+    for i, (_, listed) in enumerate(sets):
+        path = ("sets", i, f"{kind}s")
+        check_unique(((*path, j), name) for j, name in enumerate(listed))
+        for j, name in enumerate(listed):
+            _check_known(kind, name, known, (*path, j))
 
 
 def check_unique(names: Iterable[tuple[KeyPath, str]]) -> None:
@@ -197,7 +203,7 @@ def _check_members(model: FrameSpec) -> None:
             raise BadKey(("members", i, "ends"), what, "two different joints")
         for key, table in (("section", model.sections), ("material", model.materials)):
             expected = ", ".join(table) or f"a table [model.{key}s.NAME]"
-            check_known(key, getattr(member, key), table, ("members", i, key), expected)
+            _check_known(key, getattr(member, key), table, ("members", i, key), expected)
         if member.up is not None:
             _check_up(model, i, places[member.ends[1]] - places[member.ends[0]])
         elements += member.elements
@@ -222,7 +228,7 @@ def _check_ends(
     ends = {member.name: member.ends for member in model.members}
     seen = set()
     for i, item in enumerate(items):
-        check_known("member", item.member, ends, (key, i, "member"), "a member")
+        _check_known("member", item.member, ends, (key, i, "member"), "a member")
         if item.joint not in ends[item.member]:
             what = f"member {item.member!r} does not end at {item.joint!r}"
             raise BadKey((key, i, "joint"), what, f"one of {', '.join(ends[item.member])}")

@@ -15,7 +15,7 @@ from typing import IO, Any
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.core.case.checks import check_known, check_unique
+from femubench.core.case.checks import check_sets, check_unique
 from femubench.core.case.faults import BadKey, Misfit, at_key
 from femubench.core.case.files import LARGEST_FILE, CaseFiles
 from femubench.core.case.nodes import MatrixGeometry, read_dofs
@@ -283,12 +283,8 @@ def with_families(model: Model, spec: GroupedSpec) -> Model:
     Raises:
         BadKey: with a path below `model`.
     """
-    check_unique((("sets", i, "name"), item.name) for i, item in enumerate(spec.sets))
     known = {*model.groups, *model.mass_groups}
-    for i, item in enumerate(spec.sets):
-        check_unique((("sets", i, "groups", j), name) for j, name in enumerate(item.groups))
-        for j, name in enumerate(item.groups):
-            check_known("group", name, known, ("sets", i, "groups", j))
+    check_sets([(item.name, item.groups) for item in spec.sets], "group", known)
     sets = {f"{SET}{item.name}": tuple(item.groups) for item in spec.sets}
     return replace(model, families={**model.families, **sets})
 

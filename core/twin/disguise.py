@@ -214,9 +214,7 @@ def _in_another_order(model: Model, geometry: MatrixGeometry, names: Disguise) -
         grounds={},
         group_priors={groups[n]: prior for n, prior in model.group_priors.items() if n in groups},
         group_kinds={groups[n]: kind for n, kind in model.group_kinds.items() if n in groups},
-        families={
-            families[word]: tuple(groups[n] for n in own) for word, own in model.families.items()
-        },
+        families={families[w]: tuple(groups[n] for n in own) for w, own in model.families.items()},
         dofs=moved,
         geometry=MatrixGeometry(
             tuple(names.joints[geometry.names[node]] for node in numbers),

@@ -220,8 +220,8 @@ def _model_of(
     small = {name for name in model.groups if heavy.get(name, 0.0) < least}
     springs = GroupPriors(model).supports - heavy.keys()
     kinds = dict.fromkeys(small - springs, "joint")
-    model = replace(model, group_kinds=kinds, families=_find_families(deck, material))
-    return replace(model, mass_groups=masses if len(masses) > 1 else {})
+    masses, families = masses if len(masses) > 1 else {}, _find_families(deck, material)
+    return replace(model, mass_groups=masses, group_kinds=kinds, families=families)
 
 
 def _find_families(deck: SolidDeck, material: Mapping[int, str]) -> dict[str, tuple[str, ...]]:
